@@ -1,0 +1,11 @@
+// The commands of intervale-client, each in a file of its own.
+#pragma once
+
+#include "common/program/program.h"
+
+namespace intervale {
+
+void add_list_command(Program& program);
+void add_fetch_command(Program& program);
+
+}  // namespace intervale

@@ -1,0 +1,85 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/net/fetch.h"
+#include "common/mesh_writer.h"
+#include "common/program/lod_options.h"
+#include "common/program/progress.h"
+
+namespace intervale {
+namespace {
+
+struct FetchCommand {
+  std::string url;
+  FetchOptions fetch;
+  std::optional<std::filesystem::path> output;
+  bool json = false;
+};
+
+Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& options) {
+  Progress progress("receiving " + url.name);
+  return fetch(url, options, [&progress](const StreamClient& client, const FetchFigures& figures) {
+    progress.text(fmt::format("{} updates, {} tetrahedra, {}, error {:.4g}", client.updates(), client.tet_count(),
+                              human_bytes(figures.bytes_received), figures.remaining_error));
+  });
+}
+
+Result<void> report(const FetchCommand& options, const Fetched& fetched, const Mesh& mesh) {
+  const FetchFigures& figures = fetched.figures;
+  const double volume = volume_of(mesh);
+  if (options.json) {
+    return print_json({{"updates", fetched.client.updates()},
+                       {"vertices", mesh.points.size()},
+                       {"tets", mesh.tets.size()},
+                       {"volume", volume},
+                       {"bytes_received", figures.bytes_received},
+                       {"messages", figures.messages},
+                       {"seconds_first_mesh", figures.seconds_first_mesh},
+                       {"seconds", figures.seconds}});
+  }
+  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}\n", fetched.client.description().name,
+                                 fetched.client.updates(), mesh.points.size(), mesh.tets.size(), volume);
+  text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(figures.bytes_received),
+                      figures.messages, 1000 * figures.seconds_first_mesh, figures.complete ? "all" : "budget reached", 1000 * figures.seconds);
+  if (options.output) text += "wrote " + options.output->string() + "\n";
+  return print(text);
+}
+
+Result<void> run(const FetchCommand& options) {
+  const auto url = parse_url(options.url);
+  if (!url) return tl::unexpected(url.error());
+  if (url->name.empty()) return misuse("which data set? " + url->server() + "/NAME is wanted; see intervale-client list " + url->server());
+  if (options.output) {
+    if (auto writable = check_mesh_path(*options.output); !writable) return writable;
+  }
+  const auto fetched = fetch_with_progress(*url, options.fetch);
+  if (!fetched) return tl::unexpected(fetched.error());
+  const Mesh mesh = fetched->client.mesh();
+  if (options.output) {
+    if (auto written = write_mesh(*options.output, mesh); !written) return written;
+  }
+  return report(options, *fetched, mesh);
+}
+
+}  // namespace
+
+void add_fetch_command(Program& program) {
+  const auto options = std::make_shared<FetchCommand>();
+  CLI::App& command = program.add_command("fetch", "Receives a mesh", [options] { return run(*options); });
+  command.add_option("URL", options->url, "ws://host:port/NAME")->required();
+  command
+      .add_option_function<std::string>(
+          "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
+      ->type_name("MESH");
+  add_lod_options(command, options->fetch.lod);
+  add_max_bytes_option(command, options->fetch.max_bytes);
+  add_json_flag(command, options->json);
+}
+
+}  // namespace intervale

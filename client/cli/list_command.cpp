@@ -1,0 +1,63 @@
+#include <fmt/core.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "client/cli/commands.h"
+#include "client/net/http_get.h"
+
+namespace intervale {
+namespace {
+
+struct ListOptions {
+  std::string url;
+  bool json = false;
+};
+
+// What a server says goes to a terminal: no control characters.
+std::string shown(const nlohmann::ordered_json& value) {
+  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  }
+  return text;
+}
+
+std::string line_of(const nlohmann::ordered_json& dataset) {
+  const auto& dims = dataset.at("dims");
+  const auto& range = dataset.at("range");
+  const auto& full = dataset.at("full");
+  return fmt::format("{}: {} x {} x {} samples, range [{}, {}], {} updates, {} tetrahedra in full\n", shown(dataset.at("name")), shown(dims.at(0)),
+                     shown(dims.at(1)), shown(dims.at(2)), shown(range.at(0)), shown(range.at(1)), shown(dataset.at("updates")),
+                     shown(full.at("tets")));
+}
+
+Result<void> list(const ListOptions& options) {
+  const auto url = parse_url(options.url);
+  if (!url) return tl::unexpected(url.error());
+  if (!url->name.empty()) return misuse("list takes a server, without a data set's name: " + url->server());
+  const auto body = http_get(*url, "/api/datasets");
+  if (!body) return tl::unexpected(body.error());
+  // The parser throws on what is no JSON, at() on JSON of another shape: both come from outside, so both end here.
+  try {
+    const auto answer = nlohmann::ordered_json::parse(*body);
+    if (options.json) return print_json(answer);
+    std::string text;
+    for (const auto& dataset : answer.at("datasets")) text += line_of(dataset);
+    return print(text.empty() ? "no data sets\n" : text);
+  } catch (const nlohmann::json::exception&) {
+    return fail(url->authority() + " is not an intervale server of this version: its list of data sets makes no sense");
+  }
+}
+
+}  // namespace
+
+void add_list_command(Program& program) {
+  const auto options = std::make_shared<ListOptions>();
+  CLI::App& command = program.add_command("list", "Lists the data sets of a server", [options] { return list(*options); });
+  command.add_option("URL", options->url, "ws://host:port")->required();
+  add_json_flag(command, options->json);
+}
+
+}  // namespace intervale

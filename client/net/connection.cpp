@@ -1,0 +1,159 @@
+#include "client/net/connection.h"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
+#include <string>
+#include <utility>
+
+#include "protocol/codec.h"
+
+namespace intervale {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using protocol::CloseCode;
+
+}  // namespace
+
+struct StreamConnection::Socket {
+  ServerUrl url;
+  asio::io_context io{1};
+  websocket::stream<beast::tcp_stream> ws{io};
+  beast::flat_buffer buffer;
+  std::uint64_t bytes_received = 0;
+  std::uint64_t messages = 0;
+
+  // Runs one asynchronous operation to its end: Beast's deadlines hold for those only.
+  template <class Start>
+  beast::error_code run(Start start) {
+    beast::error_code result;
+    bool done = false;
+    start([&](beast::error_code error, auto&&...) {
+      result = error;
+      done = true;
+    });
+    if (io.stopped()) io.restart();
+    while (!done && io.run_one() != 0) {
+    }
+    return result;
+  }
+
+  Result<void> connect();
+  Result<void> shake_hands();
+  tl::unexpected<Error> lost(beast::error_code error) const;
+  tl::unexpected<Error> faulted(const protocol::Fault& fault) const;
+};
+
+Result<void> StreamConnection::Socket::connect() {
+  tcp::resolver resolver(io);
+  tcp::resolver::results_type endpoints;
+  beast::error_code error;
+  error = run([&](auto done) {
+    resolver.async_resolve(url.host, url.port, [&endpoints, done](beast::error_code failure, tcp::resolver::results_type found) mutable {
+      endpoints = std::move(found);
+      done(failure);
+    });
+  });
+  if (error) return fail("cannot find the host " + url.host + ": " + error.message());
+  auto& stream = beast::get_lowest_layer(ws);
+  stream.expires_after(kConnectTime);
+  error = run([&](auto done) { stream.async_connect(endpoints, done); });
+  if (error == beast::error::timeout) return fail("cannot connect to " + url.authority() + ": no answer within 5 s");
+  if (error) return fail("cannot connect to " + url.authority() + ": " + error.message());
+  stream.expires_never();  // from here on the WebSocket's own deadlines hold
+  stream.socket().set_option(tcp::no_delay(true), error);
+  return {};
+}
+
+Result<void> StreamConnection::Socket::shake_hands() {
+  ws.set_option(websocket::stream_base::timeout{kConnectTime, kSilenceTime, true});
+  ws.set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
+    request.set(http::field::user_agent, "intervale-client/" INTERVALE_VERSION);
+    request.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
+  }));
+  ws.read_message_max(protocol::kMaxServerMessage);
+  ws.auto_fragment(false);
+  ws.binary(true);
+  websocket::response_type response;
+  const auto error = run([&](auto done) { ws.async_handshake(response, url.authority(), protocol::kPath, done); });
+  if (error == beast::error::timeout) return fail("no answer from " + url.authority() + " within 5 s: is it an intervale server?");
+  if (error == websocket::error::upgrade_declined && response.result() == http::status::service_unavailable) {
+    return fail("the server at " + url.authority() + " takes no new sessions now: it is shutting down or full");
+  }
+  if (error) return fail(url.authority() + " is not an intervale server: " + error.message());
+  if (response[http::field::sec_websocket_protocol] != protocol::kSubprotocol) {
+    return fail(url.authority() + " is not an intervale server: it does not speak " + protocol::kSubprotocol);
+  }
+  return {};
+}
+
+tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) const {
+  if (error == websocket::error::closed) {
+    const auto reason = ws.reason();
+    return fail("the server at " + url.authority() + " closed the session with code " + std::to_string(reason.code));
+  }
+  if (error == websocket::error::message_too_big) return fail("the server at " + url.authority() + " sent a message larger than the protocol allows");
+  if (error == beast::error::timeout) return fail("lost the server at " + url.authority() + ": it fell silent");
+  return fail("lost the server at " + url.authority() + ": " + error.message());
+}
+
+tl::unexpected<Error> StreamConnection::Socket::faulted(const protocol::Fault& fault) const {
+  std::string text = fault.text;
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';  // it goes to a terminal
+  }
+  if (fault.code == CloseCode::no_such_dataset) {
+    return fail("no data set '" + url.name + "' at " + url.server() + "; see intervale-client list " + url.server());
+  }
+  if (fault.code == CloseCode::going_away) return fail("the server at " + url.authority() + " is shutting down");
+  return fail("the server at " + url.authority() + " ended the session: " + text + " (code " + std::to_string(static_cast<unsigned>(fault.code)) +
+              ")");
+}
+
+StreamConnection::StreamConnection(std::unique_ptr<Socket> socket) : socket_(std::move(socket)) {}
+StreamConnection::StreamConnection(StreamConnection&&) noexcept = default;
+StreamConnection& StreamConnection::operator=(StreamConnection&&) noexcept = default;
+StreamConnection::~StreamConnection() = default;
+
+Result<StreamConnection> StreamConnection::open(const ServerUrl& url) {
+  auto socket = std::make_unique<Socket>();
+  socket->url = url;
+  if (auto connected = socket->connect(); !connected) return tl::unexpected(connected.error());
+  if (auto greeted = socket->shake_hands(); !greeted) return tl::unexpected(greeted.error());
+  return StreamConnection(std::move(socket));
+}
+
+Result<void> StreamConnection::send(const protocol::ClientMessage& message) {
+  const auto bytes = protocol::encode(message);
+  const auto error = socket_->run([&](auto done) { socket_->ws.async_write(asio::buffer(bytes), done); });
+  if (error) return socket_->lost(error);
+  return {};
+}
+
+Result<protocol::ServerMessage> StreamConnection::receive() {
+  Socket& socket = *socket_;
+  socket.buffer.clear();
+  if (const auto error = socket.run([&](auto done) { socket.ws.async_read(socket.buffer, done); })) return socket.lost(error);
+  if (socket.ws.got_text()) return fail("the server at " + socket.url.authority() + " sent text, where only binary messages are spoken");
+  ++socket.messages;
+  socket.bytes_received += socket.buffer.size();
+  auto message = protocol::decode_server_message({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()});
+  if (!message) return fail("the server at " + socket.url.authority() + " sent a " + message.error().message);
+  if (const auto* fault = std::get_if<protocol::Fault>(&*message)) return socket.faulted(*fault);
+  return message;
+}
+
+void StreamConnection::close() {
+  socket_->run([this](auto done) { socket_->ws.async_close(websocket::close_code::normal, done); });
+}
+
+std::uint64_t StreamConnection::bytes_received() const { return socket_->bytes_received; }
+std::uint64_t StreamConnection::messages() const { return socket_->messages; }
+
+}  // namespace intervale

@@ -1,0 +1,55 @@
+#include "client/net/url.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstdint>
+
+namespace intervale {
+namespace {
+
+constexpr std::string_view kScheme = "ws://";
+
+bool is_host(std::string_view host, bool bracketed) {
+  return !host.empty() && std::all_of(host.begin(), host.end(), [bracketed](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '.' || (bracketed ? c == ':' || c == '%' : c == '-' || c == '_');
+  });
+}
+
+bool is_port(std::string_view port) {
+  std::uint16_t number = 0;
+  const auto [stop, failure] = std::from_chars(port.data(), port.data() + port.size(), number);
+  return failure == std::errc() && stop == port.data() + port.size() && number != 0;
+}
+
+}  // namespace
+
+std::string ServerUrl::authority() const { return (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + port; }
+
+Result<ServerUrl> parse_url(std::string_view text) {
+  const auto wrong = [text](const char* what) {
+    return misuse("cannot read the URL '" + std::string(text) + "': " + what + "; ws://host:port or ws://host:port/name is wanted");
+  };
+  if (text.starts_with("wss://")) return misuse("wss:// is not supported yet: use ws://, through a tunnel where the network is not trusted");
+  if (!text.starts_with(kScheme)) return wrong("it does not begin with ws://");
+  std::string_view rest = text.substr(kScheme.size());
+  ServerUrl url;
+  if (const auto slash = rest.find('/'); slash != std::string_view::npos) {
+    url.name = rest.substr(slash + 1);
+    rest = rest.substr(0, slash);
+  }
+  if (!url.name.empty() && url.name.back() == '/') url.name.pop_back();
+  if (url.name.find('/') != std::string::npos) return wrong("a data set's name holds no slash");
+
+  const bool bracketed = rest.starts_with('[');
+  const auto end = bracketed ? rest.find(']') : rest.find(':');
+  if (bracketed && end == std::string_view::npos) return wrong("a bracket is missing");
+  url.host = bracketed ? rest.substr(1, end - 1) : rest.substr(0, end);
+  rest = end == std::string_view::npos ? std::string_view() : rest.substr(bracketed ? end + 1 : end);
+  url.port = rest.empty() ? "80" : std::string(rest.substr(1));
+  if (!is_host(url.host, bracketed)) return wrong("the host is no name and no address");
+  if ((!rest.empty() && rest.front() != ':') || !is_port(url.port)) return wrong("the port is not 1 to 65535");
+  return url;
+}
+
+}  // namespace intervale

@@ -1,0 +1,135 @@
+#include "common/interval_volume.h"
+
+#include <xxhash.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "common/front.h"
+#include "common/update.h"
+
+namespace intervale {
+namespace {
+
+std::uint64_t hash(const void* data, std::size_t bytes, std::uint64_t seed) { return XXH3_64bits_withSeed(data, bytes, seed); }
+
+template <class T>
+std::uint64_t hash(std::span<const T> values, std::uint64_t seed) {
+  return hash(values.data(), values.size_bytes(), seed);
+}
+
+std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& parts) {
+  std::uint64_t h = 0;
+  h = hash(std::span<const std::int32_t>(d.grid.dims), h);
+  h = hash(std::span<const double>(d.grid.spacing), h);
+  h = hash(std::span<const double>(d.grid.origin), h);
+  const double range[2] = {d.range.alpha, d.range.beta};
+  h = hash(range, sizeof range, h);
+  h = hash(std::span<const std::uint8_t>(d.base), h);
+  for (const SupercubeSet::Brick& b : parts.set.bricks()) {
+    const std::uint64_t brick[2] = {b.key, b.mask};
+    h = hash(brick, sizeof brick, h);
+  }
+  h = hash(parts.set.occupancy(), h);
+  h = hash(std::span<const UpdateCode>(parts.codes), h);
+  h = hash(std::span<const std::uint8_t>(parts.differences), h);
+  return hash(std::span<const float>(parts.error_levels), h);
+}
+
+std::string where(Vertex c) { return " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")"; }
+
+}  // namespace
+
+IntervalVolume::IntervalVolume(Parts parts)
+    : description_(std::move(parts.description)),
+      domain_(description_.grid.dims),
+      set_(std::move(parts.set)),
+      codes_(std::move(parts.codes)),
+      differences_(std::move(parts.differences)),
+      error_levels_(std::move(parts.error_levels)) {
+  brick_first_.reserve(set_.bricks().size());
+  first_in_brick_.reserve(set_.supercubes());
+  std::uint32_t n = 0;
+  for (std::uint32_t b = 0; b < set_.bricks().size(); ++b) {
+    brick_first_.push_back(n);
+    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey) {
+      first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
+      const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
+      for (UpdateIndex i = first; i < end; ++i) n += codes_[i].coefficients();
+    });
+  }
+}
+
+Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
+  const Description& d = parts.description;
+  if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
+  if (parts.codes.size() != parts.set.size()) return fail("updates and supercubes do not fit");
+  if (parts.error_levels.size() > kErrorLevels || (parts.error_levels.empty() && !parts.codes.empty())) return fail("error levels out of range");
+  for (std::size_t i = 0; i < parts.error_levels.size(); ++i) {
+    if (!std::isfinite(parts.error_levels[i]) || parts.error_levels[i] < (i == 0 ? 0.0f : parts.error_levels[i - 1]))
+      return fail("error levels do not ascend");
+  }
+  std::uint64_t coefficients = 0;
+  for (UpdateCode c : parts.codes) {
+    if (c.side_difference() > 2 || c.coefficients() > kMaxCuts || c.error_level() >= parts.error_levels.size())
+      return fail("an update's code is none");
+    coefficients += c.coefficients();
+  }
+  if (coefficients != parts.differences.size()) return fail("updates and coefficients do not fit");
+  if (coefficients > std::numeric_limits<std::uint32_t>::max()) return fail("more than 2^32 coefficients");
+  const Domain domain(d.grid.dims);
+  if (auto base = decode_base(d.base, domain); !base) return tl::unexpected(base.error());
+  parts.description.updates = parts.codes.size();
+  parts.description.coefficients = coefficients;
+  parts.description.content_hash = content_hash(d, parts);
+  return IntervalVolume(std::move(parts));
+}
+
+UpdateView IntervalVolume::update(const Place& p) const {
+  std::uint32_t first = brick_first_[p.brick] + first_in_brick_[p.supercube];
+  for (UpdateIndex i = set_.first(p.brick, p.supercube); i < p.index; ++i) first += codes_[i].coefficients();
+  const UpdateCode code = codes_[p.index];
+  return {code.side_difference(), code.first_cuts(), std::span(differences_).subspan(first, code.coefficients())};
+}
+
+std::size_t IntervalVolume::memory_bytes() const {
+  return sizeof *this + description_.base.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
+         first_in_brick_.size() * 2 + differences_.size() + error_levels_.size() * sizeof(float);
+}
+
+Result<void> IntervalVolume::validate() const {
+  const auto base = decode_base(description_.base, domain_);
+  if (!base) return tl::unexpected(base.error());
+  Front front(description_.grid, *base);
+  std::optional<Error> wrong;
+  set_.for_each_down([&](const Place& p) {
+    if (wrong) return;
+    const Vertex c = set_.centre(p);
+    const auto handle = front.find(c);
+    if (!handle) {
+      wrong = Error{"an update has no parent, or lies outside the box" + where(c)};
+      return;
+    }
+    const Diamond d(c);
+    for (int k = 0; k < d.row->parents; ++k) {
+      const Vertex q = d.parent(k);
+      if (domain_.clamp(q) != q && domain_.tets(Diamond(q)) == 0) continue;
+      const auto parent = set_.find(q);
+      if (parent && error_level(parent->index) < error_level(p.index)) wrong = Error{"an error is greater than its parent's" + where(c)};
+    }
+    if (!apply_update(front, *handle, update(p))) wrong = Error{"an update's coefficients do not fit the sides around it" + where(c)};
+  });
+  if (wrong) return tl::unexpected(*wrong);
+  if (const auto broken = front.validate()) return fail(*broken);
+  if (front.tet_count() != description_.full.tets) {
+    return fail("the full mesh has " + std::to_string(front.tet_count()) + " tetrahedra, " + std::to_string(description_.full.tets) + " expected");
+  }
+  const Mesh mesh = front.mesh();
+  if (mesh.points.size() != description_.full.vertices) {
+    return fail("the full mesh has " + std::to_string(mesh.points.size()) + " vertices, " + std::to_string(description_.full.vertices) + " expected");
+  }
+  return {};
+}
+
+}  // namespace intervale

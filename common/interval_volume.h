@@ -1,0 +1,96 @@
+// Sigma: a compact multiresolution interval volume. Updates only, no field; immutable, shared by all that read it.
+//
+// Weiss and De Floriani 2008, section 6. For each relevant diamond it holds what splitting it takes: the side of its centre and the cuts on its
+// subdivision edges, and the saturated error that says when. The paper spends 12 bytes on each and one on each cut; here supercubes (supercube.h)
+// stand for the coordinates and the pointer. Sides and cuts are kept as differences from what the diamond itself predicts (prediction.h): no larger
+// in memory, and ready for file and wire.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/description.h"
+#include "common/domain.h"
+#include "common/prediction.h"
+#include "common/range.h"
+#include "common/result.h"
+#include "common/supercube.h"
+
+namespace intervale {
+
+inline constexpr int kErrorLevels = 512;  // distinct errors at most; each update's is rounded up to one of them
+
+// One update in 16 bits: the difference of the centre's side, how many coefficients it has, and the level of its error.
+class UpdateCode {
+ public:
+  UpdateCode() = default;
+  explicit UpdateCode(std::uint16_t bits) : bits_(bits) {}
+  // Of `all` coefficients (at most 20), `first` are the first of their surface: none, one (then at most 10 in all) or two.
+  UpdateCode(unsigned side_difference, unsigned all, unsigned first, unsigned error_level)
+      : bits_(std::uint16_t(side_difference | (first == 2 ? all + 9 : all) << 2 | error_level << 7)) {}
+  [[nodiscard]] std::uint16_t bits() const { return bits_; }
+  [[nodiscard]] unsigned side_difference() const { return bits_ & 3u; }
+  [[nodiscard]] unsigned coefficients() const { return shape() > 10 ? shape() - 9 : shape(); }
+  [[nodiscard]] unsigned first_cuts() const { return shape() == 0 ? 0 : shape() > 10 ? 2 : 1; }
+  [[nodiscard]] unsigned error_level() const { return bits_ >> 7; }
+
+ private:
+  [[nodiscard]] unsigned shape() const { return bits_ >> 2 & 31u; }
+  std::uint16_t bits_ = 0;
+};
+
+// An update as differences from the prediction of its diamond.
+struct UpdateView {
+  unsigned side_difference = 0;               // (side - predicted side) modulo 3
+  unsigned first_cuts = 0;                    // so many of the differences are of the first cut of their surface, and come first
+  std::span<const std::uint8_t> differences;  // of each cut on the subdivision edges, modulo 256; see Prediction::encode
+};
+
+class IntervalVolume {
+ public:
+  // What it is made of. Sizes that do not fit together are refused by assemble().
+  struct Parts {
+    Description description;  // updates, coefficients and content_hash are computed
+    SupercubeSet set;
+    std::vector<UpdateCode> codes;          // by number of the update
+    std::vector<std::uint8_t> differences;  // all updates' one after the other
+    std::vector<float> error_levels;        // ascending, at most kErrorLevels
+  };
+  // Fails where the parts do not fit together; validate() checks the meaning.
+  static Result<IntervalVolume> assemble(Parts parts);
+
+  [[nodiscard]] const Description& description() const { return description_; }
+  [[nodiscard]] const Domain& domain() const { return domain_; }
+  [[nodiscard]] const SupercubeSet& set() const { return set_; }
+  [[nodiscard]] UpdateIndex size() const { return set_.size(); }
+
+  // Saturated error in the field's units, rounded up: no smaller than that of any child. Monotone in error_level.
+  [[nodiscard]] float error(UpdateIndex i) const { return error_levels_[codes_[i].error_level()]; }
+  [[nodiscard]] unsigned error_level(UpdateIndex i) const { return codes_[i].error_level(); }
+  [[nodiscard]] std::span<const float> error_levels() const { return error_levels_; }
+  [[nodiscard]] std::span<const UpdateCode> codes() const { return codes_; }
+  [[nodiscard]] std::span<const std::uint8_t> differences() const { return differences_; }
+  [[nodiscard]] UpdateView update(const Place& p) const;  // O(1): at most 55 codes are summed
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+  // Checks every invariant: parents of updates are there, updates lie in the box, errors are saturated, sides fit coefficients, refined to the end it
+  // gives the mesh that the description promises. Fails with the first that does not hold. Takes as long as an extraction.
+  [[nodiscard]] Result<void> validate() const;
+
+ private:
+  explicit IntervalVolume(Parts parts);
+  Description description_;
+  Domain domain_;
+  SupercubeSet set_;
+  std::vector<UpdateCode> codes_;
+  std::vector<std::uint32_t> brick_first_;     // difference, of each brick
+  std::vector<std::uint16_t> first_in_brick_;  // difference, of each supercube: 64 supercubes have no more than 57344
+  std::vector<std::uint8_t> differences_;
+  std::vector<float> error_levels_;
+};
+
+}  // namespace intervale

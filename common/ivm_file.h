@@ -1,0 +1,29 @@
+// Interval volumes as files (.ivm). FORMAT.md is the specification.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/interval_volume.h"
+#include "common/result.h"
+
+namespace intervale {
+
+inline constexpr std::uint32_t kIvmVersion = 1;
+
+// The file's bytes. Equal volumes give equal bytes; the name is not stored.
+[[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume);
+
+// The inverse, for bytes from outside: every checksum is compared, every count bounded by the bytes there are before anything is allocated.
+[[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name);
+
+// Writes aside and renames.
+[[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume);
+
+// Reads a file; the name is the file's, without folders and extension. Errors begin with the path.
+[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path);
+
+}  // namespace intervale

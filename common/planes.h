@@ -1,0 +1,31 @@
+// Planes: like symbols side by side, each plane compressed by itself, so that each has a code table of its own.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace intervale {
+
+// Appends a plane to out: its length, the length it is stored in (both variable-length), and its bytes, compressed (zstd) unless that gains nothing.
+void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> plane, int compression);
+
+// Takes one plane off the front of bytes from outside. Nothing if they are no plane, or one of more than most bytes. Allocates no more than it gives
+// back.
+[[nodiscard]] std::optional<std::vector<std::uint8_t>> take_plane(std::span<const std::uint8_t>& bytes, std::size_t most);
+
+// Variable-length numbers: seven bits a byte, lowest first, the top bit set on all but the last.
+void append_varint(std::vector<std::uint8_t>& out, std::uint64_t value);
+[[nodiscard]] std::optional<std::uint64_t> take_varint(std::span<const std::uint8_t>& bytes);
+
+// Values of a few bits packed into bytes, lowest first: four of two bits a byte.
+[[nodiscard]] std::vector<std::uint8_t> pack_pairs(std::span<const std::uint8_t> values);
+[[nodiscard]] inline unsigned pair_at(std::span<const std::uint8_t> packed, std::size_t i) { return packed[i / 4] >> (2 * (i % 4)) & 3u; }
+
+// width-byte words turned to planes: all lowest bytes, then all second ones, ...; and back.
+[[nodiscard]] std::vector<std::uint8_t> split_bytes(std::span<const std::uint64_t> words, unsigned width);
+[[nodiscard]] std::vector<std::uint64_t> join_bytes(std::span<const std::uint8_t> bytes, unsigned width);  // bytes.size() a multiple of width
+
+}  // namespace intervale

@@ -1,0 +1,71 @@
+// What a diamond knows about its split before it happens: where its centre lies, and where the cuts on the subdivision edges.
+//
+// All cuts of one surface around one diamond tell of the same few values. A cut at the fraction t of an edge says that the field's distances from the
+// surface's value at the edge's ends are as t to 1 - t; along the spine and the edges from its ends that gives every vertex's distance in one unit,
+// and linear interpolation along the spine the centre's: its side, and the first cut. The first cut in turn tells the centre's true distance, and so
+// the others, up to their rounding. Where alpha and beta both cut one edge, that is beta - alpha in the same unit, and alpha's cuts predict beta's.
+//
+// An update therefore keeps differences from the prediction, which are small. It looks at nothing but the diamond, so the differences are made once
+// and are right in whatever order updates arrive. Arithmetic is plain double precision in a fixed order: every machine predicts alike.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "common/diamond.h"
+#include "common/range.h"
+
+namespace intervale {
+
+inline constexpr int kMaxCuts = 2 * kMaxVertices;  // on the subdivision edges of one diamond
+
+// An unsplit diamond, as its front or its field know it.
+struct DiamondContext {
+  const DiamondType* row = nullptr;
+  std::uint32_t sides = 0;     // two bits each, by local vertex
+  std::uint32_t vertices = 0;  // a bit for each local vertex that exists
+  // Of each edge, by surface (0 alpha, 1 beta): 2 q + 1, the cut's place from the first of edge_ends in 1/512; 0 where there is none.
+  std::array<std::array<std::uint16_t, 2>, kMaxEdges> cut{};
+
+  [[nodiscard]] Side side(int v) const { return Side(sides >> (2 * v) & 3); }
+  [[nodiscard]] bool has(int v) const { return (vertices >> v & 1) != 0; }
+
+  // How many cuts there are on the subdivision edges if the centre lies there, and how many of them are the first of their surface.
+  struct CutCount {
+    int all = 0, first = 0;
+  };
+  [[nodiscard]] CutCount count_cuts(Side centre) const;
+};
+
+class Prediction {
+ public:
+  explicit Prediction(const DiamondContext& context);  // which must outlive it
+
+  [[nodiscard]] Side side() const { return side_; }
+
+  // Differences of the cuts q from their prediction, modulo 256, and back; count_cuts(centre).all of them. Cuts in order of local vertices, alpha
+  // before beta; differences with each surface's first cut before all others, for its prediction is further off than theirs. Once only.
+  void encode(Side centre, std::span<const std::uint8_t> q, std::uint8_t* differences);
+  void decode(Side centre, std::span<const std::uint8_t> differences, std::uint8_t* q);
+
+ private:
+  struct Surface {                              // distances of the field from one surface's value, in a unit of the surface's own
+    std::array<double, kMaxVertices> distance;  // of each vertex
+    std::uint32_t known = 0;                    // a bit for each vertex whose distance is more than a guess
+    double centre = 0;                          // of the centre: above the value where positive
+  };
+  [[nodiscard]] bool above(int surface, int v) const { return surface == 0 ? context_.side(v) != Side::below : context_.side(v) == Side::above; }
+  [[nodiscard]] double place(int edge, int surface) const { return context_.cut[edge][surface] * (1.0 / 512); }
+  void measure(int surface);
+  void find_gap();
+  template <class Code>
+  void walk(Side centre, Code&& code);
+
+  const DiamondContext& context_;
+  std::array<Surface, 2> surface_;
+  double gap_ = 0;  // beta - alpha in alpha's unit; 0 where it is not known
+  Side side_ = Side::below;
+};
+
+}  // namespace intervale

@@ -1,0 +1,33 @@
+#include "common/program/describe.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace intervale {
+namespace {
+
+nlohmann::ordered_json number(double value) {
+  if (std::isinf(value)) return value < 0 ? "-inf" : "inf";
+  return value;
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const Description& description) {
+  const Grid& grid = description.grid;
+  const FullMesh& full = description.full;
+  return {
+      {"name", description.name},
+      {"dims", grid.dims},
+      {"spacing", grid.spacing},
+      {"origin", grid.origin},
+      {"range", nlohmann::ordered_json::array({number(description.range.alpha), number(description.range.beta)})},
+      {"refine", description.refine == Refine::uniform ? "uniform" : "boundary"},
+      {"max_error", number(description.max_error)},
+      {"updates", description.updates},
+      {"coefficients", description.coefficients},
+      {"full", {{"vertices", full.vertices}, {"tets", full.tets}, {"indexed_bytes", full.indexed_bytes()}}},
+  };
+}
+
+}  // namespace intervale

@@ -1,0 +1,109 @@
+#include "common/program/program.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+namespace intervale {
+namespace {
+
+// The parser's messages may hold line breaks; an error of ours is one line.
+std::string one_line(std::string text) {
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+std::string environment_name(const std::string& long_name) {
+  std::string name = "INTERVALE_" + long_name;
+  for (char& c : name) c = c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return name;
+}
+
+void name_in_environment(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    const auto& names = option->get_lnames();
+    if (names.empty() || names.front() == "help" || names.front() == "version" || !option->get_envname().empty()) continue;
+    option->envname(environment_name(names.front()));
+    if (option->get_items_expected_max() > 1) option->delimiter(',');  // the environment holds one string only
+  }
+}
+
+}  // namespace
+
+Program::Program(std::string name, std::string description) : name_(std::move(name)), app_(std::move(description), name_) {
+  app_.require_subcommand(1);
+  app_.set_version_flag("--version", name_ + " " INTERVALE_VERSION);
+  app_.set_config("--config", "", "Options from a TOML or INI file, a section for each command");
+  app_.allow_config_extras(CLI::config_extras_mode::error);
+}
+
+CLI::App& Program::add_command(const std::string& name, const std::string& description, std::function<Result<void>()> body) {
+  CLI::App& command = *app_.add_subcommand(name, description);
+  command.fallthrough();  // --config may come after the command too
+  commands_.emplace_back(&command, std::move(body));
+  return command;
+}
+
+int Program::run(int argc, const char* const* argv) {
+  std::signal(SIGPIPE, SIG_IGN);  // a reader that left is an error to report
+  name_in_environment(app_);
+  for (auto& [command, body] : commands_) name_in_environment(*command);
+  try {
+    app_.parse(argc, argv);
+  } catch (const CLI::Success& asked) {  // --help, --version: not errors
+    return app_.exit(asked);
+  } catch (const CLI::Error& error) {
+    return complain(one_line(error.what()) + " (see " + name_ + " --help)", kExitUsage);
+  }
+  try {
+    for (auto& [command, body] : commands_) {
+      if (!command->parsed()) continue;
+      if (auto result = body(); !result) return complain(result.error().message, result.error().usage ? kExitUsage : kExitFailed);
+    }
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory", kExitFailed);
+  } catch (const std::exception& exception) {
+    return complain(exception.what(), kExitFailed);
+  }
+  return kExitDone;
+}
+
+int Program::complain(const std::string& message, ExitStatus status) const {
+  const std::string line = name_ + ": " + one_line(message) + "\n";
+  std::fwrite(line.data(), 1, line.size(), stderr);
+  return status;
+}
+
+CLI::Option* add_json_flag(CLI::App& app, bool& json) { return app.add_flag("--json", json, "Print the figures as one JSON object"); }
+
+Result<void> print(const std::string& text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0) return {};
+  return fail(std::string("cannot write to the standard output: ") + std::strerror(errno));
+}
+
+Result<void> print_json(const nlohmann::ordered_json& object) { return print(object.dump() + "\n"); }
+
+std::string human_bytes(std::uint64_t bytes) {
+  if (bytes < 1000) return fmt::format("{} B", bytes);
+  constexpr std::array<const char*, 4> kUnits{"kB", "MB", "GB", "TB"};
+  double value = static_cast<double>(bytes) / 1000;
+  std::size_t unit = 0;
+  while (value >= 999.95 && unit + 1 < kUnits.size()) {  // 999.95 would be rounded to 1000.0
+    value /= 1000;
+    ++unit;
+  }
+  return fmt::format("{:.1f} {}", value, kUnits[unit]);
+}
+
+}  // namespace intervale

@@ -1,0 +1,35 @@
+#include "common/program/progress.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace intervale {
+
+Progress::Progress(std::string what) : what_(std::move(what)), terminal_(::isatty(STDERR_FILENO) == 1) {}
+
+Progress::~Progress() {
+  if (shown_) std::fputs("\r\x1b[K", stderr);
+}
+
+void Progress::fraction(double done) {
+  if (terminal_) text(fmt::format("{:3.0f} %", 100 * done));
+}
+
+void Progress::text(const std::string& state) {
+  if (!terminal_) return;
+  const std::lock_guard lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_) return;
+  next_ = now + std::chrono::milliseconds(100);
+  show_locked(state);
+}
+
+void Progress::show_locked(const std::string& state) {
+  fmt::print(stderr, "\r{}: {}\x1b[K", what_, state);
+  std::fflush(stderr);
+  shown_ = true;
+}
+
+}  // namespace intervale

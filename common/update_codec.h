@@ -1,0 +1,40 @@
+// Updates on the wire: a batch as bytes, and back into a front.
+//
+// A batch names its diamonds by brick, supercube and slot, and holds like with like: names, then differences of sides, then of each surface's first
+// cuts, then of all other cuts; each plane compressed by itself. Updates stand in the order in which they are applied: scale by scale from coarse to
+// fine; within one scale all of class 0, then class 1, then class 2; then by supercube and slot. PROTOCOL.md has the layout.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/front.h"
+#include "common/interval_volume.h"
+#include "common/result.h"
+
+namespace intervale {
+
+inline constexpr std::size_t kBatchUpdatesMost = 1 << 17;  // in one batch; what a reader makes room for
+
+// The updates of one supercube in a batch.
+struct BatchGroup {
+  std::uint32_t brick = 0, supercube = 0;
+  SupercubeKey key = 0;
+  std::uint64_t slots = 0;  // not 0
+};
+
+// The batch of these groups: keys strictly ascending; at most kBatchUpdatesMost updates.
+[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, std::span<const BatchGroup> groups);
+
+struct Applied {
+  std::uint64_t updates = 0;
+  bool over_budget = false;  // an update was left out, and all after it, because the mesh would have passed max_tets
+};
+
+// Applies a batch from outside. Fails where the bytes are no batch or an update does not fit the front, which is then of no more use.
+[[nodiscard]] Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::optional<std::uint64_t> max_tets = {});
+
+}  // namespace intervale

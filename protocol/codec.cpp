@@ -1,0 +1,237 @@
+#include "protocol/codec.h"
+
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "protocol/stream_generated.h"
+
+namespace intervale::protocol {
+namespace {
+
+using flatbuffers::FlatBufferBuilder;
+using Bytes = std::span<const std::uint8_t>;
+
+fbs::Vector to_vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+std::array<double, 3> to_array(const fbs::Vector& v) { return {v.x(), v.y(), v.z()}; }
+
+// FlatBuffers' optionals and ours.
+flatbuffers::Optional<std::uint64_t> to_wire(const std::optional<std::uint64_t>& value) {
+  return value ? flatbuffers::Optional<std::uint64_t>(*value) : flatbuffers::nullopt;
+}
+template <class T>
+std::optional<T> from_wire(const flatbuffers::Optional<T>& value) {
+  return value ? std::optional<T>(*value) : std::nullopt;
+}
+
+// Encoding: each message's table, and the tag of the union it goes into.
+
+struct Body {
+  std::uint8_t type;
+  flatbuffers::Offset<void> table;
+};
+
+template <class Tag, class Table>
+Body body(Tag tag, flatbuffers::Offset<Table> table) {
+  return {static_cast<std::uint8_t>(tag), table.Union()};
+}
+
+Body encode_body(FlatBufferBuilder& out, const Open& message) {
+  const auto dataset = out.CreateString(message.dataset);
+  const auto client = out.CreateString(message.client);
+  return body(fbs::ClientBody::Open, fbs::CreateOpen(out, dataset, client, message.credit));
+}
+
+Body encode_body(FlatBufferBuilder& out, const View& message) {
+  const Lod& lod = message.lod;
+  const auto percent = lod.error_percent ? flatbuffers::Optional<double>(*lod.error_percent) : flatbuffers::nullopt;
+  fbs::Box box;
+  if (lod.roi) box = fbs::Box(to_vector(lod.roi->min), to_vector(lod.roi->max));
+  const auto table = fbs::CreateLod(out, lod.error, percent, lod.roi ? &box : nullptr, to_wire(lod.max_tets), to_wire(lod.max_updates));
+  return body(fbs::ClientBody::View, fbs::CreateView(out, message.epoch, table));
+}
+
+Body encode_body(FlatBufferBuilder& out, const Credit& message) { return body(fbs::ClientBody::Credit, fbs::CreateCredit(out, message.bytes)); }
+
+Body encode_body(FlatBufferBuilder& out, const Opened& message) {
+  const Description& d = message.description;
+  const auto name = out.CreateString(d.name);
+  const auto base = out.CreateVector(d.base);
+  const fbs::Dims dims(d.grid.dims[0], d.grid.dims[1], d.grid.dims[2]);
+  const fbs::Vector spacing = to_vector(d.grid.spacing);
+  const fbs::Vector origin = to_vector(d.grid.origin);
+  const auto description = fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine),
+                                                  d.max_error, d.updates, d.coefficients, d.full.vertices, d.full.tets, d.content_hash, base);
+  const SessionLimits& limits = message.limits;
+  return body(fbs::ServerBody::Opened, fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message));
+}
+
+Body encode_body(FlatBufferBuilder& out, const Batch& message) {
+  const auto payload = out.CreateVector(message.payload);
+  return body(fbs::ServerBody::Batch, fbs::CreateBatch(out, message.epoch, message.sequence, message.updates, message.remaining_error, payload));
+}
+
+Body encode_body(FlatBufferBuilder& out, const Done& message) {
+  return body(fbs::ServerBody::Done, fbs::CreateDone(out, message.epoch, message.updates_sent, message.wanted));
+}
+
+Body encode_body(FlatBufferBuilder& out, const Fault& message) {
+  const auto text = out.CreateString(message.text);
+  return body(fbs::ServerBody::Fault, fbs::CreateFault(out, static_cast<std::uint16_t>(message.code), text));
+}
+
+std::vector<std::uint8_t> finished(FlatBufferBuilder& out) { return {out.GetBufferPointer(), out.GetBufferPointer() + out.GetSize()}; }
+
+// Decoding: each table, verified already, to its message.
+
+tl::unexpected<Error> malformed(const std::string& what) { return fail("malformed message: " + what); }
+
+// A string's or an array's length is known to lie within the message; here it is held to its own limit.
+template <class Container>
+bool longer_than(const Container* container, std::size_t limit) {
+  return container != nullptr && container->size() > limit;
+}
+
+std::string text_of(const flatbuffers::String* text) { return text == nullptr ? std::string() : text->str(); }
+
+Result<ClientMessage> decode_body(const fbs::Open& table) {
+  if (longer_than(table.dataset(), kMaxName)) return malformed("the data set's name is too long");
+  if (longer_than(table.client(), kMaxText)) return malformed("the client's name is too long");
+  return Open{table.dataset()->str(), text_of(table.client()), table.credit()};
+}
+
+Result<ClientMessage> decode_body(const fbs::View& table) {
+  const fbs::Lod& wire = *table.lod();
+  Lod lod{.error = wire.error(),
+          .error_percent = from_wire(wire.error_percent()),
+          .roi = {},
+          .max_tets = from_wire(wire.max_tets()),
+          .max_updates = from_wire(wire.max_updates())};
+  // Written so that NaN fails each test.
+  if (!(std::isfinite(lod.error) && lod.error >= 0)) return malformed("the error is not a finite number of at least 0");
+  if (lod.error_percent && !(*lod.error_percent >= 0 && *lod.error_percent <= 100)) return malformed("the error's percentage is not within 0 to 100");
+  if (wire.roi() != nullptr) {
+    lod.roi = Box{to_array(wire.roi()->min()), to_array(wire.roi()->max())};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double low = lod.roi->min[axis];
+      const double high = lod.roi->max[axis];
+      if (!(std::isfinite(low) && std::isfinite(high) && low <= high)) return malformed("the region's box is not finite and in order");
+    }
+  }
+  return View{table.epoch(), lod};
+}
+
+Result<ClientMessage> decode_body(const fbs::Credit& table) { return Credit{table.bytes()}; }
+
+Result<ServerMessage> decode_body(const fbs::Opened& table) {
+  const fbs::Description& wire = *table.description();
+  if (longer_than(wire.name(), kMaxName)) return malformed("the data set's name is too long");
+  if (longer_than(wire.base(), kMaxBase)) return malformed("the base is too long");
+  if (wire.refine() > std::uint8_t(Refine::uniform)) return malformed("an unknown way to refine");
+  Description d;
+  d.name = wire.name()->str();
+  d.grid = {{wire.dims()->x(), wire.dims()->y(), wire.dims()->z()}, to_array(*wire.spacing()), to_array(*wire.origin())};
+  d.range = {wire.alpha(), wire.beta()};
+  d.refine = Refine(wire.refine());
+  d.max_error = wire.max_error();
+  d.updates = wire.updates();
+  d.coefficients = wire.coefficients();
+  d.full = {wire.full_vertices(), wire.full_tets()};
+  d.content_hash = wire.content_hash();
+  d.base.assign(wire.base()->begin(), wire.base()->end());
+  return Opened{std::move(d), {table.max_window(), table.min_credit(), table.max_message()}};
+}
+
+Result<ServerMessage> decode_body(const fbs::Batch& table) {
+  if (longer_than(table.payload(), kMaxBatchPayload)) return malformed("the batch is too large");
+  if (!(table.remaining_error() >= 0)) return malformed("the remaining error is not a number of at least 0");
+  Batch batch{table.epoch(), table.sequence(), table.updates(), table.remaining_error(), {}};
+  batch.payload.assign(table.payload()->begin(), table.payload()->end());
+  return batch;
+}
+
+Result<ServerMessage> decode_body(const fbs::Done& table) { return Done{table.epoch(), table.updates_sent(), table.wanted()}; }
+
+Result<ServerMessage> decode_body(const fbs::Fault& table) {
+  if (longer_than(table.text(), kMaxText)) return malformed("the fault's text is too long");
+  return Fault{CloseCode(table.code()), table.text()->str()};
+}
+
+// Bytes that begin at a multiple of 8, as FlatBuffers' scalars take for granted: these, or a copy of them.
+class Aligned {
+ public:
+  explicit Aligned(Bytes bytes) : bytes_(bytes) {
+    if (bytes.empty() || reinterpret_cast<std::uintptr_t>(bytes.data()) % alignof(std::uint64_t) == 0) return;
+    copy_.resize(bytes.size() / sizeof(std::uint64_t) + 1);
+    std::memcpy(copy_.data(), bytes.data(), bytes.size());
+    bytes_ = {reinterpret_cast<const std::uint8_t*>(copy_.data()), bytes.size()};
+  }
+  [[nodiscard]] Bytes bytes() const { return bytes_; }
+
+ private:
+  Bytes bytes_;
+  std::vector<std::uint64_t> copy_;
+};
+
+template <class Root>
+const Root* verified(Bytes bytes) {
+  flatbuffers::Verifier verifier(bytes.data(), bytes.size(), kMaxDepth, kMaxTables);
+  return verifier.VerifyBuffer<Root>(nullptr) ? flatbuffers::GetRoot<Root>(bytes.data()) : nullptr;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode(const ClientMessage& message) {
+  FlatBufferBuilder out(256);
+  const Body encoded = std::visit([&](const auto& m) { return encode_body(out, m); }, message);
+  out.Finish(fbs::CreateClientMessage(out, fbs::ClientBody(encoded.type), encoded.table));
+  return finished(out);
+}
+
+std::vector<std::uint8_t> encode(const ServerMessage& message) {
+  const auto* batch = std::get_if<Batch>(&message);
+  FlatBufferBuilder out((batch == nullptr ? 0 : batch->payload.size()) + 512);
+  const Body encoded = std::visit([&](const auto& m) { return encode_body(out, m); }, message);
+  out.Finish(fbs::CreateServerMessage(out, fbs::ServerBody(encoded.type), encoded.table));
+  return finished(out);
+}
+
+Result<ClientMessage> decode_client_message(Bytes bytes) {
+  const Aligned aligned(bytes);
+  const auto* root = verified<fbs::ClientMessage>(aligned.bytes());
+  if (root == nullptr) return malformed("not a client's message");
+  switch (root->body_type()) {
+    case fbs::ClientBody::Open:
+      return decode_body(*root->body_as_Open());
+    case fbs::ClientBody::View:
+      return decode_body(*root->body_as_View());
+    case fbs::ClientBody::Credit:
+      return decode_body(*root->body_as_Credit());
+    case fbs::ClientBody::NONE:
+      break;
+  }
+  return malformed("of an unknown kind");  // the verifier lets kinds pass that it does not know
+}
+
+Result<ServerMessage> decode_server_message(Bytes bytes) {
+  const Aligned aligned(bytes);
+  const auto* root = verified<fbs::ServerMessage>(aligned.bytes());
+  if (root == nullptr) return malformed("not a server's message");
+  switch (root->body_type()) {
+    case fbs::ServerBody::Opened:
+      return decode_body(*root->body_as_Opened());
+    case fbs::ServerBody::Batch:
+      return decode_body(*root->body_as_Batch());
+    case fbs::ServerBody::Done:
+      return decode_body(*root->body_as_Done());
+    case fbs::ServerBody::Fault:
+      return decode_body(*root->body_as_Fault());
+    case fbs::ServerBody::NONE:
+      break;
+  }
+  return malformed("of an unknown kind");
+}
+
+}  // namespace intervale::protocol

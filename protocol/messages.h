@@ -1,0 +1,86 @@
+// The messages of intervale.v1 as plain structs. Who may send what when: PROTOCOL.md.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/description.h"
+#include "common/lod.h"
+#include "protocol/limits.h"
+
+namespace intervale::protocol {
+
+inline constexpr const char* kSubprotocol = "intervale.v1";  // the WebSocket subprotocol: client offers it, server confirms it
+inline constexpr const char* kPath = "/v1/stream";           // the WebSocket's path
+inline constexpr const char* kServerName = "intervale";      // how the server's HTTP Server header begins
+
+// Why a session ended, as the WebSocket's close code.
+enum class CloseCode : std::uint16_t {
+  normal = 1000,
+  going_away = 1001,  // the server shuts down
+  text_frame = 1003,  // a text frame, where only binary ones are spoken
+  internal = 1011,    // the server's own failure
+  malformed = 4400,   // a message that does not decode, or says what cannot be
+  no_such_dataset = 4404,
+  timed_out = 4408,     // no Open within the handshake time, or no credit while updates wait
+  out_of_order = 4409,  // a message that is not allowed in this state
+  too_large = 4413,     // a message, or a credit, over its limit
+};
+
+// Client to server.
+struct Open {
+  std::string dataset;
+  std::string client;        // name and version, for the server's log
+  std::uint64_t credit = 0;  // first grant; see Credit
+  friend bool operator==(const Open&, const Open&) = default;
+};
+struct View {
+  std::uint64_t epoch = 0;  // greater than that of the View before
+  Lod lod;
+  friend bool operator==(const View&, const View&) = default;
+};
+struct Credit {
+  std::uint64_t bytes = 0;  // so much more of Batch messages may come; see cost_of
+  friend bool operator==(const Credit&, const Credit&) = default;
+};
+using ClientMessage = std::variant<Open, View, Credit>;
+
+// Server to client.
+struct SessionLimits {
+  std::uint64_t max_window = kMaxWindow;  // most credit that may be outstanding
+  std::uint64_t min_credit = kMinCredit;  // with at least this much outstanding the server sends if anything is wanted
+  std::uint64_t max_message = kMaxClientMessage;
+  friend bool operator==(const SessionLimits&, const SessionLimits&) = default;
+};
+struct Opened {
+  Description description;
+  SessionLimits limits;
+  friend bool operator==(const Opened&, const Opened&) = default;
+};
+struct Batch {
+  std::uint64_t epoch = 0;     // of the View it serves
+  std::uint64_t sequence = 0;  // 0, 1, 2, … within a session
+  std::uint32_t updates = 0;
+  double remaining_error = 0;         // largest saturated error of what is wanted and still unsent; field units
+  std::vector<std::uint8_t> payload;  // updates; see common/update_codec.h
+  friend bool operator==(const Batch&, const Batch&) = default;
+};
+// The credit that a Batch takes: client and server count alike, and never less than the message's bytes.
+[[nodiscard]] inline std::uint64_t cost_of(const Batch& batch) { return batch.payload.size() + kBatchEnvelope; }
+
+struct Done {
+  std::uint64_t epoch = 0;
+  std::uint64_t updates_sent = 0;  // in this session
+  std::uint64_t wanted = 0;        // updates that the view needs
+  friend bool operator==(const Done&, const Done&) = default;
+};
+struct Fault {
+  CloseCode code = CloseCode::internal;  // the close code that follows
+  std::string text;                      // one line for people
+  friend bool operator==(const Fault&, const Fault&) = default;
+};
+using ServerMessage = std::variant<Opened, Batch, Done, Fault>;
+
+}  // namespace intervale::protocol

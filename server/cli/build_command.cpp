@@ -1,0 +1,134 @@
+#include <fmt/core.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/info.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "common/ivm_file.h"
+#include "common/program/progress.h"
+#include "server/build/field_hierarchy.h"
+#include "server/cli/commands.h"
+#include "server/cli/describe_volume.h"
+#include "server/volume/read_volume.h"
+
+namespace intervale {
+namespace {
+
+struct BuildCommand {
+  std::string input, output;
+  std::vector<std::string> range;
+  std::string refine = "boundary", type;
+  std::optional<double> nan;
+  unsigned threads = 0;
+  std::vector<std::int64_t> dims;
+  std::vector<double> spacing, origin;
+  bool big_endian = false, json = false;
+  std::uint64_t skip = 0;
+};
+
+Result<double> parse_bound(const std::string& text) {
+  std::size_t used = 0;
+  try {
+    const double value = std::stod(text, &used);
+    if (used == text.size() && !std::isnan(value)) return value;
+  } catch (const std::exception&) {
+    // said below
+  }
+  return misuse("--range: '" + text + "' is no bound; give a number, -inf or inf");
+}
+
+Result<Range> parse_range(const std::vector<std::string>& bounds) {
+  const auto low = parse_bound(bounds.at(0)), high = parse_bound(bounds.at(1));
+  if (!low) return tl::unexpected(low.error());
+  if (!high) return tl::unexpected(high.error());
+  if (*low > *high)
+    return misuse("--range: the lower bound " + bounds[0] + " is greater than the upper bound " + bounds[1] + "; give the lower one first");
+  if (*low == INFINITY || *high == -INFINITY) return misuse("--range: nothing lies between " + bounds[0] + " and " + bounds[1]);
+  return Range{*low, *high};
+}
+
+Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
+  const bool any = !options.dims.empty() || !options.type.empty() || !options.spacing.empty() || !options.origin.empty() || options.big_endian ||
+                   options.skip != 0;
+  if (!any) return std::optional<RawLayout>{};
+  if (options.dims.empty() || options.type.empty()) return misuse("raw samples need both --dims X Y Z and --type");
+  RawLayout layout;
+  const auto type = parse_sample_type(options.type);
+  if (!type) return tl::unexpected(type.error());
+  layout.type = *type;
+  layout.big_endian = options.big_endian;
+  layout.skip_bytes = options.skip;
+  std::copy_n(options.dims.begin(), 3, layout.dims.begin());
+  if (!options.spacing.empty()) std::copy_n(options.spacing.begin(), 3, layout.spacing.begin());
+  if (!options.origin.empty()) std::copy_n(options.origin.begin(), 3, layout.origin.begin());
+  return std::optional(layout);
+}
+
+Result<void> run(const BuildCommand& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto range = parse_range(options.range);
+  if (!range) return tl::unexpected(range.error());
+  const auto layout = parse_layout(options);
+  if (!layout) return tl::unexpected(layout.error());
+  // Seen before the long work, not after it.
+  const std::filesystem::path folder = std::filesystem::absolute(options.output).parent_path();
+  if (!std::filesystem::is_directory(folder)) return fail("'" + options.output + "' cannot be written: there is no folder '" + folder.string() + "'");
+
+  auto volume = read_volume(options.input, *layout);
+  if (!volume) return tl::unexpected(volume.error());
+  if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
+  volume->name = std::filesystem::path(options.output).stem().string();
+
+  const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  Result<IntervalVolume> made = fail("");
+  {
+    Progress progress("building " + volume->name);
+    const FieldHierarchy hierarchy(
+        *volume, {*range, options.refine == "uniform" ? Refine::uniform : Refine::boundary, [&](double done) { progress.fraction(done); }});
+    made = hierarchy.compact();
+  }
+  if (!made) return tl::unexpected(made.error());
+  if (auto saved = save_ivm(options.output, *made); !saved) return saved;
+  std::error_code code;
+  const auto size = std::filesystem::file_size(options.output, code);
+  const std::uint64_t file_bytes = code ? 0 : size;
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (options.json) {
+    auto figures = figures_of(*made, file_bytes);
+    figures["seconds"] = seconds;
+    return print_json(figures);
+  }
+  return print(text_of(*made, file_bytes) + fmt::format("wrote {} in {:.2f} s\n", options.output, seconds));
+}
+
+}  // namespace
+
+void add_build_command(Program& program) {
+  const auto o = std::make_shared<BuildCommand>();
+  CLI::App& command = program.add_command("build", "Makes an interval volume from a volume and a range", [o] { return run(*o); });
+  command.add_option("INPUT", o->input, "Volume: .nrrd, .nhdr, or raw samples (then --dims and --type)")->required();
+  command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
+  command.add_option("--range", o->range, "Values to keep, both ends among them: numbers, -inf, inf; may be equal")
+      ->required()
+      ->expected(2)
+      ->type_name("LO HI");
+  command.add_option("--refine", o->refine, "boundary: the inside stays as coarse as it can; uniform: it is refined too")
+      ->check(CLI::IsMember({"boundary", "uniform"}))
+      ->capture_default_str();
+  command.add_option("--nan", o->nan, "Put this in place of samples that are NaN or infinite, which are refused otherwise")->type_name("VALUE");
+  command.add_option("--threads", o->threads, "0: one for each core")->capture_default_str();
+  command.add_option("--dims", o->dims, "Raw input: samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
+  command.add_option("--type", o->type, "Raw input: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");
+  command.add_flag("--big-endian", o->big_endian, "Raw input: samples are big endian");
+  command.add_option("--skip", o->skip, "Raw input: bytes before the first sample")->type_name("BYTES");
+  command.add_option("--spacing", o->spacing, "Raw input: distance of samples in world units")->expected(3)->type_name("X Y Z");
+  command.add_option("--origin", o->origin, "Raw input: world position of the first sample")->expected(3)->type_name("X Y Z");
+  add_json_flag(command, o->json);
+}
+
+}  // namespace intervale

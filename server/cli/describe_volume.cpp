@@ -1,0 +1,31 @@
+#include "server/cli/describe_volume.h"
+
+#include <fmt/core.h>
+
+#include "common/program/describe.h"
+#include "common/program/program.h"
+
+namespace intervale {
+
+nlohmann::ordered_json figures_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
+  nlohmann::ordered_json figures = to_json(volume.description());
+  figures["supercubes"] = volume.set().supercubes();
+  figures["memory_bytes"] = volume.memory_bytes();
+  figures["file_bytes"] = file_bytes;
+  return figures;
+}
+
+std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
+  const Description& d = volume.description();
+  const auto times = [&d](std::uint64_t bytes) { return bytes == 0 ? 0.0 : double(d.full.indexed_bytes()) / double(bytes); };
+  std::string text = fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined at its {}\n", d.name, d.grid.dims[0], d.grid.dims[1],
+                                 d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
+  text += fmt::format("{} updates, {} coefficients, {} supercubes, largest error {:g}\n", d.updates, d.coefficients, volume.set().supercubes(),
+                      d.max_error);
+  text += fmt::format("full mesh: {} vertices, {} tetrahedra, {} as an indexed mesh\n", d.full.vertices, d.full.tets,
+                      human_bytes(d.full.indexed_bytes()));
+  return text + fmt::format("in memory {} ({:.1f} times smaller), in the file {} ({:.1f} times smaller)\n", human_bytes(volume.memory_bytes()),
+                            times(volume.memory_bytes()), human_bytes(file_bytes), times(file_bytes));
+}
+
+}  // namespace intervale

@@ -1,0 +1,69 @@
+#include <fmt/core.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/extraction.h"
+#include "common/ivm_file.h"
+#include "common/mesh_writer.h"
+#include "common/program/lod_options.h"
+#include "common/program/progress.h"
+#include "server/cli/commands.h"
+
+namespace intervale {
+namespace {
+
+struct ExtractCommand {
+  std::string file;
+  std::optional<std::filesystem::path> output;
+  Lod lod;
+  bool json = false;
+};
+
+Result<Extraction> extract_with_progress(const IntervalVolume& volume, const Lod& lod) {
+  Progress progress("extracting " + volume.description().name);
+  return extract(volume, lod, [&progress](double done) { progress.fraction(done); });
+}
+
+Result<void> run(const ExtractCommand& options) {
+  if (options.output) {
+    if (auto writable = check_mesh_path(*options.output); !writable) return writable;
+  }
+  const auto volume = load_ivm(options.file);
+  if (!volume) return tl::unexpected(volume.error());
+  const auto start = std::chrono::steady_clock::now();
+  const auto extracted = extract_with_progress(**volume, options.lod);
+  if (!extracted) return tl::unexpected(extracted.error());
+  const Mesh mesh = extracted->front.mesh();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (options.output) {
+    if (auto written = write_mesh(*options.output, mesh); !written) return written;
+  }
+  const double enclosed = volume_of(mesh);
+  if (options.json) {
+    return print_json(
+        {{"updates", extracted->updates}, {"vertices", mesh.points.size()}, {"tets", mesh.tets.size()}, {"volume", enclosed}, {"seconds", seconds}});
+  }
+  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", (*volume)->description().name,
+                                 extracted->updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
+  if (options.output) text += "wrote " + options.output->string() + "\n";
+  return print(text);
+}
+
+}  // namespace
+
+void add_extract_command(Program& program) {
+  const auto options = std::make_shared<ExtractCommand>();
+  CLI::App& command = program.add_command("extract", "Makes a mesh of an interval volume, without a server", [options] { return run(*options); });
+  command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
+  command
+      .add_option_function<std::string>(
+          "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
+      ->type_name("MESH");
+  add_lod_options(command, options->lod);
+  add_json_flag(command, options->json);
+}
+
+}  // namespace intervale

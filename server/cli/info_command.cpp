@@ -1,0 +1,54 @@
+#include <filesystem>
+#include <memory>
+
+#include "common/ivm_file.h"
+#include "server/cli/commands.h"
+#include "server/cli/describe_volume.h"
+
+namespace intervale {
+namespace {
+
+struct InfoCommand {
+  std::string file;
+  bool json = false;
+};
+
+std::uint64_t file_size(const std::string& path) {
+  std::error_code code;
+  const auto size = std::filesystem::file_size(path, code);
+  return code ? 0 : size;
+}
+
+Result<void> info(const InfoCommand& options) {
+  const auto volume = load_ivm(options.file);
+  if (!volume) return tl::unexpected(volume.error());
+  if (options.json) return print_json(figures_of(**volume, file_size(options.file)));
+  return print(text_of(**volume, file_size(options.file)));
+}
+
+Result<void> verify(const InfoCommand& options) {
+  const auto volume = load_ivm(options.file);
+  if (!volume) return tl::unexpected(volume.error());
+  if (auto valid = (*volume)->validate(); !valid) return fail(options.file + ": " + valid.error().message);
+  if (options.json) return print_json({{"file", options.file}, {"valid", true}, {"updates", (*volume)->size()}});
+  return print(options.file + ": all checksums and invariants hold (" + std::to_string((*volume)->size()) + " updates)\n");
+}
+
+}  // namespace
+
+void add_info_command(Program& program) {
+  const auto options = std::make_shared<InfoCommand>();
+  CLI::App& command = program.add_command("info", "Says what an interval volume holds and how small it is", [options] { return info(*options); });
+  command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
+  add_json_flag(command, options->json);
+}
+
+void add_verify_command(Program& program) {
+  const auto options = std::make_shared<InfoCommand>();
+  CLI::App& command =
+      program.add_command("verify", "Checks every checksum and every invariant of an interval volume", [options] { return verify(*options); });
+  command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
+  add_json_flag(command, options->json);
+}
+
+}  // namespace intervale

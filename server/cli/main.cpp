@@ -1,0 +1,12 @@
+#include "server/cli/commands.h"
+
+int main(int argc, char** argv) {
+  intervale::Program program("intervale", "Makes, inspects and serves multiresolution interval volumes");
+  intervale::add_sample_command(program);
+  intervale::add_build_command(program);
+  intervale::add_info_command(program);
+  intervale::add_verify_command(program);
+  intervale::add_extract_command(program);
+  intervale::add_serve_command(program);
+  return program.run(argc, argv);
+}

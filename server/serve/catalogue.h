@@ -1,0 +1,34 @@
+// The data sets a server offers, by name.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/interval_volume.h"
+#include "common/result.h"
+
+namespace intervale {
+
+// Data sets are immutable and shared: whoever found one keeps it as long as needed. Reading is safe from any thread once filled.
+class Catalogue {
+ public:
+  using Volume = std::shared_ptr<const IntervalVolume>;
+
+  // Files, and the *.ivm in folders (not in folders within). See serve().
+  static Result<Catalogue> load(const std::vector<std::filesystem::path>& inputs);
+
+  // Under its description's name. Failure: the name is taken, or unfit for a URL's path.
+  Result<void> add(Volume volume);
+
+  [[nodiscard]] Volume find(std::string_view name) const;  // nullptr if there is none
+  [[nodiscard]] const std::map<std::string, Volume, std::less<>>& volumes() const { return volumes_; }
+
+ private:
+  std::map<std::string, Volume, std::less<>> volumes_;
+};
+
+}  // namespace intervale

@@ -1,0 +1,23 @@
+// What every session of a server shares.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "server/serve/catalogue.h"
+#include "server/serve/connections.h"
+#include "server/serve/metrics.h"
+#include "server/serve/options.h"
+
+namespace intervale {
+
+// Outlives every session. The catalogue and the options do not change while serving.
+struct ServerContext {
+  ServeOptions options;
+  Catalogue catalogue;
+  Metrics metrics;
+  Connections connections;
+  std::atomic<std::uint64_t> next_session_id{1};
+};
+
+}  // namespace intervale

@@ -1,0 +1,170 @@
+#include "server/serve/http_session.h"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <chrono>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "protocol/messages.h"
+#include "server/serve/http_routes.h"
+#include "server/serve/websocket_session.h"
+
+namespace intervale {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+
+constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
+constexpr std::chrono::seconds kRequestTime{10};    // for a request to arrive in whole
+constexpr std::chrono::seconds kKeepAliveTime{30};  // between requests
+constexpr std::chrono::seconds kAnswerTime{30};
+constexpr std::uint32_t kMaxHeader = 4096;
+
+using Request = http::request<http::empty_body>;
+using Response = http::response<http::string_body>;
+
+bool offers_our_subprotocol(const Request& request) {
+  for (const auto& name : http::token_list(request[http::field::sec_websocket_protocol])) {
+    if (name == protocol::kSubprotocol) return true;
+  }
+  return false;
+}
+
+Response response_to(const Request& request, HttpAnswer answer, bool keep_alive) {
+  Response response(http::status(answer.status), request.version());
+  response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
+  response.set(http::field::content_type, answer.content_type);
+  response.set("X-Content-Type-Options", "nosniff");
+  response.set("Content-Security-Policy", "default-src 'none'");
+  response.set(http::field::cache_control, "no-store");
+  if (answer.status == 405) response.set(http::field::allow, "GET, HEAD");
+  if (answer.status == 426) response.set(http::field::upgrade, "websocket");
+  response.keep_alive(keep_alive);
+  response.body() = std::move(answer.body);
+  response.prepare_payload();
+  if (request.method() == http::verb::head) response.body().clear();  // Content-Length stays that of GET
+  return response;
+}
+
+class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(asio::ip::tcp::socket socket, ServerContext& context)
+      : stream_(std::move(socket)), strand_(stream_.get_executor()), context_(context) {}
+  HttpSession(const HttpSession&) = delete;
+  HttpSession& operator=(const HttpSession&) = delete;
+  ~HttpSession() override { --context_.metrics.connections; }
+
+  void start() {
+    ++context_.metrics.connections;
+    membership_ = context_.connections.join(shared_from_this());
+    asio::co_spawn(strand_, run(shared_from_this()), [](const std::exception_ptr& failure) { report(failure); });
+  }
+
+  void go_away() override {
+    asio::post(strand_, [self = shared_from_this()] {
+      self->leaving_ = true;
+      if (self->waiting_) self->stream_.cancel();  // an answer under way is finished
+    });
+  }
+
+ private:
+  static void report(const std::exception_ptr& failure) {
+    if (!failure) return;
+    try {
+      std::rethrow_exception(failure);
+    } catch (const std::exception& exception) {
+      spdlog::error("http: {}", exception.what());
+    }
+  }
+
+  // Whatever ends this coroutine ends the connection, but for an upgrade, which takes the socket along. `self` keeps the object.
+  asio::awaitable<void> run([[maybe_unused]] std::shared_ptr<HttpSession> self) {
+    for (std::chrono::seconds patience = kRequestTime; !leaving_; patience = kKeepAliveTime) {
+      http::request_parser<http::empty_body> parser;
+      parser.header_limit(kMaxHeader);
+      stream_.expires_after(patience);
+      waiting_ = true;
+      const auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
+      waiting_ = false;
+      if (error) {
+        co_await refuse(error);
+        break;
+      }
+      const Request request = parser.get();
+      if (beast::websocket::is_upgrade(request) && request.target() == protocol::kPath) {
+        if (auto complaint = unfit_for_session(request)) {
+          Response response = response_to(request, std::move(*complaint), false);
+          co_await send(response);
+          break;
+        }
+        stream_.expires_never();  // from here on the WebSocket's own deadlines hold
+        start_websocket_session(std::move(stream_), request, context_);
+        co_return;
+      }
+      // A body is not read, so what follows it cannot be told from it: the connection ends with this answer.
+      const bool has_body = parser.chunked() || parser.content_length().value_or(0) > 0;
+      const bool keep_alive = request.keep_alive() && !has_body && !leaving_;
+      Response response = response_to(request, answer_to(request), keep_alive);
+      if (!co_await send(response) || !keep_alive) break;
+    }
+    beast::error_code ignored;
+    stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+  }
+
+  HttpAnswer answer_to(const Request& request) const {
+    if (request.target() == protocol::kPath) return {.status = 426, .body = "this is where WebSocket sessions are opened\n"};
+    const HttpState state{context_.catalogue, context_.metrics, !leaving_};
+    return answer({request.method_string().data(), request.method_string().size()}, {request.target().data(), request.target().size()}, state);
+  }
+
+  std::optional<HttpAnswer> unfit_for_session(const Request& request) const {
+    if (leaving_) return HttpAnswer{.status = 503, .body = "draining\n"};
+    if (!offers_our_subprotocol(request)) return HttpAnswer{.status = 400, .body = "the subprotocol intervale.v1 is not offered\n"};
+    return {};
+  }
+
+  // What did not read as a request is told so, if it was bytes at all that came.
+  asio::awaitable<void> refuse(beast::error_code error) {
+    if (error.category() != http::make_error_code(http::error::bad_target).category()) co_return;
+    if (error == http::error::end_of_stream || error == http::error::partial_message) co_return;
+    const bool too_long = error == http::error::header_limit || error == http::error::buffer_overflow;
+    Response response = refusal(too_long ? 431 : 400);
+    co_await send(response);
+  }
+
+  static Response refusal(unsigned status) {
+    return response_to(Request(http::verb::get, "/", 11), {.status = status, .body = "not a request this server can read\n"}, false);
+  }
+
+  // By reference, and never from a temporary: g++ 12 destroys some temporaries of a co_await expression twice.
+  asio::awaitable<bool> send(Response& response) {
+    stream_.expires_after(kAnswerTime);
+    const auto [error, size] = co_await http::async_write(stream_, response, kAwait);
+    co_return !error;
+  }
+
+  beast::tcp_stream stream_;
+  asio::any_io_executor strand_;  // apart, for go_away comes from other threads and an upgrade moves the stream away
+  ServerContext& context_;
+  beast::flat_buffer buffer_{2 * kMaxHeader};
+  bool waiting_ = false;  // for a request
+  bool leaving_ = false;
+  Connections::Membership membership_;
+};
+
+}  // namespace
+
+void start_http_session(asio::ip::tcp::socket socket, ServerContext& context) { std::make_shared<HttpSession>(std::move(socket), context)->start(); }
+
+}  // namespace intervale

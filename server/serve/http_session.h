@@ -1,0 +1,13 @@
+// One HTTP connection, until it closes or becomes a WebSocket. Internal to server/serve: brings in Asio.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+
+#include "server/serve/context.h"
+
+namespace intervale {
+
+// Serves requests on a socket whose executor is a strand of its own. Returns at once; the connection keeps itself alive.
+void start_http_session(boost::asio::ip::tcp::socket socket, ServerContext& context);
+
+}  // namespace intervale

@@ -1,0 +1,94 @@
+#include "server/serve/listener.h"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/strand.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <charconv>
+#include <chrono>
+#include <memory>
+#include <utility>
+
+#include "server/serve/http_session.h"
+
+namespace intervale {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+
+constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
+
+}  // namespace
+
+Result<tcp::endpoint> parse_endpoint(const std::string& text) {
+  const auto wrong = [&] { return misuse("cannot read the address '" + text + "': address:port is wanted, such as 127.0.0.1:8080 or [::1]:8080"); };
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos) return wrong();
+  std::string host = text.substr(0, colon);
+  const bool bracketed = host.size() >= 2 && host.front() == '[' && host.back() == ']';
+  if (bracketed) host = host.substr(1, host.size() - 2);
+  boost::system::error_code error;
+  const auto address = asio::ip::make_address(host, error);
+  if (error || address.is_v6() != bracketed) return wrong();
+  std::uint16_t port = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, failure] = std::from_chars(text.data() + colon + 1, end, port);
+  if (failure != std::errc() || stop != end) return wrong();
+  return tcp::endpoint(address, port);
+}
+
+Listener::Listener(asio::io_context& io, ServerContext& context) : io_(io), acceptor_(asio::make_strand(io)), context_(context) {}
+
+Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std::string& address, ServerContext& context) {
+  const auto endpoint = parse_endpoint(address);
+  if (!endpoint) return tl::unexpected(endpoint.error());
+  std::unique_ptr<Listener> listener(new Listener(io, context));
+  tcp::acceptor& acceptor = listener->acceptor_;
+  boost::system::error_code error;
+  const auto step = [&](auto&& action) {
+    if (!error) action();
+  };
+  step([&] { acceptor.open(endpoint->protocol(), error); });
+  step([&] { acceptor.set_option(asio::socket_base::reuse_address(true), error); });
+  step([&] { acceptor.bind(*endpoint, error); });
+  step([&] { acceptor.listen(asio::socket_base::max_listen_connections, error); });
+  step([&] { listener->endpoint_ = acceptor.local_endpoint(error); });
+  if (error) return fail("cannot listen on " + address + ": " + error.message());
+  return listener;
+}
+
+void Listener::start() { asio::co_spawn(acceptor_.get_executor(), accept_all(), asio::detached); }
+
+void Listener::close() {
+  asio::post(acceptor_.get_executor(), [this] {
+    boost::system::error_code ignored;
+    acceptor_.close(ignored);
+  });
+}
+
+asio::awaitable<void> Listener::accept_all() {
+  while (acceptor_.is_open()) {
+    auto [error, socket] = co_await acceptor_.async_accept(asio::make_strand(io_), kAwait);
+    if (error == asio::error::operation_aborted) co_return;
+    if (error) {
+      // Out of descriptors, most likely: what is open goes on, and in a while there may be room again.
+      spdlog::warn("cannot accept a connection: {}", error.message());
+      asio::steady_timer pause(acceptor_.get_executor(), std::chrono::milliseconds(100));
+      co_await pause.async_wait(kAwait);
+      continue;
+    }
+    if (context_.connections.size() >= context_.options.max_connections) {
+      ++context_.metrics.refused_total;  // and the socket closes
+      continue;
+    }
+    start_http_session(std::move(socket), context_);
+  }
+}
+
+}  // namespace intervale

@@ -1,0 +1,17 @@
+// `intervale serve`: from files and options to a server that runs until it is told to stop.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "common/result.h"
+#include "server/serve/options.h"
+
+namespace intervale {
+
+// Serves the .ivm files given, and those in the folders given (a damaged file in a folder is logged and left out; one that is named is an
+// error, like two data sets of one name). Blocks until SIGTERM or SIGINT, then drains and returns. Logs on stderr. Failures: an address that
+// cannot be read or had, a file that cannot be served.
+Result<void> serve(const ServeOptions& options, const std::vector<std::filesystem::path>& inputs);
+
+}  // namespace intervale

@@ -1,0 +1,35 @@
+// A running server: a port, threads, and the sessions on it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "common/result.h"
+#include "server/serve/catalogue.h"
+#include "server/serve/options.h"
+
+namespace intervale {
+
+class Server {
+ public:
+  // Listens, and serves on threads of its own from then on. Failures: an address that cannot be read, or cannot be had.
+  static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);
+  ~Server();  // stops
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const;
+  [[nodiscard]] std::string url() const;  // "http://127.0.0.1:8080/"
+
+  // Drains: not ready, nobody new, WebSocket sessions closed with 1001; returns once all are gone, after options.drain_time at the latest, when
+  // what is left is cut off. A second call does nothing. Not from a thread of the server's own.
+  void stop();
+
+ private:
+  struct Running;  // keeps Asio out of this header
+  explicit Server(std::unique_ptr<Running> running);
+  std::unique_ptr<Running> running_;
+};
+
+}  // namespace intervale

@@ -1,0 +1,76 @@
+#include "server/serve/session_state.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace intervale {
+namespace {
+
+using protocol::CloseCode;
+using protocol::Fault;
+
+// The first batch is small, so that there is something to draw soon; each is twice the last, up to where a larger one gains nothing.
+constexpr std::size_t kFirstPayload = 8 << 10;
+
+Fault fault(CloseCode code, std::string text) { return {code, std::move(text)}; }
+
+}  // namespace
+
+std::optional<Fault> SessionState::receive(const protocol::ClientMessage& message) {
+  return std::visit([this](const auto& m) { return on(m); }, message);
+}
+
+std::optional<Fault> SessionState::on(const protocol::Open& open) {
+  if (opened()) return fault(CloseCode::out_of_order, "Open came twice");
+  volume_ = catalogue_.find(open.dataset);
+  if (!volume_) return fault(CloseCode::no_such_dataset, "no such data set; see /api/datasets");
+  dataset_ = open.dataset;
+  plan_.emplace(volume_);
+  target_ = kFirstPayload;
+  return grant(open.credit);
+}
+
+std::optional<Fault> SessionState::on(const protocol::View& view) {
+  if (!opened()) return fault(CloseCode::out_of_order, "View before Open");
+  if (viewing_ && view.epoch <= epoch_) return fault(CloseCode::out_of_order, "a View's epoch must be greater than the last one's");
+  epoch_ = view.epoch;
+  asked_ = view.lod;
+  viewing_ = true;
+  done_ = false;
+  return {};
+}
+
+std::optional<Fault> SessionState::on(const protocol::Credit& credit) {
+  if (!opened()) return fault(CloseCode::out_of_order, "Credit before Open");
+  return grant(credit.bytes);
+}
+
+std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
+  if (bytes > protocol::kMaxWindow - credit_) return fault(CloseCode::too_large, "more credit than the largest window");
+  credit_ += bytes;
+  return {};
+}
+
+std::optional<protocol::ServerMessage> SessionState::next() {
+  if (!opened()) return {};
+  if (!std::exchange(announced_, true)) return protocol::Opened{volume_->description(), {}};
+  if (!viewing_ || done_) return {};
+  if (asked_) plan_->set_lod(*std::exchange(asked_, std::nullopt));
+  if (credit_ < protocol::kMinCredit) return {};
+  return next_batch_or_done();
+}
+
+protocol::ServerMessage SessionState::next_batch_or_done() {
+  const std::size_t size = std::min<std::uint64_t>(target_, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
+  auto batch = plan_->next(size);
+  if (!batch) {
+    done_ = true;
+    return protocol::Done{epoch_, plan_->sent(), plan_->wanted()};
+  }
+  target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
+  protocol::Batch message{epoch_, sequence_++, batch->updates, batch->remaining_error, std::move(batch->payload)};
+  credit_ -= protocol::cost_of(message);  // at most what there was: next() keeps to size
+  return message;
+}
+
+}  // namespace intervale

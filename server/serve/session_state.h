@@ -1,0 +1,52 @@
+// A streaming session without its socket: messages in, messages out, by PROTOCOL.md. No I/O.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "protocol/messages.h"
+#include "server/serve/catalogue.h"
+#include "server/serve/stream_plan.h"
+
+namespace intervale {
+
+// One thread at a time. `catalogue` must outlive it.
+class SessionState {
+ public:
+  explicit SessionState(const Catalogue& catalogue) : catalogue_(catalogue) {}
+
+  // Takes a client's message. A fault ends the session: nothing else may be called after.
+  [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
+
+  // The next message to send, or nothing for now. Selecting takes time linear in the data set's updates after a new view, else in the batch.
+  [[nodiscard]] std::optional<protocol::ServerMessage> next();
+
+  [[nodiscard]] bool opened() const { return volume_ != nullptr; }
+  [[nodiscard]] bool starved() const { return viewing_ && !done_ && credit_ < protocol::kMinCredit; }  // sends only once there is more credit
+  [[nodiscard]] const std::string& dataset() const { return dataset_; }
+  [[nodiscard]] std::uint64_t updates_sent() const { return plan_ ? plan_->sent() : 0; }
+
+ private:
+  std::optional<protocol::Fault> on(const protocol::Open& open);
+  std::optional<protocol::Fault> on(const protocol::View& view);
+  std::optional<protocol::Fault> on(const protocol::Credit& credit);
+  std::optional<protocol::Fault> grant(std::uint64_t bytes);
+  protocol::ServerMessage next_batch_or_done();
+
+  const Catalogue& catalogue_;
+  Catalogue::Volume volume_;
+  std::string dataset_;
+  std::optional<StreamPlan> plan_;
+  std::optional<Lod> asked_;  // a view that the plan has not taken up yet
+  std::uint64_t epoch_ = 0;
+  std::uint64_t credit_ = 0;    // outstanding
+  std::uint64_t sequence_ = 0;  // of the next batch
+  std::size_t target_ = 0;      // payload of the next batch, if credit allows
+  bool announced_ = false;      // Opened was sent
+  bool viewing_ = false;        // a View came
+  bool done_ = false;           // Done was sent for epoch_
+};
+
+}  // namespace intervale

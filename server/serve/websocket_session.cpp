@@ -1,0 +1,235 @@
+// Two coroutines on one strand: the reader takes messages to the state, the writer sends what the state has next and alone ends the session.
+// A message is selected only once the one before has left, so a slow client costs one message of memory and no one else's time.
+#include "server/serve/websocket_session.h"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "protocol/codec.h"
+#include "server/serve/session_state.h"
+
+namespace intervale {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using protocol::CloseCode;
+using protocol::Fault;
+using Clock = std::chrono::steady_clock;
+using Request = http::request<http::empty_body>;
+
+constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
+
+class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
+ public:
+  WebSocketSession(beast::tcp_stream stream, ServerContext& context)
+      : ws_(std::move(stream)),
+        wake_(ws_.get_executor()),
+        write_deadline_(ws_.get_executor()),
+        context_(context),
+        state_(context.catalogue),
+        id_(context.next_session_id++) {}
+  WebSocketSession(const WebSocketSession&) = delete;
+  WebSocketSession& operator=(const WebSocketSession&) = delete;
+
+  ~WebSocketSession() override {
+    --context_.metrics.sessions;
+    --context_.metrics.connections;
+    spdlog::info("session {} closed: dataset '{}', {} updates, {} bytes, code {}{}", id_, state_.dataset(), state_.updates_sent(), bytes_sent_,
+                 close_code_, note_.empty() ? "" : " (" + note_ + ")");
+  }
+
+  void start(const Request& request) {
+    ++context_.metrics.connections;
+    ++context_.metrics.sessions;
+    ++context_.metrics.sessions_total;
+    beast::error_code ignored;
+    const auto peer = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
+    spdlog::info("session {} from {}:{}", id_, peer.address().to_string(), peer.port());
+    membership_ = context_.connections.join(shared_from_this());
+    spawn(run(shared_from_this(), request));
+  }
+
+  void go_away() override {
+    asio::post(ws_.get_executor(), [self = shared_from_this()] { self->end({CloseCode::going_away, "the server shuts down"}); });
+  }
+
+ private:
+  void spawn(asio::awaitable<void> coroutine) {
+    asio::co_spawn(ws_.get_executor(), std::move(coroutine), [self = shared_from_this()](const std::exception_ptr& failure) {
+      if (failure) self->fail_with(failure);
+    });
+  }
+
+  void fail_with(const std::exception_ptr& failure) {
+    try {
+      std::rethrow_exception(failure);
+    } catch (const std::exception& exception) {
+      note_ = exception.what();
+    }
+    close_code_ = static_cast<unsigned>(CloseCode::internal);
+    cut_off();
+  }
+
+  // Ends the session in order: the writer says why, and closes. The first reason holds.
+  void end(Fault why) {
+    if (!why_ && !gone_) why_ = std::move(why);
+    wake_.cancel();
+  }
+
+  // Ends it at once.
+  void cut_off() {
+    gone_ = true;
+    beast::get_lowest_layer(ws_).close();
+    wake_.cancel();
+  }
+
+  asio::awaitable<void> run(std::shared_ptr<WebSocketSession> self, Request request) {
+    prepare();
+    if (const auto [error] = co_await ws_.async_accept(request, kAwait); error) {
+      note_ = error.message();
+      co_return;
+    }
+    open_deadline_ = Clock::now() + context_.options.handshake_time;
+    spawn(write_messages(self));
+    co_await read_messages();
+  }
+
+  void prepare() {
+    beast::error_code ignored;
+    beast::get_lowest_layer(ws_).socket().set_option(asio::ip::tcp::no_delay(true), ignored);
+    ws_.set_option(websocket::stream_base::timeout{protocol::kHandshakeTime, protocol::kIdleTime, true});
+    ws_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+      response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
+      response.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
+    }));
+    ws_.read_message_max(0);  // read_messages counts, so that it can close with a code of ours
+    ws_.auto_fragment(false);
+    ws_.binary(true);
+  }
+
+  asio::awaitable<void> read_messages() {
+    beast::flat_buffer buffer;
+    while (!why_) {
+      buffer.clear();
+      do {
+        const std::size_t room = protocol::kMaxClientMessage + 1 - buffer.size();
+        const auto [error, size] = co_await ws_.async_read_some(buffer, room, kAwait);
+        if (error) {
+          lost(error);
+          co_return;
+        }
+        if (ws_.got_text()) co_return end({CloseCode::text_frame, "text frames are not spoken here"});
+        if (buffer.size() > protocol::kMaxClientMessage) co_return end({CloseCode::too_large, "the message is too large"});
+      } while (!ws_.is_message_done());
+      if (!why_) receive({static_cast<const std::uint8_t*>(buffer.data().data()), buffer.size()});
+    }
+  }
+
+  void receive(std::span<const std::uint8_t> bytes) {
+    const auto message = protocol::decode_client_message(bytes);
+    if (!message) return end({CloseCode::malformed, message.error().message});
+    if (!state_.starved()) stalled_since_ = Clock::now();  // in case this message makes it so
+    if (auto fault = state_.receive(*message)) return end(std::move(*fault));
+    wake_.cancel();
+  }
+
+  // The connection is over, by the client's close or by what happened to it.
+  void lost(beast::error_code error) {
+    if (error == websocket::error::closed) {
+      if (close_code_ == 0) close_code_ = ws_.reason().code;
+    } else if (note_.empty()) {
+      note_ = error.message();
+    }
+    gone_ = true;
+    wake_.cancel();
+  }
+
+  asio::awaitable<void> write_messages([[maybe_unused]] std::shared_ptr<WebSocketSession> self) {
+    while (!gone_) {
+      if (why_) co_return co_await take_leave();
+      if (auto message = state_.next()) {
+        if (!co_await send(*message)) co_return cut_off();
+        stalled_since_ = Clock::now();
+        if (const auto* batch = std::get_if<protocol::Batch>(&*message)) context_.metrics.updates_sent_total += batch->updates;
+        continue;
+      }
+      co_await wait();
+    }
+  }
+
+  // Until something changes, or the client has kept us waiting too long.
+  asio::awaitable<void> wait() {
+    auto deadline = Clock::time_point::max();
+    if (!state_.opened()) deadline = open_deadline_;
+    if (state_.starved()) deadline = stalled_since_ + context_.options.stall_time;
+    wake_.expires_at(deadline);
+    const auto [error] = co_await wake_.async_wait(kAwait);
+    if (!error && Clock::now() >= deadline) end({CloseCode::timed_out, state_.opened() ? "no credit came in time" : "no Open came in time"});
+  }
+
+  asio::awaitable<bool> send(const protocol::ServerMessage& message) {
+    const auto bytes = protocol::encode(message);
+    write_deadline_.expires_after(protocol::kWriteTime);
+    write_deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
+      if (const auto self = weak.lock(); self && !error) self->cut_off();
+    });
+    const auto [error, size] = co_await ws_.async_write(asio::buffer(bytes), kAwait);
+    write_deadline_.cancel();
+    if (error) {
+      if (note_.empty()) note_ = error.message();
+      co_return false;
+    }
+    bytes_sent_ += bytes.size();
+    context_.metrics.bytes_sent_total += bytes.size();
+    co_return true;
+  }
+
+  asio::awaitable<void> take_leave() {
+    close_code_ = static_cast<unsigned>(why_->code);
+    note_ = why_->text;
+    if (why_->code != CloseCode::going_away) ++context_.metrics.faults_total;
+    const protocol::ServerMessage fault = *why_;
+    if (!co_await send(fault)) co_return cut_off();
+    const auto code = static_cast<websocket::close_code>(why_->code);
+    const websocket::close_reason reason(code, why_->text);
+    co_await ws_.async_close(reason, kAwait);  // within kHandshakeTime; an error is a client that left first
+    cut_off();
+  }
+
+  websocket::stream<beast::tcp_stream> ws_;
+  asio::steady_timer wake_;  // the writer sleeps on it
+  asio::steady_timer write_deadline_;
+  ServerContext& context_;
+  SessionState state_;
+  std::uint64_t id_;
+  std::optional<Fault> why_;  // set once the session is to end
+  bool gone_ = false;         // nothing can be sent any more
+  Clock::time_point open_deadline_{};
+  Clock::time_point stalled_since_{};  // when credit was last enough
+  std::uint64_t bytes_sent_ = 0;
+  unsigned close_code_ = 0;
+  std::string note_;
+  Connections::Membership membership_;
+};
+
+}  // namespace
+
+void start_websocket_session(beast::tcp_stream stream, const Request& request, ServerContext& context) {
+  std::make_shared<WebSocketSession>(std::move(stream), context)->start(request);
+}
+
+}  // namespace intervale

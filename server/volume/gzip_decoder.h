@@ -1,0 +1,21 @@
+// gzip data inside a file (RFC 1952), from any offset.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "common/result.h"
+#include "server/volume/input_file.h"
+
+namespace intervale {
+
+// Decodes what begins at `offset`, drops `skip` decoded bytes and fills `out`. Comes back with how many bytes of it were filled: fewer than
+// out.size() if the data ends before. Damaged data fails. If the data ends within the next few kilobytes, its checksum has been compared;
+// concatenated members count as one.
+Result<std::uint64_t> gzip_decode(const InputFile& file, std::uint64_t offset, std::uint64_t skip, std::span<std::byte> out);
+
+// How many bytes the data decodes to. Time of a full decoding, memory of one chunk.
+Result<std::uint64_t> gzip_length(const InputFile& file, std::uint64_t offset);
+
+}  // namespace intervale

@@ -1,0 +1,109 @@
+#include "server/volume/input_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace intervale {
+namespace {
+
+std::string because(const char* what, const std::filesystem::path& path, int error) {
+  return std::string("cannot ") + what + " " + in_quotes(path) + ": " + std::generic_category().message(error);
+}
+
+template <class Word>
+void swap_words(std::span<std::byte> samples, Word (*swapped)(Word)) {
+  for (std::size_t i = 0; i + sizeof(Word) <= samples.size(); i += sizeof(Word)) {
+    Word word;
+    std::memcpy(&word, samples.data() + i, sizeof word);
+    word = swapped(word);
+    std::memcpy(samples.data() + i, &word, sizeof word);
+  }
+}
+
+}  // namespace
+
+InputFile::InputFile(std::filesystem::path path, int descriptor, std::uint64_t size) : path_(std::move(path)), descriptor_(descriptor), size_(size) {}
+
+InputFile::InputFile(InputFile&& other) noexcept
+    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)), size_(other.size_) {}
+
+InputFile::~InputFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+Result<InputFile> InputFile::open(const std::filesystem::path& path) {
+  // O_NONBLOCK: opening a pipe must not wait for somebody to write to it. It changes nothing for a regular file.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return fail(because("read", path, errno));
+  struct stat status {};
+  const int error = ::fstat(descriptor, &status) == 0 ? 0 : errno;
+  InputFile file(path, descriptor, static_cast<std::uint64_t>(std::max<off_t>(status.st_size, 0)));
+  if (error != 0) return fail(because("read", path, error));
+  if (!S_ISREG(status.st_mode)) return fail("cannot read '" + path.string() + "': it is not a regular file; copy the data into one first");
+  return file;
+}
+
+Result<std::size_t> InputFile::read_some(std::uint64_t offset, std::span<std::byte> out) const {
+  std::size_t done = 0;
+  while (done < out.size() && offset + done < size_) {
+    const auto got = ::pread(descriptor_, out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return fail(because("read", path_, errno));
+    if (got == 0) break;  // the file has shrunk since
+    done += static_cast<std::size_t>(got);
+  }
+  return done;
+}
+
+Result<void> InputFile::read(std::uint64_t offset, std::span<std::byte> out) const {
+  const auto got = read_some(offset, out);
+  if (!got) return tl::unexpected<Error>(got.error());
+  if (*got == out.size()) return {};
+  return fail(in_quotes(path_) + " ends after " + std::to_string(offset + *got) + " bytes, where " + std::to_string(offset + out.size()) +
+              " are needed; is it cut short?");
+}
+
+std::string in_quotes(const std::filesystem::path& path) {
+  std::string text = "'";
+  return text.append(path.string()).append("'");
+}
+
+Result<void> check_grid(const std::array<std::int64_t, 3>& dims, const std::array<double, 3>& spacing, const std::array<double, 3>& origin,
+                        const std::string& where) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::string on_axis = std::string(" on axis ") + "xyz"[axis];
+    if (dims[axis] < kMinSide || dims[axis] > kMaxSide)
+      return fail(where + ": " + std::to_string(dims[axis]) + (dims[axis] == 1 ? " sample" : " samples") + on_axis + "; a volume has " +
+                  std::to_string(kMinSide) + " to " + std::to_string(kMaxSide));
+    if (!(std::isfinite(spacing[axis]) && spacing[axis] > 0)) return fail(where + ": the spacing" + on_axis + " must be finite and greater than 0");
+    if (!std::isfinite(origin[axis])) return fail(where + ": the origin" + on_axis + " must be finite");
+    if (!std::isfinite(origin[axis] + spacing[axis] * static_cast<double>(dims[axis] - 1)))
+      return fail(where + ": the volume's far corner" + on_axis + " is beyond what a double holds; use a smaller spacing");
+  }
+  return {};
+}
+
+void swap_bytes(std::span<std::byte> samples, SampleType type) {
+  switch (size_of(type)) {
+    case 2:
+      return swap_words<std::uint16_t>(samples, [](std::uint16_t w) { return __builtin_bswap16(w); });
+    case 4:
+      return swap_words<std::uint32_t>(samples, [](std::uint32_t w) { return __builtin_bswap32(w); });
+    case 8:
+      return swap_words<std::uint64_t>(samples, [](std::uint64_t w) -> std::uint64_t { return __builtin_bswap64(w); });
+    default:
+      return;
+  }
+}
+
+}  // namespace intervale

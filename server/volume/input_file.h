@@ -1,0 +1,50 @@
+// A file of samples, read by position.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "common/result.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+// An open regular file. Reading by position keeps no state, so one file may be read by several threads.
+class InputFile {
+ public:
+  static Result<InputFile> open(const std::filesystem::path& path);  // refuses folders, pipes and devices, whose size says nothing
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&&) = delete;
+  ~InputFile();
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }  // bytes, when it was opened
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  // Up to out.size() bytes from `offset` on; fewer only at the end of the file.
+  [[nodiscard]] Result<std::size_t> read_some(std::uint64_t offset, std::span<std::byte> out) const;
+  // Exactly out.size() bytes; an error if the file ends before.
+  [[nodiscard]] Result<void> read(std::uint64_t offset, std::span<std::byte> out) const;
+
+ private:
+  InputFile(std::filesystem::path path, int descriptor, std::uint64_t size);
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+  std::uint64_t size_ = 0;
+};
+
+// A path as error messages show it, between apostrophes.
+[[nodiscard]] std::string in_quotes(const std::filesystem::path& path);
+
+// Whether a volume of this shape can be: 2 to 2^20 samples a side; spacing, origin and the far corner finite, spacing above 0.
+// The message begins with `where`.
+Result<void> check_grid(const std::array<std::int64_t, 3>& dims, const std::array<double, 3>& spacing, const std::array<double, 3>& origin,
+                        const std::string& where);
+
+// Turns the bytes of every sample round, in place.
+void swap_bytes(std::span<std::byte> samples, SampleType type);
+
+}  // namespace intervale

@@ -1,0 +1,202 @@
+// teem knows the grammar of fields, their aliases and types; it does not expect malice. It overflows buffers by long lines (its
+// messages) and long words (its text reader), takes the header's file name for a printf format, and leaves gzip's checksum unread. So the header is
+// cut out and screened here, teem parses what is left, from memory and without touching any file, and the data is read in nrrd_reader.cpp.
+#include "server/volume/nrrd_header.h"
+
+#include <teem/biff.h>
+#include <teem/nrrd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <mutex>
+#include <string_view>
+
+namespace intervale {
+namespace {
+
+constexpr std::size_t kMaxHeaderBytes = 1 << 20;
+constexpr std::size_t kMaxLine = 512;  // teem formats its messages, with the line in them, into 1 KiB by vsprintf
+constexpr std::string_view kMagic = "NRRD000";
+
+struct Screened {
+  std::string text;  // what teem may see
+  std::optional<std::string> data_file;
+  std::uint64_t end = 0;  // where the data begins, if attached
+};
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r";
+  const auto begin = text.find_first_not_of(kBlank);
+  return begin == text.npos ? std::string_view{} : text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
+}
+
+// A field's name without case and blanks: a superset of the spellings that teem takes for one field.
+std::string canonical(std::string_view name) {
+  std::string plain;
+  for (const char c : name)
+    if (c != ' ' && c != '\t') plain += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return plain;
+}
+
+// Says nothing about where the samples are and what they are.
+bool is_decoration(const std::string& field) {
+  constexpr std::array<std::string_view, 14> kDecorations{
+      "content", "number", "thicknesses", "centers", "centerings",  "labels",     "units",
+      "min",     "max",    "oldmin",      "oldmax",  "sampleunits", "spaceunits", "measurementframe"};
+  return std::find(kDecorations.begin(), kDecorations.end(), field) != kDecorations.end();
+}
+
+Result<Screened> screen(std::string_view file, const std::string& name) {
+  Screened screened;
+  bool blank_line = false, has_dimension = false;
+  std::string kinds;  // handed over last: teem leaks when it meets them before the dimension
+  std::size_t position = 0;
+  for (bool first = true; position < file.size(); first = false) {
+    const auto end = std::min(file.find('\n', position), file.size());
+    auto line = file.substr(position, end - position);
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    if (first && !(line.size() == kMagic.size() + 1 && line.starts_with(kMagic) && line.back() >= '1' && line.back() <= '6'))
+      return fail(name + " is not an NRRD file: it does not begin with NRRD0001 to NRRD0006");
+    position = std::min(end + 1, file.size());
+    if (line.empty()) {
+      blank_line = true;
+      break;
+    }
+    if (line.find('\0') != line.npos) return fail(name + ": zero bytes in the NRRD header; is it cut short or damaged?");
+    const auto colon = line.find(": ");
+    const auto field = canonical(line.substr(0, colon));
+    const bool pair = line.find(":=") < colon;
+    if (line.front() == '#' || pair || (colon != line.npos && is_decoration(field))) continue;
+    if (colon != line.npos && field == "datafile") {
+      if (screened.data_file) return fail(name + ": two 'data file' lines in the NRRD header");
+      screened.data_file = trimmed(line.substr(colon + 1));
+      continue;
+    }
+    if (line.size() > kMaxLine) return fail(name + ": a line of the NRRD header is longer than " + std::to_string(kMaxLine) + " characters");
+    has_dimension = has_dimension || field == "dimension";
+    (field == "kinds" ? kinds : screened.text).append(line).append("\n");
+  }
+  if (!blank_line && !screened.data_file)
+    return fail(name + ": the NRRD header " +
+                (file.size() == kMaxHeaderBytes ? "is longer than 1 MiB" : "ends without a blank line before the data; is it cut short?"));
+  if (has_dimension) screened.text += kinds;
+  screened.end = position;
+  return screened;
+}
+
+// The innermost of teem's messages, which knows most, without the name of teem's function.
+std::string last_teem_error() {
+  const std::unique_ptr<char, void (*)(void*)> all(biffGetDone(NRRD), std::free);
+  if (!all) return "unknown error";
+  std::string_view text = trimmed(all.get());
+  while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
+  text = text.substr(text.rfind('\n') + 1);
+  const auto colon = text.find(": ");
+  if (colon != text.npos) text.remove_prefix(colon + 2);
+  std::string line;
+  for (const char c : text.substr(0, 200)) line += std::isprint(static_cast<unsigned char>(c)) ? c : '?';
+  return line;
+}
+
+Result<SampleType> sample_type(int type, const std::string& name) {
+  switch (type) {
+    case nrrdTypeChar:
+      return SampleType::i8;
+    case nrrdTypeUChar:
+      return SampleType::u8;
+    case nrrdTypeShort:
+      return SampleType::i16;
+    case nrrdTypeUShort:
+      return SampleType::u16;
+    case nrrdTypeInt:
+      return SampleType::i32;
+    case nrrdTypeUInt:
+      return SampleType::u32;
+    case nrrdTypeFloat:
+      return SampleType::f32;
+    case nrrdTypeDouble:
+      return SampleType::f64;
+    case nrrdTypeLLong:
+    case nrrdTypeULLong:
+      return fail(name + ": 64-bit integers do not fit a double exactly; convert them first, e.g. unu convert -t double");
+    default:
+      return fail(name + ": samples of type 'block' are not numbers");
+  }
+}
+
+Result<NrrdHeader::Encoding> encoding_of(const NrrdEncoding* encoding, const std::string& name) {
+  if (encoding == nrrdEncodingRaw) return NrrdHeader::Encoding::raw;
+  if (encoding == nrrdEncodingGzip) return NrrdHeader::Encoding::gzip;
+  if (encoding == nrrdEncodingAscii) return NrrdHeader::Encoding::ascii;
+  return fail(name + ": NRRD encoding '" + encoding->name + "' is not read; convert it first, e.g. unu save -f nrrd -e gzip");
+}
+
+double usable(double value, double otherwise) { return std::isfinite(value) && value != 0 ? std::abs(value) : otherwise; }
+
+// Samples keep their own axes: of an oblique volume only the distances between samples are kept, not its rotation.
+void place(const Nrrd& nrrd, Grid& grid) {
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const auto& info = nrrd.axis[axis];
+    const double spacing = nrrd.spaceDim > 0 ? nrrdSpaceVecNorm(nrrd.spaceDim, info.spaceDirection) : info.spacing;
+    grid.spacing[axis] = usable(std::isfinite(spacing) ? spacing : info.spacing, 1);
+    const double origin = nrrd.spaceDim == 3 ? nrrd.spaceOrigin[axis] : info.min;
+    grid.origin[axis] = std::isfinite(origin) ? origin : 0;
+  }
+}
+
+Result<NrrdHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std::string& name) {
+  NrrdHeader header;
+  for (const int field : {nrrdField_type, nrrdField_dimension, nrrdField_sizes, nrrdField_encoding})
+    if (!state.seen[field]) return fail(name + ": the NRRD header has no '" + airEnumStr(nrrdField, field) + "' line");
+  if (nrrd.dim != 3) return fail(name + " has " + std::to_string(nrrd.dim) + (nrrd.dim == 1 ? " axis" : " axes") + "; a volume has 3");
+  std::array<std::int64_t, 3> dims{};
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    if (nrrd.axis[axis].kind >= nrrdKindList)
+      return fail(name + ": axis " + std::to_string(axis + 1) + " holds the parts of a '" + airEnumStr(nrrdKind, nrrd.axis[axis].kind) +
+                  "'; a volume has 3 axes in space and one number a sample");
+    dims[axis] = static_cast<std::int64_t>(std::min<std::uint64_t>(nrrd.axis[axis].size, INT64_MAX));
+  }
+  const auto type = sample_type(nrrd.type, name);
+  if (!type) return tl::unexpected<Error>(type.error());
+  const auto encoding = encoding_of(state.encoding, name);
+  if (!encoding) return tl::unexpected<Error>(encoding.error());
+  header.type = *type;
+  header.encoding = *encoding;
+  header.big_endian = state.encoding->endianMatters && state.endian == airEndianBig;
+  header.line_skip = state.lineSkip;
+  header.byte_skip = state.byteSkip;
+  place(nrrd, header.grid);
+  if (const auto checked = check_grid(dims, header.grid.spacing, header.grid.origin, name); !checked) return tl::unexpected<Error>(checked.error());
+  for (std::size_t axis = 0; axis < 3; ++axis) header.grid.dims[axis] = static_cast<std::int32_t>(dims[axis]);
+  return header;
+}
+
+}  // namespace
+
+Result<NrrdHeader> read_nrrd_header(const InputFile& file) {
+  static std::mutex teem;
+  const auto name = in_quotes(file.path());
+  std::string bytes(std::min<std::uint64_t>(file.size(), kMaxHeaderBytes), '\0');
+  const auto got = file.read_some(0, std::as_writable_bytes(std::span(bytes)));
+  if (!got) return tl::unexpected<Error>(got.error());
+  const auto screened = screen(std::string_view(bytes).substr(0, *got), name);
+  if (!screened) return tl::unexpected<Error>(screened.error());
+
+  const std::lock_guard one_at_a_time(teem);
+  const std::unique_ptr<Nrrd, Nrrd* (*)(Nrrd*)> nrrd(nrrdNew(), nrrdNix);
+  const std::unique_ptr<NrrdIoState, NrrdIoState* (*)(NrrdIoState*)> state(nrrdIoStateNew(), nrrdIoStateNix);
+  if (!nrrd || !state) return fail("no memory left to read '" + name + "'");
+  state->skipData = 1;  // or teem would allocate what the header claims
+  if (nrrdStringRead(nrrd.get(), screened->text.c_str(), state.get()) != 0) return fail(name + ": bad NRRD header: " + last_teem_error());
+  auto header = judged(*nrrd, *state, name);
+  if (header) {
+    header->data_file = screened->data_file;
+    header->data_offset = screened->end;
+  }
+  return header;
+}
+
+}  // namespace intervale

@@ -1,0 +1,62 @@
+#include "server/volume/nrrd_writer.h"
+
+#include <charconv>
+#include <string>
+
+#include "common/atomic_file.h"
+
+namespace intervale {
+namespace {
+
+const char* nrrd_type(SampleType type) {
+  switch (type) {
+    case SampleType::u8:
+      return "uint8";
+    case SampleType::i8:
+      return "int8";
+    case SampleType::u16:
+      return "uint16";
+    case SampleType::i16:
+      return "int16";
+    case SampleType::u32:
+      return "uint32";
+    case SampleType::i32:
+      return "int32";
+    case SampleType::f32:
+      return "float";
+    case SampleType::f64:
+      break;
+  }
+  return "double";
+}
+
+std::string shortest(double value) {
+  std::array<char, 32> digits;
+  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
+}
+
+// `space directions` rather than `spacings`: a NRRD has an origin in space only together with them. NRRD0004 is the first with either.
+std::string header(const Volume& volume) {
+  const auto& [dims, spacing, origin] = volume.grid;
+  std::string text = "NRRD0004\n# written by Intervale " INTERVALE_VERSION "\ntype: ";
+  text.append(nrrd_type(volume.type)).append("\ndimension: 3\nspace dimension: 3\nsizes:");
+  for (const auto side : dims) text.append(" ").append(std::to_string(side));
+  text += "\nspace directions: (" + shortest(spacing[0]) + ",0,0) (0," + shortest(spacing[1]) + ",0) (0,0," + shortest(spacing[2]) + ")";
+  text += "\nspace origin: (" + shortest(origin[0]) + "," + shortest(origin[1]) + "," + shortest(origin[2]) + ")";
+  text += "\nkinds: domain domain domain\n";
+  if (size_of(volume.type) > 1) text += "endian: little\n";
+  return text + "encoding: raw\n\n";
+}
+
+}  // namespace
+
+Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected<Error>(file.error());
+  const auto text = header(volume);
+  if (auto written = file->write(std::as_bytes(std::span(text))); !written) return written;
+  if (auto written = file->write(volume.bytes); !written) return written;
+  return file->commit();
+}
+
+}  // namespace intervale

@@ -1,0 +1,14 @@
+// Volumes into NRRD files.
+#pragma once
+
+#include <filesystem>
+
+#include "common/result.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+// Writes header and samples into one file, raw and little endian, aside and renamed. read_nrrd gives back the same grid, bit by bit.
+Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume);
+
+}  // namespace intervale

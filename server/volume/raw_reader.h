@@ -1,0 +1,30 @@
+// Raw samples without a header: the user says what they are.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+#include "common/result.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+struct RawLayout {
+  std::array<std::int64_t, 3> dims{};  // samples on x (fastest), y, z
+  SampleType type = SampleType::u8;
+  bool big_endian = false;
+  std::uint64_t skip_bytes = 0;  // before the first sample
+  std::array<double, 3> spacing{1, 1, 1};
+  std::array<double, 3> origin{0, 0, 0};
+};
+
+// "u8", "i8", "u16", "i16", "u32", "i32", "f32" or "f64"; misuse with that list otherwise.
+Result<SampleType> parse_sample_type(std::string_view name);
+
+// Reads a file of exactly skip_bytes + samples; a layout that cannot be is misuse, a file of another size fails with both sizes.
+// Takes the volume's memory and nothing beside it, and takes it only once the sizes agree.
+Result<Volume> read_raw(const std::filesystem::path& path, const RawLayout& layout);
+
+}  // namespace intervale

@@ -1,0 +1,316 @@
+// A server in this process, and clients that do not keep to the protocol.
+#include "server/serve/server.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "protocol/codec.h"
+#include "tests/e2e/support/programs.h"
+#include "tests/e2e/support/raw_client.h"
+
+namespace intervale {
+namespace {
+
+using protocol::Batch;
+using protocol::CloseCode;
+using protocol::Credit;
+using protocol::Done;
+using protocol::Open;
+using protocol::Opened;
+using protocol::View;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+std::unique_ptr<Server> start(const ServeOptions& wanted = {}) {
+  spdlog::set_level(spdlog::level::off);
+  ServeOptions options = wanted;
+  options.listen = "127.0.0.1:0";
+  options.threads = 2;
+  auto server = Server::start(options, Catalogue::load({buckyball()}).value());
+  if (!server) throw std::runtime_error(server.error().message);
+  return std::move(*server);
+}
+
+const Open kOpen{"buckyball", "test", protocol::kDefaultWindow};
+const View kEverything{1, {}};
+
+// A client in the middle of its stream: one batch received, no credit for a second.
+struct Waiting {
+  RawClient client;
+  std::uint64_t updates = 0;
+  explicit Waiting(std::uint16_t port) : client(port) {
+    client.send(Open{"buckyball", "waiting", protocol::kMinCredit});
+    client.send(kEverything);
+    (void)client.expect<Opened>();
+    updates = client.expect<Batch>().updates;
+  }
+  std::uint64_t finish() {
+    client.send(Credit{protocol::kDefaultWindow});
+    return updates += client.stream_to_end();
+  }
+};
+
+struct Attack {
+  const char* name;
+  CloseCode code;
+  std::function<void(RawClient&)> act;
+};
+
+void PrintTo(const Attack& attack, std::ostream* out) { *out << attack.name; }
+
+std::vector<std::uint8_t> bytes_of(std::size_t size, std::uint8_t value) { return std::vector<std::uint8_t>(size, value); }
+
+View view_with_error(double error) {
+  View view = kEverything;
+  view.lod.error = error;
+  return view;
+}
+
+std::vector<Attack> attacks() {
+  constexpr std::size_t kTooMuch = protocol::kMaxClientMessage + 1;
+  return {
+      {"Garbage", CloseCode::malformed, [](RawClient& c) { c.send_binary(bytes_of(100, 0xa5)); }},
+      {"Nothing", CloseCode::malformed, [](RawClient& c) { c.send_binary({}); }},
+      {"LargestGarbage", CloseCode::malformed, [](RawClient& c) { c.send_binary(bytes_of(kTooMuch - 1, 1)); }},
+      {"GarbageWhileStreaming", CloseCode::malformed,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(kEverything);
+         c.send_binary(bytes_of(100, 0xa5));
+       }},
+      {"NotANumber", CloseCode::malformed,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(view_with_error(std::numeric_limits<double>::quiet_NaN()));
+       }},
+      {"AServersMessage", CloseCode::malformed,
+       [](RawClient& c) {
+         c.send_binary(protocol::encode(protocol::ServerMessage(protocol::Fault{CloseCode::malformed, "you"})));
+       }},
+      {"Text", CloseCode::text_frame, [](RawClient& c) { c.send_text("hello"); }},
+      {"TextWhileStreaming", CloseCode::text_frame,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(kEverything);
+         c.send_text("hello");
+       }},
+      {"TooLarge", CloseCode::too_large, [](RawClient& c) { c.send_binary(bytes_of(kTooMuch, 0)); }},
+      {"MuchTooLarge", CloseCode::too_large, [](RawClient& c) { c.send_binary(bytes_of(4 << 20, 0)); }},
+      {"TooLargeInPieces", CloseCode::too_large,
+       [](RawClient& c) {
+         for (std::size_t sent = 0; sent < kTooMuch; sent += 1000) c.send_binary(bytes_of(1000, 0), false);
+       }},
+      {"TooMuchCredit", CloseCode::too_large,
+       [](RawClient& c) {
+         c.send(Open{"buckyball", "", protocol::kMaxWindow + 1});
+       }},
+      {"CreditThatOverflows", CloseCode::too_large,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(Credit{std::numeric_limits<std::uint64_t>::max()});
+       }},
+      {"NoSuchDataset", CloseCode::no_such_dataset,
+       [](RawClient& c) {
+         c.send(Open{"../buckyball", "", 0});
+       }},
+      {"ViewBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(kEverything); }},
+      {"CreditBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(Credit{1}); }},
+      {"OpenTwice", CloseCode::out_of_order,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(kOpen);
+       }},
+      {"EpochTwice", CloseCode::out_of_order,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(kEverything);
+         c.send(kEverything);
+       }},
+  };
+}
+
+class Attacks : public testing::TestWithParam<Attack> {};
+
+TEST_P(Attacks, CloseThatSessionWithTheCodeAndTouchNoOther) {
+  const auto server = start();
+  RawClient whole(server->port());
+  whole.send(kOpen);
+  whole.send(kEverything);
+  const std::uint64_t everything = whole.stream_to_end();
+
+  Waiting other(server->port());
+  RawClient attacker(server->port());
+  GetParam().act(attacker);
+  const auto end = attacker.end();
+  EXPECT_EQ(end.code, static_cast<unsigned>(GetParam().code));
+  ASSERT_TRUE(end.fault);
+  EXPECT_EQ(end.fault->code, GetParam().code);
+  EXPECT_NE(end.fault->text, "");
+  EXPECT_EQ(other.finish(), everything);
+}
+
+INSTANTIATE_TEST_SUITE_P(Server, Attacks, testing::ValuesIn(attacks()), [](const auto& attack) { return attack.param.name; });
+
+TEST(Server, NeverSendsMoreThanItWasGranted) {
+  const auto server = start();
+  RawClient client(server->port());
+  client.send(Open{"buckyball", "", 0});
+  client.send(kEverything);
+  (void)client.expect<Opened>();
+  std::uint64_t left = 0;
+  std::uint64_t updates = 0;
+  for (std::uint64_t grant = protocol::kMinCredit;; grant = grant * 3 / 2) {
+    client.send(Credit{grant});
+    left += grant;
+    bool done = false;
+    while (left >= protocol::kMinCredit && !done) {  // with so much left, the server sends
+      const auto message = client.receive().value();
+      done = std::holds_alternative<Done>(message);
+      if (done) continue;
+      const auto& batch = std::get<Batch>(message);
+      ASSERT_LE(protocol::encode(message).size(), protocol::cost_of(batch));
+      ASSERT_LE(protocol::cost_of(batch), left);
+      left -= protocol::cost_of(batch);
+      updates += batch.updates;
+    }
+    if (done) break;
+  }
+  EXPECT_GT(updates, 10000u);
+}
+
+TEST(Server, ANewViewGoesOnFromWhatWasSent) {
+  const auto server = start();
+  RawClient whole(server->port());
+  whole.send(kOpen);
+  whole.send(kEverything);
+  const std::uint64_t everything = whole.stream_to_end();
+
+  RawClient client(server->port());
+  client.send(kOpen);
+  client.send(view_with_error(20));
+  const std::uint64_t coarse = client.stream_to_end();
+  client.send(View{2, {}});
+  const std::uint64_t rest = client.stream_to_end();
+  EXPECT_GT(coarse, 0u);
+  EXPECT_EQ(coarse + rest, everything);
+  client.send(View{7, {}});  // nothing is left to send
+  EXPECT_EQ(client.stream_to_end(), 0u);
+}
+
+TEST(Server, ASessionThatDoesNotOpenIsClosed) {
+  ServeOptions options;
+  options.handshake_time = std::chrono::milliseconds(50);
+  const auto server = start(options);
+  RawClient client(server->port());
+  EXPECT_EQ(client.end().code, static_cast<unsigned>(CloseCode::timed_out));
+}
+
+TEST(Server, ASessionThatGrantsNothingIsClosed) {
+  ServeOptions options;
+  options.stall_time = std::chrono::milliseconds(50);
+  const auto server = start(options);
+  RawClient client(server->port());
+  client.send(Open{"buckyball", "", 0});
+  client.send(kEverything);
+  EXPECT_EQ(client.end().code, static_cast<unsigned>(CloseCode::timed_out));
+}
+
+TEST(Server, StopClosesSessionsWithGoingAway) {
+  const auto server = start();
+  Waiting streaming(server->port());
+  RawClient idle(server->port());
+  std::thread stopping([&server] { server->stop(); });
+  EXPECT_EQ(streaming.client.end().code, static_cast<unsigned>(CloseCode::going_away));
+  EXPECT_EQ(idle.end().code, static_cast<unsigned>(CloseCode::going_away));
+  stopping.join();
+}
+
+TEST(Server, StopDoesNotWaitForClientsThatDoNotLeave) {
+  ServeOptions options;
+  options.drain_time = std::chrono::milliseconds(50);
+  const auto server = start(options);
+  const Waiting deaf(server->port());
+  server->stop();  // and returns
+}
+
+TEST(Server, TurnsConnectionsAwayAtItsLimit) {
+  ServeOptions options;
+  options.max_connections = 2;
+  const auto server = start(options);
+  Waiting first(server->port());
+  Waiting second(server->port());
+  EXPECT_EQ(talk(server->port(), ""), "");
+  EXPECT_GT(first.finish(), 0u);
+  EXPECT_GT(second.finish(), 0u);
+}
+
+TEST(Server, AnAddressThatCannotBeHadIsAnError) {
+  const auto server = start();
+  for (const std::string& listen : {"127.0.0.1:" + std::to_string(server->port()), std::string("192.0.2.1:1")}) {
+    ServeOptions options;
+    options.listen = listen;
+    const auto second = Server::start(options, {});
+    ASSERT_FALSE(second);
+    EXPECT_FALSE(second.error().usage);
+    EXPECT_THAT(second.error().message, HasSubstr(listen));
+  }
+  for (const char* listen :
+       {"", "8080", ":8080", "localhost:8080", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "::1:80", "[127.0.0.1]:80", "1.2.3.4:-1"}) {
+    ServeOptions options;
+    options.listen = listen;
+    const auto wrong = Server::start(options, {});
+    ASSERT_FALSE(wrong) << listen;
+    EXPECT_TRUE(wrong.error().usage) << listen;
+  }
+}
+
+TEST(Server, ListensOnVersion6) {
+  ServeOptions options;
+  options.listen = "[::1]:0";
+  const auto server = Server::start(options, {});
+  if (!server) GTEST_SKIP() << server.error().message;  // a machine without IPv6
+  EXPECT_THAT((*server)->url(), StartsWith("http://[::1]:"));
+}
+
+TEST(Http, AnswersByMethodAndTarget) {
+  const auto server = start();
+  const auto ask = [&](const std::string& line) { return talk(server->port(), line + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"); };
+  EXPECT_THAT(ask("GET /"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("text/html"), HasSubstr("buckyball")));
+  EXPECT_THAT(ask("GET /api/datasets?x=1"),
+              testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("application/json"), HasSubstr("\"dims\":[65,65,65]")));
+  EXPECT_THAT(ask("GET /healthz"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(ask("GET /readyz"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(ask("GET /metrics"), testing::AllOf(HasSubstr("version=0.0.4"), HasSubstr("\nintervale_sessions 0\n")));
+  EXPECT_THAT(ask("HEAD /"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("Content-Length"), Not(HasSubstr("<html"))));
+  EXPECT_THAT(ask("POST /"), testing::AllOf(StartsWith("HTTP/1.1 405"), HasSubstr("Allow: GET, HEAD")));
+  EXPECT_THAT(ask("GET /../etc/passwd"), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(ask("GET /v1/stream"), StartsWith("HTTP/1.1 426"));
+}
+
+TEST(Http, KeepsTheConnectionForTheNextRequest) {
+  const auto server = start();
+  const std::string answers =
+      talk(server->port(), "GET /healthz HTTP/1.1\r\nHost: x\r\n\r\nGET /readyz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  EXPECT_NE(answers.find("HTTP/1.1 200"), answers.rfind("HTTP/1.1 200"));
+}
+
+TEST(Http, WhatIsNoRequestIsToldSo) {
+  const auto server = start();
+  EXPECT_THAT(talk(server->port(), std::string(100, '\x01') + "\r\n\r\n"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(talk(server->port(), "GET / HTTP/1.1\r\nX: " + std::string(5000, 'x') + "\r\n\r\n"), StartsWith("HTTP/1.1 431"));
+  const std::string upgrade =
+      "GET /v1/stream HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+  EXPECT_THAT(talk(server->port(), upgrade), StartsWith("HTTP/1.1 400"));  // our subprotocol is not offered
+}
+
+}  // namespace
+}  // namespace intervale

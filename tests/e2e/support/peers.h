@@ -1,0 +1,36 @@
+// Stand-ins for the other side of a connection: a relay that can be told when to act, and servers that are not ours.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace intervale {
+
+// Passes one connection on to 127.0.0.1:port. After each piece that came from the server, and before it is passed on, on_bytes is called with the
+// count of bytes so far, on the relay's thread; false cuts both connections.
+class Relay {
+ public:
+  Relay(std::uint16_t port, std::function<bool(std::uint64_t)> on_bytes);
+  ~Relay();
+  [[nodiscard]] std::string url(const std::string& name) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// Answers whatever comes first on a connection with `answer`, then closes; with an empty answer it keeps silent.
+class Stranger {
+ public:
+  explicit Stranger(std::string answer);
+  ~Stranger();
+  [[nodiscard]] std::string url(const std::string& name) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace intervale

@@ -1,0 +1,31 @@
+// The programs under test, and a data set made with them.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "tests/support/process.h"
+
+namespace intervale {
+
+// A program's path: in $INTERVALE_BIN, else where this build puts its programs.
+[[nodiscard]] std::string program(const std::string& name);
+
+// The buckyball, 65 samples a side, [128, 188]; made once a run: "…/buckyball.ivm".
+[[nodiscard]] const std::filesystem::path& buckyball();
+
+// `intervale serve` on a free port, ready.
+class ServerProgram {
+ public:
+  explicit ServerProgram(const std::string& input = buckyball().string());
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] std::string url(const std::string& name = {}) const;
+  [[nodiscard]] Process& process() { return process_; }
+
+ private:
+  Process process_;
+  std::uint16_t port_ = 0;
+};
+
+}  // namespace intervale

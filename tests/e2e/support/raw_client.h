@@ -1,0 +1,47 @@
+// A WebSocket that sends whatever a test wants, allowed or not. Blocks; the test's own time-out is the deadline.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "protocol/messages.h"
+
+namespace intervale {
+
+class RawClient {
+ public:
+  explicit RawClient(std::uint16_t port);  // with the handshake done
+  ~RawClient();
+
+  void send(const protocol::ClientMessage& message);
+  void send_binary(std::span<const std::uint8_t> bytes, bool last = true);  // one frame
+  void send_text(const std::string& text);
+
+  // The next message, or nothing once the server has closed.
+  std::optional<protocol::ServerMessage> receive();
+  template <class Message>
+  Message expect() {
+    return std::get<Message>(receive().value());
+  }
+
+  struct End {
+    unsigned code = 0;                     // the WebSocket's close code; 0: the connection broke
+    std::optional<protocol::Fault> fault;  // what was said before it
+  };
+  End end();  // receives until the server has closed
+
+  // Takes batches and grants what they cost, until Done; the updates that came.
+  std::uint64_t stream_to_end();
+
+ private:
+  struct Socket;
+  std::unique_ptr<Socket> socket_;
+};
+
+// Sends bytes over plain TCP and gives what comes back until the server closes.
+[[nodiscard]] std::string talk(std::uint16_t port, const std::string& bytes);
+
+}  // namespace intervale

@@ -1,0 +1,105 @@
+// Writes the seeds of every fuzz target into FOLDER/NAME/: fuzz_corpus FOLDER.
+#include <zlib.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "common/ivm_file.h"
+#include "common/refinement.h"
+#include "common/update_codec.h"
+#include "fuzz/small_volumes.h"
+#include "protocol/codec.h"
+#include "support/batches.h"
+
+using namespace intervale;
+
+namespace {
+
+class Corpus {
+ public:
+  explicit Corpus(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  void add(const std::string& target, const std::string& name, const std::string& prefix, std::string_view bytes) const {
+    std::filesystem::create_directories(folder_ / target);
+    std::ofstream(folder_ / target / name, std::ios::binary) << prefix << bytes;
+  }
+  template <class T>
+  void add(const std::string& target, const std::string& name, const std::string& prefix, const std::vector<T>& bytes) const {
+    add(target, name, prefix, std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+void add_batches(const Corpus& corpus) {
+  for (std::size_t i = 0; i < testing::small_volumes().size(); ++i) {
+    const IntervalVolume& v = testing::small_volumes()[i];
+    const auto queue = in_order(v, select(v, {}));
+    for (const std::size_t stage : {0u, 5u, 7u}) {
+      const auto left = std::span(queue).subspan(queue.size() * stage / 8);
+      const auto bytes = testing::batch_of(v, left.first(std::min<std::size_t>(left.size(), 60)));
+      const std::string name = "volume" + std::to_string(i) + "-stage" + std::to_string(stage);
+      corpus.add("update_batch", name, {char(i), char(stage)}, bytes);
+      if (stage == 5) corpus.add("update_batch", name + "-budget", {char(i), char(0xb8 | stage)}, bytes);
+    }
+  }
+}
+
+void add_nrrds(const Corpus& corpus) {
+  const std::string sizes = "dimension: 3\nsizes: 2 3 4\n", samples(24, 'x');
+  corpus.add("nrrd", "raw", "NRRD0004\n# made\ntype: uchar\n" + sizes + "encoding: raw\n\n", samples);
+  corpus.add("nrrd", "big", "NRRD0004\ntype: unsigned short\nendian: big\nspacings: 1 2 0.5\n" + sizes + "encoding: raw\n\n", samples + samples);
+  corpus.add(
+      "nrrd", "directions",
+      "NRRD0005\ntype: int8\nspace: left-posterior-superior\nspace directions: (1,0,0) (0,2,0) (0,0,3)\nspace origin: (1,2,3)\nbyte skip: -1\n" +
+          sizes + "encoding: raw\n\n",
+      "head" + samples);
+  corpus.add("nrrd", "text", "NRRD0002\ntype: float\n" + sizes + "line skip: 1\nencoding: ascii\n\nskipped\n",
+             "1 2 3 4 5 6 7 8 9 10 11 12 1e3 -2 0.5 4 5 6 7 8 9 10 11 12\n");
+  corpus.add("nrrd", "detached", "NRRD0004\ntype: uchar\n" + sizes + "encoding: raw\ndata file: elsewhere.raw\n", "");
+  std::string gzipped(200, '\0');
+  z_stream stream{};
+  deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(samples.data()));
+  stream.avail_in = uInt(samples.size());
+  stream.next_out = reinterpret_cast<Bytef*>(gzipped.data());
+  stream.avail_out = uInt(gzipped.size());
+  deflate(&stream, Z_FINISH);
+  gzipped.resize(stream.total_out);
+  deflateEnd(&stream);
+  corpus.add("nrrd", "gzip", "NRRD0004\ntype: uchar\n" + sizes + "encoding: gzip\n\n", gzipped);
+}
+
+void add_messages(const Corpus& corpus) {
+  using namespace protocol;
+  corpus.add("protocol", "open", {0}, encode(ClientMessage(Open{"buckyball", "fuzz 1", 262144})));
+  corpus.add("protocol", "view", {0}, encode(ClientMessage(View{7, {0.5, 10.0, Box{{-1, 0, 1}, {2, 0, 3}}, 5, 6}})));
+  corpus.add("protocol", "view-all", {0}, encode(ClientMessage(View{1, {}})));
+  corpus.add("protocol", "credit", {0}, encode(ClientMessage(Credit{65536})));
+  corpus.add("protocol", "opened", {1}, encode(ServerMessage(Opened{testing::small_volumes()[1].description(), {}})));
+  const IntervalVolume& v = testing::small_volumes()[0];
+  const auto queue = in_order(v, select(v, {}));
+  const auto payload = testing::batch_of(v, std::span(queue).first(30));
+  corpus.add("protocol", "batch", {1}, encode(ServerMessage(protocol::Batch{1, 2, 30, 0.5, payload})));
+  corpus.add("protocol", "done", {1}, encode(ServerMessage(Done{1, 22, 333})));
+  corpus.add("protocol", "fault", {1}, encode(ServerMessage(Fault{CloseCode::too_large, "too large"})));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fputs("usage: fuzz_corpus FOLDER\n", stderr);
+    return 2;
+  }
+  const Corpus corpus(argv[1]);
+  for (std::size_t i = 0; i < testing::small_volumes().size(); ++i) {
+    corpus.add("ivm_file", "volume" + std::to_string(i), "", encode_ivm(testing::small_volumes()[i]));
+  }
+  add_batches(corpus);
+  add_nrrds(corpus);
+  add_messages(corpus);
+  return 0;
+}

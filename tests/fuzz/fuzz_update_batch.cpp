@@ -1,0 +1,51 @@
+// Bytes as a batch of updates. The first byte picks the volume, the second how far its client has come and whether there is a budget; the rest is the
+// batch.
+#include <cstdio>
+#include <cstdlib>
+
+#include "common/refinement.h"
+#include "common/update_codec.h"
+#include "fuzz/small_volumes.h"
+#include "support/batches.h"
+
+using namespace intervale;
+
+namespace {
+
+constexpr std::size_t kStages = 8;
+
+// For each volume its client at stages from 0 to all but the last updates.
+const std::vector<std::vector<Front>>& clients() {
+  static const std::vector<std::vector<Front>> all = [] {
+    std::vector<std::vector<Front>> made;
+    for (const IntervalVolume& v : testing::small_volumes()) {
+      const auto queue = in_order(v, select(v, {}));
+      auto& stages = made.emplace_back();
+      for (std::size_t stage = 0; stage < kStages; ++stage) {
+        Front& front = stages.emplace_back(v.description().grid, *decode_base(v.description().base, v.domain()));
+        if (!apply_batch(front, testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages)))) std::abort();
+      }
+    }
+    return made;
+  }();
+  return all;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < 2) return 0;
+  Front front = clients()[data[0] % clients().size()][data[1] % kStages];
+  std::optional<std::uint64_t> max_tets;
+  if (data[1] & 0x80) max_tets = front.tet_count() + (data[1] >> 3 & 15);
+  const auto applied = apply_batch(front, {data + 2, size - 2}, max_tets);
+  if (!applied) {
+    if (applied.error().message.empty()) std::abort();
+    return 0;
+  }
+  const auto broken = front.validate();
+  if (broken) std::fprintf(stderr, "the front does not hold: %s\n", broken->c_str());
+  if (broken || (max_tets && front.tet_count() > *max_tets)) std::abort();
+  if (front.mesh().tets.size() != front.tet_count()) std::abort();
+  return 0;
+}

@@ -1,0 +1,160 @@
+// Laws of the front: the mesh depends only on which diamonds are split, and merging undoes splitting.
+#include "common/front.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+
+#include "common/extraction.h"
+#include "common/update.h"
+#include "server/build/field_hierarchy.h"
+#include "support/analytic_fields.h"
+#include "support/mesh_laws.h"
+
+namespace intervale {
+namespace {
+
+using testing::broken_law;
+using testing::canonical;
+
+IntervalVolume made(const Volume& volume, const Range& range) {
+  BuildOptions options;
+  options.range = range;
+  auto sigma = FieldHierarchy(volume, options).compact();
+  EXPECT_TRUE(sigma);
+  return std::move(*sigma);
+}
+
+class FrontLaws : public ::testing::TestWithParam<unsigned> {
+ protected:
+  FrontLaws() {
+    std::mt19937 random(GetParam());
+    const auto side = [&] { return std::int32_t(2 + random() % 11); };
+    const std::array<std::int32_t, 3> dims{side(), side(), side()};
+    const bool equal = GetParam() % 4 == 0;
+    if (GetParam() % 2 == 0) {
+      volume = testing::digits(dims, GetParam());
+      range = {3, equal ? 3.0 : 5.5};
+    } else {
+      volume = testing::gyroid(GetParam() % 3 == 0 ? std::array<std::int32_t, 3>{9, 9, 9} : dims);
+      range = {-0.3, equal ? -0.3 : 0.2};
+    }
+  }
+  Volume volume;
+  Range range;
+};
+
+TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
+  const IntervalVolume sigma = made(volume, range);
+  const Base base = *decode_base(sigma.description().base, sigma.domain());
+  const testing::Canonical expected = canonical(extract(sigma, {})->front.mesh());
+  for (unsigned trial = 0; trial < 3; ++trial) {
+    std::mt19937 random(GetParam() * 10 + trial);
+    Front front(volume.grid, base);
+    std::vector<Place> waiting;
+    sigma.set().for_each_down([&](const Place& p) { waiting.push_back(p); });
+    std::size_t steps = 0;
+    while (!waiting.empty()) {
+      std::shuffle(waiting.begin(), waiting.end(), random);
+      std::vector<Place> later;
+      for (const Place& p : waiting) {
+        const auto handle = front.find(sigma.set().centre(p));
+        if (!handle) {
+          later.push_back(p);
+          continue;
+        }
+        ASSERT_TRUE(apply_update(front, *handle, sigma.update(p)));
+        if (++steps % 97 == 0) {
+          ASSERT_EQ(front.validate(), std::nullopt);
+          ASSERT_EQ(broken_law(front.mesh(), volume.grid, range.alpha == range.beta), "");
+        }
+      }
+      ASSERT_LT(later.size(), waiting.size()) << "nothing can be split";
+      waiting = later;
+    }
+    EXPECT_EQ(canonical(front.mesh()), expected);
+  }
+}
+
+TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
+  const IntervalVolume sigma = made(volume, range);
+  const Base base = *decode_base(sigma.description().base, sigma.domain());
+  std::mt19937 random(GetParam());
+  Front front(volume.grid, base);
+  const testing::Canonical coarse = canonical(front.mesh());
+  std::map<UpdateIndex, Cuts> split;  // with what merging needs back
+  std::vector<Place> places;
+  sigma.set().for_each_down([&](const Place& p) { places.push_back(p); });
+  if (places.empty()) return;
+  const auto afresh = [&] {  // the mesh of this split set, made afresh
+    SplitSet set(sigma.size());
+    for (const auto& [i, cuts] : split) set.insert(i);
+    return canonical(extract(volume.grid, base, sigma.set(), set, [&](Front& fresh, Front::Handle handle, const Place& p) {
+                       return apply_update(fresh, handle, sigma.update(p)).has_value();
+                     })->front.mesh());
+  };
+  for (int round = 0; round < 12; ++round) {
+    // Some splits, then some merges, of whatever can be.
+    for (int i = 0; i < 400; ++i) {
+      const Place p = places[random() % places.size()];
+      const Vertex c = sigma.set().centre(p);
+      const bool split_now = round % 3 == 2 ? random() % 3 == 0 : random() % 3 != 0;
+      if (split_now) {
+        const auto handle = front.find(c);
+        EXPECT_FALSE(handle && split.contains(p.index));
+        if (!handle) continue;
+        split[p.index] = *apply_update(front, *handle, sigma.update(p));
+      } else {
+        const Cuts spine = split.contains(p.index) ? split[p.index] : Cuts{};
+        if (front.merge(c, spine)) {
+          EXPECT_EQ(split.erase(p.index), 1u) << "merged what was not split";
+        }
+      }
+    }
+    ASSERT_EQ(front.validate(), std::nullopt);
+    ASSERT_EQ(broken_law(front.mesh(), volume.grid, range.alpha == range.beta), "");
+    ASSERT_EQ(canonical(front.mesh()), afresh());
+  }
+  // All the way back.
+  for (bool any = true; any;) {
+    any = false;
+    for (const Place& p : places) {
+      if (split.contains(p.index) && front.merge(sigma.set().centre(p), split[p.index])) split.erase(p.index), any = true;
+    }
+  }
+  EXPECT_TRUE(split.empty());
+  EXPECT_EQ(front.diamond_count(), 1u);
+  EXPECT_EQ(canonical(front.mesh()), coarse);
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, FrontLaws, ::testing::Range(1u, 25u));
+
+TEST(Front, RefusesWhatCannotBeSplit) {
+  const Volume volume = testing::gyroid({9, 9, 9});
+  const IntervalVolume sigma = made(volume, {-0.3, 0.2});
+  const Front front(volume.grid, *decode_base(sigma.description().base, sigma.domain()));
+  EXPECT_TRUE(front.find({4, 4, 4}));
+  for (const Vertex v : {Vertex{0, 0, 0}, Vertex{8, 8, 8}, Vertex{2, 2, 2}, Vertex{-4, 4, 4}, Vertex{4, 4, 1 << 30}}) EXPECT_FALSE(front.find(v));
+}
+
+TEST(Front, TheBudgetIsNeverPassed) {
+  const Volume volume = testing::gyroid({17, 17, 17});
+  const IntervalVolume sigma = made(volume, {-0.3, 0.2});
+  for (std::uint64_t most : {0u, 100u, 1000u, 5000u}) {
+    Lod lod;
+    lod.max_tets = most;
+    const auto extracted = extract(sigma, lod);
+    ASSERT_TRUE(extracted);
+    EXPECT_LE(extracted->front.tet_count(),
+              std::max<std::uint64_t>(most, Front(volume.grid, *decode_base(sigma.description().base, sigma.domain())).tet_count()));
+    EXPECT_EQ(broken_law(extracted->front.mesh(), volume.grid), "");
+    Lod updates;
+    updates.max_updates = most;
+    EXPECT_LE(extract(sigma, updates)->updates, most);
+  }
+}
+
+}  // namespace
+}  // namespace intervale

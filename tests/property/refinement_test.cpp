@@ -1,0 +1,215 @@
+// Laws of the mesh at any level of detail, of any range, on boxes of any shape.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "common/extraction.h"
+#include "common/mesh_writer.h"
+#include "server/build/field_hierarchy.h"
+#include "support/analytic_fields.h"
+#include "support/mesh_laws.h"
+#include "support/naive_volume.h"
+
+namespace intervale {
+namespace {
+
+using testing::broken_law;
+using testing::canonical;
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+struct Trial {
+  Volume volume;
+  BuildOptions options;
+  std::string text;
+};
+
+// A volume of random shape and kind with a random range: finite, infinite, equal, equal to samples, or one that misses the field.
+Trial random_trial(unsigned seed) {
+  std::mt19937 random(seed);
+  const auto side = [&] { return std::int32_t(2 + random() % 12); };
+  std::array<std::int32_t, 3> dims{side(), side(), side()};
+  if (seed % 5 == 0) dims = {9, 9, 9};
+  Trial trial;
+  double low = 0, high = 0;
+  switch (random() % 3) {
+    case 0:
+      trial.volume = testing::digits(dims, seed), low = -1, high = 10;
+      break;
+    case 1:
+      trial.volume = testing::bump(dims, seed), low = 50, high = 100;
+      break;
+    default:
+      trial.volume = testing::gyroid(dims), low = -1.6, high = 1.6;
+  }
+  trial.volume.grid.spacing = {0.5, 1, 3};
+  trial.volume.grid.origin = {-4, 0, 7};
+  const auto value = [&] {
+    const double v = low + (high - low) * double(random() % 1000) / 1000;
+    return trial.volume.type == SampleType::u8 && random() % 2 == 0 ? std::floor(v) : v;
+  };
+  Range& r = trial.options.range;
+  r = {value(), value()};
+  if (r.alpha > r.beta) std::swap(r.alpha, r.beta);
+  switch (random() % 8) {
+    case 0:
+      r.alpha = -kInf;
+      break;
+    case 1:
+      r.beta = kInf;
+      break;
+    case 2:
+      r = {-kInf, kInf};
+      break;
+    case 3:
+      r.beta = r.alpha;
+      break;
+    case 4:
+      r = {high + 10, high + 20};
+      break;
+    case 5:
+      r.beta = r.alpha + (high - low) / 1000;
+      break;
+    default:
+      break;
+  }
+  trial.options.refine = random() % 4 == 0 ? Refine::uniform : Refine::boundary;
+  trial.text = "seed " + std::to_string(seed) + ", " + std::to_string(dims[0]) + " x " + std::to_string(dims[1]) + " x " + std::to_string(dims[2]) +
+               ", [" + std::to_string(r.alpha) + ", " + std::to_string(r.beta) + "]";
+  return trial;
+}
+
+class Property : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(Property, EveryLevelOfDetailIsRight) {
+  const Trial trial = random_trial(GetParam());
+  SCOPED_TRACE(trial.text);
+  const bool sheet = trial.options.range.alpha == trial.options.range.beta;
+  const FieldHierarchy delta(trial.volume, trial.options);
+  const auto sigma = delta.compact();
+  ASSERT_TRUE(sigma) << sigma.error().message;
+  const auto valid = sigma->validate();
+  ASSERT_TRUE(valid) << valid.error().message;
+
+  std::mt19937 random(GetParam() + 1000);
+  const Grid& g = trial.volume.grid;
+  std::uint64_t finer = std::numeric_limits<std::uint64_t>::max();
+  for (int level = 0; level < 4; ++level) {
+    Lod lod;
+    if (level > 0) lod.error_percent = 20.0 * level * double(random() % 100) / 100;
+    if (level == 3) {
+      Box box;
+      for (int i = 0; i < 3; ++i) {
+        box.min[i] = g.origin[i] + g.spacing[i] * double(random() % g.dims[i]);
+        box.max[i] = box.min[i] + g.spacing[i] * double(random() % 3);
+      }
+      lod.roi = box;
+    }
+    const auto extracted = extract(*sigma, lod);
+    ASSERT_TRUE(extracted) << extracted.error().message;
+    if (level == 0) finer = extracted->updates;
+    EXPECT_LE(extracted->updates, finer);
+    EXPECT_EQ(extracted->front.validate(), std::nullopt);
+    const Mesh mesh = extracted->front.mesh();
+    EXPECT_EQ(broken_law(mesh, g, sheet), "");
+    EXPECT_EQ(mesh.tets.size(), extracted->front.tet_count());
+    if (level == 0) {
+      EXPECT_EQ(mesh.tets.size(), sigma->description().full.tets);
+      EXPECT_EQ(mesh.points.size(), sigma->description().full.vertices);
+    }
+    // The volume is the naive sum's, but for the rounding of the cuts.
+    const SplitSet split = select(*sigma, lod);
+    const auto naive = testing::naive_sum(trial.volume, trial.options.range, [&](Vertex c) {
+      if ((c.x | c.y | c.z) == 0) return false;
+      const auto place = sigma->set().find(c);
+      return place && split.contains(place->index);
+    });
+    const double unit = g.spacing[0] * g.spacing[1] * g.spacing[2];
+    EXPECT_NEAR(volume_of(mesh) / unit, naive.volume, 0.01 * naive.cut_volume + 1e-9);
+    // The same mesh from the field's hierarchy.
+    if (level < 3) {
+      const Lod same{error_of(lod, sigma->description()), {}, {}, {}, {}};
+      const SplitSet from_delta = select(
+          delta.set(), [&](UpdateIndex i) { return double(sigma->error(i)); }, criterion_of(same, sigma->description()));
+      EXPECT_EQ(from_delta, split);
+      const auto again = extract(g, delta.base(), delta.set(), from_delta, [&](Front& front, Front::Handle handle, const Place& p) {
+        const Diamond d(delta.set().centre(p));
+        const DiamondContext known = delta.context(d), held = front.context(handle);
+        EXPECT_EQ(known.cut, held.cut) << "the field and the front know the same of a diamond";
+        front.split(handle, delta.side(d.centre), delta.cuts(d));
+        return true;
+      });
+      ASSERT_TRUE(again) << again.error().message;
+      EXPECT_EQ(canonical(again->front.mesh()), canonical(mesh));
+    }
+  }
+}
+
+TEST_P(Property, BoxesThatDoNotNestKeepTheGuaranteeAtSamples) {
+  const Trial trial = random_trial(GetParam());
+  SCOPED_TRACE(trial.text);
+  const FieldHierarchy delta(trial.volume, trial.options);
+  const auto sigma = delta.compact();
+  ASSERT_TRUE(sigma);
+  Lod lod;
+  lod.error_percent = 15;
+  const double epsilon = error_of(lod, sigma->description());
+  const auto extracted = extract(*sigma, lod);
+  ASSERT_TRUE(extracted);
+  const Mesh mesh = extracted->front.mesh();
+  const Grid& g = trial.volume.grid;
+  // Which samples a tetrahedron holds, with a tolerance for those that lie on its faces.
+  std::vector<bool> covered(g.sample_count());
+  for (const auto& t : mesh.tets) {
+    std::array<std::array<double, 3>, 4> p{};
+    std::array<double, 3> lo{kInf, kInf, kInf}, hi{-kInf, -kInf, -kInf};
+    for (int i = 0; i < 4; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        p[i][k] = (mesh.points[t[i]][k] - g.origin[k]) / g.spacing[k];
+        lo[k] = std::min(lo[k], p[i][k]);
+        hi[k] = std::max(hi[k], p[i][k]);
+      }
+    }
+    const auto det = [](const auto& a, const auto& b, const auto& c, const auto& d) {
+      double m[3][3];
+      for (int k = 0; k < 3; ++k) m[0][k] = b[k] - a[k], m[1][k] = c[k] - a[k], m[2][k] = d[k] - a[k];
+      return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+             m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+    };
+    const double whole = det(p[0], p[1], p[2], p[3]);
+    if (whole <= 0) continue;
+    for (int z = int(std::ceil(lo[2] - 1e-9)); z <= int(std::floor(hi[2] + 1e-9)); ++z) {
+      for (int y = int(std::ceil(lo[1] - 1e-9)); y <= int(std::floor(hi[1] + 1e-9)); ++y) {
+        for (int x = int(std::ceil(lo[0] - 1e-9)); x <= int(std::floor(hi[0] + 1e-9)); ++x) {
+          const std::array<double, 3> q{double(x), double(y), double(z)};
+          const double least = -1e-9;
+          if (det(q, p[1], p[2], p[3]) < least || det(p[0], q, p[2], p[3]) < least || det(p[0], p[1], q, p[3]) < least ||
+              det(p[0], p[1], p[2], q) < least)
+            continue;
+          covered[(std::size_t(z) * g.dims[1] + y) * g.dims[0] + x] = true;
+        }
+      }
+    }
+  }
+  // A cut is rounded to a step of its edge: 1/256 of the difference of values there, at most of the whole span.
+  double low = kInf, high = -kInf;
+  for (std::size_t i = 0; i < covered.size(); ++i) {
+    const double f = testing::sample(trial.volume, int(i % g.dims[0]), int(i / g.dims[0] % g.dims[1]), int(i / g.dims[0] / g.dims[1]));
+    low = std::min(low, f);
+    high = std::max(high, f);
+  }
+  const double step = epsilon + (high - low) / 128;
+  const Range r = trial.options.range;
+  for (std::size_t i = 0; i < covered.size(); ++i) {
+    const double f = testing::sample(trial.volume, int(i % g.dims[0]), int(i / g.dims[0] % g.dims[1]), int(i / g.dims[0] / g.dims[1]));
+    const bool must = f >= r.alpha + step && f <= r.beta - step, never = f < r.alpha - step || f > r.beta + step;
+    EXPECT_FALSE(must && !covered[i]) << "sample " << i << ", value " << f;
+    EXPECT_FALSE(never && covered[i]) << "sample " << i << ", value " << f;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, Property, ::testing::Range(1u, 61u));
+
+}  // namespace
+}  // namespace intervale

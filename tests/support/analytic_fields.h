@@ -1,0 +1,65 @@
+// Volumes made by formula, for tests: any size, any range, seeded.
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <vector>
+
+#include "server/volume/volume.h"
+
+namespace intervale::testing {
+
+template <class T>
+Volume volume_of_type(SampleType type, const std::array<std::int32_t, 3>& dims, const std::vector<T>& samples) {
+  Volume v;
+  v.name = "made";
+  v.grid.dims = dims;
+  v.type = type;
+  v.bytes.resize(samples.size() * sizeof(T));
+  std::memcpy(v.bytes.data(), samples.data(), v.bytes.size());
+  return v;
+}
+
+// A gyroid of about two periods, in [-1.5, 1.5].
+inline Volume gyroid(const std::array<std::int32_t, 3>& dims) {
+  std::vector<float> f;
+  for (int z = 0; z < dims[2]; ++z) {
+    for (int y = 0; y < dims[1]; ++y) {
+      for (int x = 0; x < dims[0]; ++x) {
+        const double a = x * 0.7, b = y * 0.7, c = z * 0.7;
+        f.push_back(float(std::sin(a) * std::cos(b) + std::sin(b) * std::cos(c) + std::sin(c) * std::cos(a)));
+      }
+    }
+  }
+  return volume_of_type(SampleType::f32, dims, f);
+}
+
+// Integers from 0 to 9: many samples equal to each other and to bounds.
+inline Volume digits(const std::array<std::int32_t, 3>& dims, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<std::uint8_t> f(std::size_t(dims[0]) * dims[1] * dims[2]);
+  for (auto& v : f) v = std::uint8_t(random() % 10);
+  return volume_of_type(SampleType::u8, dims, f);
+}
+
+// A smooth bump and a little noise: some regions full, some empty.
+inline Volume bump(const std::array<std::int32_t, 3>& dims, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> noise(-2, 2), place(0.2, 0.8);
+  const double cx = place(random) * dims[0], cy = place(random) * dims[1], cz = place(random) * dims[2];
+  std::vector<double> f;
+  for (int z = 0; z < dims[2]; ++z) {
+    for (int y = 0; y < dims[1]; ++y) {
+      for (int x = 0; x < dims[0]; ++x) f.push_back(100 - 6 * std::hypot(x - cx, y - cy, z - cz) + noise(random));
+    }
+  }
+  return volume_of_type(SampleType::f64, dims, f);
+}
+
+// The sample at integer coordinates.
+inline double sample(const Volume& v, int x, int y, int z) {
+  return visit_samples(v, [&](auto samples) { return double(samples[(std::size_t(z) * v.grid.dims[1] + y) * v.grid.dims[0] + x]); });
+}
+
+}  // namespace intervale::testing

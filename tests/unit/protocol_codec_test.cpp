@@ -1,0 +1,167 @@
+#include "protocol/codec.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+
+namespace intervale::protocol {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Description some_description() {
+  Description d;
+  d.name = "buckyball";
+  d.grid = {{129, 65, 2}, {1, 0.5, 0.25}, {-1, 0, 1e9}};
+  d.range = {-kInfinity, 188};
+  d.refine = Refine::uniform;
+  d.max_error = 12.25;
+  d.updates = 123456789012;
+  d.coefficients = 99;
+  d.full = {1u << 31, 1ull << 40};
+  d.content_hash = 0xfedcba9876543210;
+  d.base = {1, 2, 3, 255};
+  return d;
+}
+
+std::vector<ClientMessage> client_messages() {
+  return {Open{"buckyball", "test 1", 262144}, View{1, {}},
+          View{std::numeric_limits<std::uint64_t>::max(),
+               {.error = 0.5, .error_percent = 10, .roi = Box{{-1, 0, 1}, {2, 0, 3}}, .max_tets = 0, .max_updates = 1ull << 60}},
+          Credit{65536}};
+}
+
+std::vector<ServerMessage> server_messages() {
+  return {Opened{some_description(), {}}, Batch{1, 2, 3, 4.5, {7, 8, 9}}, Batch{}, Done{1, 22, 333}, Fault{CloseCode::too_large, "too large"}};
+}
+
+Result<ClientMessage> decode(const ClientMessage&, std::span<const std::uint8_t> bytes) { return decode_client_message(bytes); }
+Result<ServerMessage> decode(const ServerMessage&, std::span<const std::uint8_t> bytes) { return decode_server_message(bytes); }
+
+// Bytes in a buffer of exactly their size, so that the address sanitizer sees every step beyond.
+template <class Message>
+auto decode_exact(const Message& kind, std::span<const std::uint8_t> bytes) {
+  const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), exact.get());
+  return decode(kind, {exact.get(), bytes.size()});
+}
+
+template <class Action>
+void for_each_message(Action action) {
+  for (const auto& message : client_messages()) action(message);
+  for (const auto& message : server_messages()) action(message);
+}
+
+TEST(Codec, EveryMessageComesBackTheSame) {
+  for_each_message([](const auto& message) {
+    const auto back = decode_exact(message, encode(message));
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(*back, message);
+  });
+}
+
+TEST(Codec, TheExampleInTheSpecificationIsTrue) {
+  const Bytes example{0x10, 0, 0, 0, 0, 0, 0, 0, 8,    0, 0x0e, 0, 7, 0, 8, 0, 8, 0, 0, 0, 0, 0, 0, 3,
+                      0x0c, 0, 0, 0, 0, 0, 6, 0, 0x0c, 0, 4,    0, 6, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0};
+  EXPECT_EQ(encode(ClientMessage(Credit{65536})), example);
+}
+
+TEST(Codec, EveryAlignmentIsRead) {
+  for_each_message([](const auto& message) {
+    const Bytes bytes = encode(message);
+    for (std::size_t shift = 0; shift < 8; ++shift) {
+      Bytes shifted(shift);
+      shifted.insert(shifted.end(), bytes.begin(), bytes.end());
+      const auto back = decode(message, std::span(shifted).subspan(shift));
+      ASSERT_TRUE(back);
+      EXPECT_EQ(*back, message);
+    }
+  });
+}
+
+TEST(Codec, NoTruncatedMessageCrashes) {
+  for_each_message([](const auto& message) {
+    const Bytes bytes = encode(message);
+    EXPECT_FALSE(decode_exact(message, {}));
+    for (std::size_t size = 0; size < bytes.size(); ++size) (void)decode_exact(message, std::span(bytes).first(size));
+  });
+}
+
+TEST(Codec, NoChangedByteCrashes) {
+  for_each_message([](const auto& message) {
+    const Bytes bytes = encode(message);
+    for (std::size_t at = 0; at < bytes.size(); ++at) {
+      for (const int change : {0x01, 0x80, 0xff}) {
+        Bytes changed = bytes;
+        changed[at] ^= static_cast<std::uint8_t>(change);
+        (void)decode_exact(message, changed);
+      }
+    }
+  });
+}
+
+TEST(Codec, NoiseIsRefused) {
+  const unsigned seed = 20240607;
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
+  for (int round = 0; round < 20000; ++round) {
+    Bytes noise(random() % 200);
+    for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
+    EXPECT_FALSE(decode_exact(ClientMessage{}, noise));
+    EXPECT_FALSE(decode_exact(ServerMessage{}, noise));
+  }
+}
+
+TEST(Codec, OneSidesMessagesAreNotTheOthers) {
+  EXPECT_FALSE(decode_server_message(encode(ClientMessage(Open{"x", "y", 1}))));                    // Opened holds a description there
+  EXPECT_FALSE(decode_client_message(encode(ServerMessage(Fault{CloseCode::malformed, "text"}))));  // a kind that clients have not
+}
+
+TEST(Codec, LimitsHold) {
+  EXPECT_TRUE(decode_client_message(encode(ClientMessage(Open{std::string(kMaxName, 'x'), "", 0}))));
+  EXPECT_FALSE(decode_client_message(encode(ClientMessage(Open{std::string(kMaxName + 1, 'x'), "", 0}))));
+  EXPECT_FALSE(decode_client_message(encode(ClientMessage(Open{"x", std::string(kMaxText + 1, 'x'), 0}))));
+  Opened opened{some_description(), {}};
+  opened.description.base.resize(kMaxBase + 1);
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(opened))));
+  EXPECT_TRUE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, Bytes(kMaxBatchPayload)}))));
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, Bytes(kMaxBatchPayload + 1)}))));
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, kNan, {}}))));
+}
+
+TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
+  const Box box{{0, 0, 0}, {1, 1, 1}};
+  std::vector<Lod> wrong(9);
+  wrong[0].error = -1;
+  wrong[1].error = kNan;
+  wrong[2].error = kInfinity;
+  wrong[3].error_percent = 100.5;
+  wrong[4].error_percent = kNan;
+  wrong[5].roi = box;
+  wrong[5].roi->min[1] = 2;
+  wrong[6].roi = box;
+  wrong[6].roi->max[2] = kInfinity;
+  wrong[7].roi = box;
+  wrong[7].roi->min[0] = kNan;
+  wrong[8].error_percent = -0.5;
+  for (const Lod& lod : wrong) EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, lod})))) << &lod - wrong.data();
+}
+
+TEST(Codec, ABatchesEnvelopeIsWithinItsLimit) {
+  constexpr auto kMost = std::numeric_limits<std::uint64_t>::max();
+  for (const std::size_t size : {0, 1, 2, 3, 5, 1000, 65536}) {
+    const Batch batch{kMost, kMost, 0xffffffff, 1e300, Bytes(size)};
+    EXPECT_LE(encode(ServerMessage(batch)).size(), size + kBatchEnvelope);
+    EXPECT_LE(encode(ServerMessage(batch)).size(), cost_of(batch));
+  }
+}
+
+}  // namespace
+}  // namespace intervale::protocol

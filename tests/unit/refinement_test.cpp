@@ -1,0 +1,217 @@
+#include "common/refinement.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "server/build/field_hierarchy.h"
+#include "support/analytic_fields.h"
+
+namespace intervale {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+const Box kEverywhere{{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
+
+Lod of_error(double error) {
+  Lod lod;
+  lod.error = error;
+  return lod;
+}
+
+Lod of_percent(double percent) {
+  Lod lod;
+  lod.error_percent = percent;
+  return lod;
+}
+
+Lod of_region(const Box& box) {
+  Lod lod;
+  lod.roi = box;
+  return lod;
+}
+
+// Boxes of several shapes, in world coordinates that are not the samples'.
+IntervalVolume made(unsigned seed) {
+  constexpr std::array<std::array<std::int32_t, 3>, 5> shapes{{{9, 9, 9}, {17, 17, 17}, {12, 5, 7}, {2, 9, 20}, {10, 16, 3}}};
+  Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 5]) : testing::digits(shapes[seed % 5], seed);
+  volume.grid.spacing = {0.5, 1, 3};
+  volume.grid.origin = {-4, 0, 7};
+  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
+  EXPECT_TRUE(sigma);
+  return std::move(*sigma);
+}
+
+// The updates' numbers of a diamond's parents.
+std::vector<UpdateIndex> parents_of(const IntervalVolume& v, const Diamond& d) {
+  std::vector<UpdateIndex> parents;
+  for (int k = 0; k < d.row->parents; ++k) {
+    const Vertex c = d.parent(k);
+    if (c.x < 0 || c.y < 0 || c.z < 0) continue;
+    if (const auto p = v.set().find(c)) parents.push_back(p->index);
+  }
+  return parents;
+}
+
+void expect_closed(const IntervalVolume& v, const SplitSet& chosen) {
+  v.set().for_each_down([&](const Place& p) {
+    if (!chosen.contains(p.index)) return;
+    for (UpdateIndex parent : parents_of(v, Diamond(v.set().centre(p)))) EXPECT_TRUE(chosen.contains(parent));
+  });
+}
+
+// A random box; one in three is a point, or reaches beyond the volume.
+Box random_box(const Grid& g, std::mt19937& random) {
+  Box box;
+  const double share = random() % 3 == 0 ? 0 : 0.3;
+  for (int i = 0; i < 3; ++i) {
+    const double length = g.spacing[i] * (g.dims[i] - 1);
+    box.min[i] = g.origin[i] + length * (double(random() % 1300) / 1000 - 0.2);
+    box.max[i] = box.min[i] + length * share;
+  }
+  return box;
+}
+
+class Select : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(Select, IsClosedUnderParentsAndWantsNothingElse) {
+  const IntervalVolume v = made(GetParam());
+  const Grid& g = v.description().grid;
+  std::mt19937 random(GetParam());
+  for (int trial = 0; trial < 20; ++trial) {
+    Lod lod;
+    if (trial % 2 == 0) lod.error_percent = double(random() % 50);
+    if (trial % 4 != 0) lod.roi = random_box(g, random);
+    const SplitSet chosen = select(v, lod);
+    expect_closed(v, chosen);
+    // The naive set: all that is finer than the error and whose cube of side 2h meets the box; then ancestors.
+    const double threshold = error_of(lod, v.description());
+    SplitSet expected(v.size());
+    v.set().for_each_up([&](const Place& p) {
+      const Diamond d(v.set().centre(p));
+      bool wanted = threshold == 0 || v.error(p.index) > threshold;
+      const double c[3] = {double(d.centre.x), double(d.centre.y), double(d.centre.z)};
+      for (int i = 0; i < 3 && lod.roi; ++i) {
+        // Of the box, what lies in the volume, in samples.
+        const double lo = std::max(0.0, (lod.roi->min[i] - g.origin[i]) / g.spacing[i]),
+                     hi = std::min(g.dims[i] - 1.0, (lod.roi->max[i] - g.origin[i]) / g.spacing[i]);
+        wanted = wanted && lo <= hi && c[i] - d.h <= hi && c[i] + d.h >= lo;
+      }
+      if (!wanted && !expected.contains(p.index)) return;
+      expected.insert(p.index);
+      for (UpdateIndex parent : parents_of(v, d)) expected.insert(parent);
+    });
+    EXPECT_TRUE(chosen == expected) << "trial " << trial << ": " << chosen.count() << " chosen, " << expected.count() << " expected";
+  }
+}
+
+TEST_P(Select, ErrorZeroMeansAllAndTheLargestErrorNone) {
+  const IntervalVolume v = made(GetParam());
+  EXPECT_EQ(select(v, Lod{}).count(), v.size());
+  EXPECT_EQ(select(v, of_percent(0)).count(), v.size());
+  EXPECT_EQ(select(v, of_percent(100)).count(), 0u);
+  EXPECT_EQ(select(v, of_error(v.description().max_error)).count(), 0u);
+  EXPECT_EQ(select(v, of_region(kEverywhere)).count(), v.size());
+}
+
+TEST_P(Select, AFinerErrorChoosesNoLess) {
+  const IntervalVolume v = made(GetParam());
+  SplitSet coarser(v.size());
+  for (double percent : {90.0, 60.0, 30.0, 10.0, 3.0, 0.3, 0.0}) {
+    const SplitSet chosen = select(v, of_percent(percent));
+    expect_closed(v, chosen);
+    for (UpdateIndex i = 0; i < v.size(); ++i) {
+      EXPECT_TRUE(!coarser.contains(i) || chosen.contains(i));
+      EXPECT_EQ(chosen.contains(i), percent == 0 || v.error(i) > percent / 100 * v.description().max_error);
+    }
+    coarser = chosen;
+  }
+}
+
+TEST_P(Select, ARegionOutsideTheBoxChoosesNothing) {
+  const IntervalVolume v = made(GetParam());
+  const Grid& g = v.description().grid;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double steps : {0.01, 0.5, 1.0, 3.0, 1e6}) {
+      for (const bool before : {false, true}) {
+        Lod lod = of_region(kEverywhere);
+        if (before)
+          lod.roi->max[axis] = g.origin[axis] - steps * g.spacing[axis];
+        else
+          lod.roi->min[axis] = g.origin[axis] + (g.dims[axis] - 1 + steps) * g.spacing[axis];
+        if (lod.roi->min[axis] > lod.roi->max[axis]) lod.roi->min[axis] = lod.roi->max[axis];
+        EXPECT_EQ(select(v, lod).count(), 0u) << steps << (before ? " steps before axis " : " steps behind axis ") << axis;
+      }
+    }
+  }
+}
+
+TEST_P(Select, InOrderErrorsNeverAscendAndParentsComeFirst) {
+  const IntervalVolume v = made(GetParam());
+  std::mt19937 random(GetParam());
+  for (int trial = 0; trial < 4; ++trial) {
+    Lod lod;
+    if (trial > 0) lod.roi = random_box(v.description().grid, random);
+    const SplitSet chosen = select(v, lod);
+    const auto order = in_order(v, chosen);
+    EXPECT_EQ(order.size(), chosen.count());
+    SplitSet seen(v.size());
+    float error = std::numeric_limits<float>::max();
+    for (UpdateIndex i : order) {
+      EXPECT_TRUE(chosen.contains(i) && !seen.contains(i));
+      EXPECT_LE(v.error(i), error);
+      error = v.error(i);
+      for (UpdateIndex parent : parents_of(v, Diamond(v.set().centre(v.set().place(i))))) EXPECT_TRUE(seen.contains(parent));
+      seen.insert(i);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shapes, Select, ::testing::Range(0u, 10u));
+
+TEST(CheckLod, PassesWhatMakesSense) {
+  EXPECT_TRUE(check_lod({}));
+  EXPECT_TRUE(check_lod(of_error(1e300)));
+  EXPECT_TRUE(check_lod(of_percent(0)));
+  EXPECT_TRUE(check_lod({0, 100.0, {}, 0, 0}));
+  EXPECT_TRUE(check_lod(of_region({{1, 2, 3}, {1, 2, 3}})));
+}
+
+TEST(CheckLod, RefusesWhatDoesNot) {
+  const Lod senseless[] = {of_error(-1),
+                           of_error(kNan),
+                           of_error(kInf),
+                           of_percent(-0.1),
+                           of_percent(100.1),
+                           of_percent(kNan),
+                           of_percent(kInf),
+                           of_region({{0, 0, 2}, {1, 1, 1}}),
+                           of_region({{0, kNan, 0}, {1, 1, 1}}),
+                           of_region({{0, 0, 0}, {1, 1, kNan}})};
+  for (const Lod& lod : senseless) {
+    const auto checked = check_lod(lod);
+    ASSERT_FALSE(checked) << "number " << &lod - senseless;
+    EXPECT_TRUE(checked.error().usage);
+  }
+}
+
+TEST(SplitSetLaws, HoldsWhatWasPutInAndNothingElse) {
+  std::mt19937 random(3);
+  SplitSet set(1000);
+  std::vector<bool> model(1000);
+  for (int i = 0; i < 5000; ++i) {
+    const auto n = UpdateIndex(random() % 1000);
+    if (random() % 2 == 0)
+      set.insert(n), model[n] = true;
+    else
+      set.erase(n), model[n] = false;
+  }
+  for (UpdateIndex n = 0; n < 1000; ++n) EXPECT_EQ(set.contains(n), model[n]);
+  EXPECT_EQ(set.count(), std::uint64_t(std::count(model.begin(), model.end(), true)));
+}
+
+}  // namespace
+}  // namespace intervale

@@ -1,0 +1,226 @@
+#include "client/core/stream_client.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <memory>
+#include <random>
+
+#include "common/extraction.h"
+#include "server/build/field_hierarchy.h"
+#include "server/serve/stream_plan.h"
+#include "support/analytic_fields.h"
+#include "support/mesh_laws.h"
+
+namespace intervale {
+namespace {
+
+using testing::broken_law;
+using testing::canonical;
+
+constexpr std::size_t kBatchBytes = 4096;
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+std::shared_ptr<const IntervalVolume> made(unsigned seed) {
+  constexpr std::array<std::array<std::int32_t, 3>, 4> shapes{{{9, 9, 9}, {12, 7, 10}, {22, 2, 11}, {13, 13, 6}}};
+  Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed / 2 % 4]) : testing::digits(shapes[seed / 2 % 4], seed);
+  volume.grid.spacing = {0.5, 1, 3};
+  volume.grid.origin = {-4, 0, 7};
+  Range range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5};
+  if (seed % 5 == 0) range.beta = kInf;
+  if (seed % 5 == 1) range.beta = range.alpha;
+  auto sigma = FieldHierarchy(volume, {.range = range}).compact();
+  EXPECT_TRUE(sigma);
+  return std::make_shared<const IntervalVolume>(std::move(*sigma));
+}
+
+std::string broken(const StreamClient& client) {
+  const Description& d = client.description();
+  return broken_law(client.mesh(), d.grid, d.range.alpha == d.range.beta);
+}
+
+StreamClient started(const Description& description, std::optional<std::uint64_t> max_tets = {}) {
+  auto client = StreamClient::start(description, max_tets);
+  EXPECT_TRUE(client) << client.error().message;
+  return std::move(*client);
+}
+
+// In a buffer of exactly its size, so that the address sanitizer sees every step beyond.
+Result<void> apply_exact(StreamClient& client, const std::vector<std::uint8_t>& payload) {
+  const auto exact = std::make_unique<std::uint8_t[]>(payload.size());
+  std::copy(payload.begin(), payload.end(), exact.get());
+  return client.apply({exact.get(), payload.size()});
+}
+
+// Streams a level of detail to its end; the mesh holds its laws after every batch.
+void stream(StreamPlan& plan, StreamClient& client, const Lod& lod, int batches = std::numeric_limits<int>::max()) {
+  plan.set_lod(lod);
+  double remaining = kInf;
+  while (batches-- > 0) {
+    const auto batch = plan.next(kBatchBytes);
+    if (!batch) break;
+    ASSERT_LE(batch->remaining_error, remaining);
+    remaining = batch->remaining_error;
+    const auto applied = apply_exact(client, batch->payload);
+    ASSERT_TRUE(applied) << applied.error().message;
+    ASSERT_EQ(broken(client), "") << "after " << client.updates() << " updates";
+    ASSERT_EQ(client.tet_count(), client.mesh().tets.size());
+    if (!client.over_budget()) {
+      ASSERT_EQ(client.updates(), plan.sent());
+    }
+  }
+}
+
+class Stream : public ::testing::TestWithParam<unsigned> {
+ protected:
+  std::shared_ptr<const IntervalVolume> volume = made(GetParam());
+  StreamPlan plan{volume};
+};
+
+TEST_P(Stream, EndsWithTheExtractedMesh) {
+  StreamClient client = started(volume->description());
+  EXPECT_EQ(broken(client), "");
+  ASSERT_NO_FATAL_FAILURE(stream(plan, client, {}));
+  EXPECT_EQ(canonical(client.mesh()), canonical(extract(*volume, {})->front.mesh()));
+  EXPECT_EQ(client.updates(), volume->size());
+  EXPECT_EQ(client.tet_count(), volume->description().full.tets);
+  EXPECT_EQ(client.mesh().points.size(), volume->description().full.vertices);
+}
+
+TEST_P(Stream, EveryLevelOfDetailEndsWithItsMesh) {
+  std::mt19937 random(GetParam());
+  const Grid& g = volume->description().grid;
+  for (int kind = 0; kind < 4; ++kind) {
+    Lod lod;
+    if (kind == 0) lod.error_percent = double(random() % 60);
+    if (kind == 1) lod.error = volume->description().max_error / 4;
+    if (kind == 2) lod.max_updates = random() % (volume->size() + 1);
+    if (kind == 3) {
+      Box box;
+      for (int i = 0; i < 3; ++i) {
+        box.min[i] = g.origin[i] + g.spacing[i] * double(random() % std::uint32_t(g.dims[i]));
+        box.max[i] = box.min[i] + g.spacing[i] * 3;
+      }
+      lod.roi = box;
+    }
+    StreamPlan fresh(volume);
+    StreamClient client = started(volume->description());
+    ASSERT_NO_FATAL_FAILURE(stream(fresh, client, lod));
+    const auto expected = extract(*volume, lod);
+    ASSERT_TRUE(expected) << expected.error().message;
+    EXPECT_EQ(client.updates(), expected->updates);
+    EXPECT_EQ(canonical(client.mesh()), canonical(expected->front.mesh())) << "kind " << kind;
+  }
+}
+
+// A batch that came twice would be refused: what is asked for in the middle never makes the plan send anything again.
+TEST_P(Stream, ChangesOfMindKeepTheMeshWhole) {
+  std::mt19937 random(GetParam());
+  const Grid& g = volume->description().grid;
+  StreamClient client = started(volume->description());
+  for (int view = 0; view < 6; ++view) {
+    Lod lod;
+    lod.error_percent = double(random() % 30);
+    Box box;
+    for (int i = 0; i < 3; ++i) {
+      box.min[i] = g.origin[i] + g.spacing[i] * double(random() % std::uint32_t(g.dims[i]));
+      box.max[i] = box.min[i] + g.spacing[i] * 4;
+    }
+    if (view % 2 == 0) lod.roi = box;
+    ASSERT_NO_FATAL_FAILURE(stream(plan, client, lod, 1 + int(random() % 2)));
+  }
+  ASSERT_NO_FATAL_FAILURE(stream(plan, client, {}));
+  EXPECT_EQ(canonical(client.mesh()), canonical(extract(*volume, {})->front.mesh()));
+}
+
+TEST_P(Stream, TheBudgetHoldsAndWhatFollowsIsLeftOut) {
+  const std::uint64_t coarse = started(volume->description()).tet_count(), full = volume->description().full.tets;
+  for (const double share : {0.0, 0.01, 0.3, 0.7, 1.0}) {
+    const auto most = coarse + std::uint64_t(double(full - std::min(full, coarse)) * share);
+    StreamPlan fresh(volume);
+    StreamClient client = started(volume->description(), most);
+    ASSERT_NO_FATAL_FAILURE(stream(fresh, client, {}));
+    EXPECT_LE(client.tet_count(), most);
+    const auto updates = client.updates();
+    EXPECT_EQ(client.over_budget(), updates < volume->size());
+    if (!client.over_budget()) continue;
+    EXPECT_TRUE(client.apply({})) << "nothing more is applied, nothing more is judged";
+    EXPECT_EQ(client.updates(), updates);
+  }
+  if (coarse > 0) {
+    EXPECT_TRUE(started(volume->description(), coarse - 1).over_budget()) << "the root's patch alone is too much";
+  }
+}
+
+TEST_P(Stream, DamagedAndRepeatedBatchesAreRefused) {
+  plan.set_lod({});
+  const auto first = plan.next(kBatchBytes);
+  ASSERT_TRUE(first);
+  StreamClient client = started(volume->description());
+  ASSERT_TRUE(apply_exact(client, first->payload));
+  EXPECT_FALSE(apply_exact(client, first->payload)) << "a second time";
+  for (std::size_t cut = 1; cut < 40; ++cut) {
+    StreamClient again = started(volume->description());
+    EXPECT_FALSE(apply_exact(again, {first->payload.begin(), first->payload.end() - std::ptrdiff_t(cut)}));
+  }
+  if (const auto second = plan.next(kBatchBytes)) {
+    StreamClient again = started(volume->description());
+    EXPECT_FALSE(apply_exact(again, second->payload)) << "without the first";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, Stream, ::testing::Range(0u, 10u));
+
+TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
+  const Description good = made(0)->description();
+  ASSERT_TRUE(StreamClient::start(good));
+  const struct {
+    const char* what;
+    void (*spoil)(Description&);
+  } cases[] = {
+      {"a side of 1 sample", [](Description& d) { d.grid.dims[0] = 1; }},
+      {"a side of 0", [](Description& d) { d.grid.dims[1] = 0; }},
+      {"a negative side", [](Description& d) { d.grid.dims[2] = std::numeric_limits<std::int32_t>::min(); }},
+      {"a side that is too long", [](Description& d) { d.grid.dims[0] = kMaxSide + 1; }},
+      {"no spacing", [](Description& d) { d.grid.spacing[0] = 0; }},
+      {"negative spacing", [](Description& d) { d.grid.spacing[1] = -1; }},
+      {"infinite spacing", [](Description& d) { d.grid.spacing[2] = kInf; }},
+      {"spacing that is no number", [](Description& d) { d.grid.spacing[0] = kNan; }},
+      {"an infinite origin", [](Description& d) { d.grid.origin[0] = -kInf; }},
+      {"an origin that is no number", [](Description& d) { d.grid.origin[2] = kNan; }},
+      {"a far corner beyond all numbers", [](Description& d) { d.grid.spacing[1] = std::numeric_limits<double>::max(); }},
+      {"no base", [](Description& d) { d.base.clear(); }},
+      {"a base too short", [](Description& d) { d.base.pop_back(); }},
+      {"a base too long", [](Description& d) { d.base.push_back(0); }},
+      {"a base with a corner on no side", [](Description& d) { d.base[7] = 3; }},
+      {"a range upside down",
+       [](Description& d) {
+         d.range = {1, 0};
+       }},
+      {"a range that is no number", [](Description& d) { d.range.alpha = kNan; }},
+      {"an error that is no number", [](Description& d) { d.max_error = kNan; }},
+      {"a negative error", [](Description& d) { d.max_error = -1; }},
+  };
+  for (const auto& c : cases) {
+    Description d = good;
+    c.spoil(d);
+    const auto client = StreamClient::start(d);
+    EXPECT_FALSE(client) << c.what;
+    if (!client) {
+      EXPECT_EQ(client.error().message.find('\n'), std::string::npos);
+    }
+  }
+}
+
+TEST(StreamClient, TheLargestBoxCostsNothingBeforeItsFirstUpdate) {
+  Description d;
+  d.grid.dims = {kMaxSide, kMaxSide, kMaxSide};
+  d.base.assign(8, 1);
+  const StreamClient client = started(d);
+  EXPECT_EQ(client.tet_count(), 6u);
+  EXPECT_EQ(broken(client), "");
+}
+
+}  // namespace
+}  // namespace intervale

@@ -1,0 +1,180 @@
+#include "server/serve/stream_plan.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "common/refinement.h"
+#include "common/update_codec.h"
+#include "server/build/field_hierarchy.h"
+#include "support/analytic_fields.h"
+
+namespace intervale {
+namespace {
+
+constexpr std::size_t kBatchBytes = 4096;
+
+std::shared_ptr<const IntervalVolume> made(unsigned seed) {
+  constexpr std::array<std::array<std::int32_t, 3>, 3> shapes{{{17, 17, 17}, {24, 17, 20}, {30, 2, 11}}};
+  const Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 3]) : testing::digits(shapes[seed % 3], seed);
+  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
+  EXPECT_TRUE(sigma);
+  return std::make_shared<const IntervalVolume>(std::move(*sigma));
+}
+
+Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
+  Lod lod;
+  if (random() % 2 == 0) lod.error_percent = double(random() % 40);
+  if (random() % 3 == 0) lod.max_updates = random() % (v.size() + 10);
+  if (random() % 2 == 0) {
+    Box box;
+    for (int i = 0; i < 3; ++i) {
+      box.min[i] = double(random() % std::uint32_t(v.description().grid.dims[i]));
+      box.max[i] = box.min[i] + double(random() % 5);
+    }
+    lod.roi = box;
+  }
+  return lod;
+}
+
+// What was sent, as a front that takes every batch tells it; and what is left.
+class Receiver {
+ public:
+  explicit Receiver(std::shared_ptr<const IntervalVolume> volume)
+      : volume_(std::move(volume)),
+        front_(volume_->description().grid, *decode_base(volume_->description().base, volume_->domain())),
+        sent_(volume_->size()) {}
+
+  void set_lod(const Lod& lod) {
+    wanted_ = in_order(*volume_, select(*volume_, lod));
+    if (lod.max_updates && wanted_.size() > *lod.max_updates) wanted_.resize(*lod.max_updates);
+  }
+  // Takes a batch; what was sent before, or before its parents, is refused.
+  Result<Applied> take(const Batch& batch) {
+    const auto applied = apply_batch(front_, batch.payload);
+    // A diamond whose parents are all split is in the front, or split.
+    volume_->set().for_each_down([&](const Place& p) {
+      if (sent_[p.index]) return;
+      const Diamond d(SupercubeSet::centre(p));
+      for (int k = 0; k < d.row->parents; ++k) {
+        const Vertex c = d.parent(k);
+        if (c.x < 0 || c.y < 0 || c.z < 0) continue;
+        if (const auto parent = volume_->set().find(c); parent && !sent_[parent->index]) return;
+      }
+      sent_[p.index] = !front_.find(d.centre);
+    });
+    return applied;
+  }
+  [[nodiscard]] std::vector<UpdateIndex> left() const {
+    std::vector<UpdateIndex> left;
+    std::copy_if(wanted_.begin(), wanted_.end(), std::back_inserter(left), [this](UpdateIndex i) { return !sent_[i]; });
+    return left;
+  }
+  [[nodiscard]] double remaining_error() const {
+    double most = 0;
+    for (UpdateIndex i : left()) most = std::max(most, double(volume_->error(i)));
+    return most;
+  }
+  [[nodiscard]] std::uint64_t wanted() const { return wanted_.size(); }
+  [[nodiscard]] std::uint64_t sent() const { return std::uint64_t(std::count(sent_.begin(), sent_.end(), true)); }
+
+ private:
+  std::shared_ptr<const IntervalVolume> volume_;
+  Front front_;
+  std::vector<UpdateIndex> wanted_;
+  std::vector<bool> sent_;
+};
+
+class Plan : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
+  const auto volume = made(GetParam());
+  std::mt19937 random(GetParam());
+  StreamPlan plan(volume);
+  Receiver receiver(volume);
+  EXPECT_FALSE(plan.next(kBatchBytes)) << "nothing is wanted yet";
+  for (int view = 0; view < 8; ++view) {
+    const Lod lod = view == 7 ? Lod{} : random_lod(*volume, random);
+    plan.set_lod(lod);
+    receiver.set_lod(lod);
+    ASSERT_EQ(plan.wanted(), receiver.wanted());
+    for (int batches = view == 7 ? 100000 : int(random() % 4); batches > 0; --batches) {
+      const std::size_t most = std::size_t(256) << random() % 8;
+      const auto left = receiver.left();
+      const auto batch = plan.next(most);
+      ASSERT_EQ(batch.has_value(), !left.empty());
+      if (!batch) break;
+      ASSERT_GT(batch->updates, 0u);
+      ASSERT_LE(batch->payload.size(), most);
+      const auto before = receiver.sent();
+      const auto applied = receiver.take(*batch);
+      ASSERT_TRUE(applied) << applied.error().message;
+      ASSERT_EQ(applied->updates, batch->updates);
+      ASSERT_EQ(receiver.sent(), before + batch->updates);
+      ASSERT_EQ(receiver.left().size() + batch->updates, left.size()) << "all of it is wanted";
+      ASSERT_EQ(batch->remaining_error, receiver.remaining_error());
+      ASSERT_EQ(plan.sent(), receiver.sent());
+    }
+  }
+  EXPECT_EQ(plan.sent(), volume->size());
+  EXPECT_FALSE(plan.next(kBatchBytes));
+}
+
+// Bands of falling error: half of the updates already leave no more than the error that the plain order leaves after a quarter.
+TEST_P(Plan, GreatErrorsComeEarly) {
+  const auto volume = made(GetParam());
+  const auto order = in_order(*volume, select(*volume, {}));
+  StreamPlan plan(volume);
+  plan.set_lod({});
+  while (const auto batch = plan.next(kBatchBytes)) {
+    if (plan.sent() > 8192 && plan.sent() < order.size()) {
+      EXPECT_LE(batch->remaining_error, volume->error(order[plan.sent() / 4])) << plan.sent() << " sent";
+    }
+  }
+}
+
+TEST_P(Plan, RemainingErrorNeverGrowsWithinAView) {
+  const auto volume = made(GetParam());
+  StreamPlan plan(volume);
+  plan.set_lod({});
+  double before = volume->description().max_error, last = before;
+  while (const auto batch = plan.next(kBatchBytes)) {
+    EXPECT_LE(batch->remaining_error, before);
+    before = last = batch->remaining_error;
+  }
+  EXPECT_EQ(last, 0);
+}
+
+TEST_P(Plan, TheSameViewAgainSendsNothing) {
+  const auto volume = made(GetParam());
+  StreamPlan plan(volume);
+  Lod lod;
+  lod.error_percent = 10;
+  plan.set_lod(lod);
+  while (plan.next(kBatchBytes)) {
+  }
+  const auto sent = plan.sent();
+  EXPECT_EQ(sent, plan.wanted());
+  plan.set_lod(lod);
+  EXPECT_FALSE(plan.next(kBatchBytes));
+  lod.error_percent = 20;
+  plan.set_lod(lod);
+  EXPECT_FALSE(plan.next(kBatchBytes)) << "a coarser view has all it needs";
+  EXPECT_EQ(plan.sent(), sent);
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, Plan, ::testing::Range(0u, 12u));
+
+TEST(StreamPlan, AVolumeWithoutUpdatesSendsNothing) {
+  const auto empty = FieldHierarchy(testing::gyroid({9, 9, 9}), {.range = {50, 60}}).compact();
+  ASSERT_TRUE(empty);
+  StreamPlan plan(std::make_shared<const IntervalVolume>(*empty));
+  plan.set_lod({});
+  EXPECT_EQ(plan.wanted(), 0u);
+  EXPECT_FALSE(plan.next(kBatchBytes));
+}
+
+}  // namespace
+}  // namespace intervale
