@@ -138,12 +138,6 @@ class Front {
   std::uint64_t tet_count_ = 0;
 };
 
-// The sides of four local vertices in the order of a shape, as of tet_sides.
-[[nodiscard]] inline unsigned shape_sides(const TetShape& s, std::uint32_t sides) {
-  return (sides >> (2 * s.vertex[0]) & 3) | (sides >> (2 * s.vertex[1]) & 3) << 2 | (sides >> (2 * s.vertex[2]) & 3) << 4 |
-         (sides >> (2 * s.vertex[3]) & 3) << 6;
-}
-
 template <class Sink>
 void Front::for_each_tet(Sink&& sink) const {
   const TetCases& cases = tet_cases();

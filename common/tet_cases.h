@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "common/diamond.h"
 #include "common/range.h"
 
 namespace intervale {
@@ -28,6 +29,12 @@ inline constexpr int kTetOrders = 32;
 // The sides of a tetrahedron's vertices 0..3 in one number below 256: two bits each, vertex 0 lowest.
 [[nodiscard]] constexpr unsigned tet_sides(Side a, Side b, Side c, Side d) {
   return unsigned(a) | unsigned(b) << 2 | unsigned(c) << 4 | unsigned(d) << 6;
+}
+
+// The sides of four local vertices in the order of a shape, as of tet_sides; sides: two bits each, by local vertex.
+[[nodiscard]] inline unsigned shape_sides(const TetShape& s, std::uint32_t sides) {
+  return (sides >> (2 * s.vertex[0]) & 3) | (sides >> (2 * s.vertex[1]) & 3) << 2 | (sides >> (2 * s.vertex[2]) & 3) << 4 |
+         (sides >> (2 * s.vertex[3]) & 3) << 6;
 }
 
 class TetCases {

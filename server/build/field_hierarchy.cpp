@@ -269,15 +269,13 @@ FullMesh FieldHierarchy::full_mesh() const {
     const bool interior = domain_.is_interior(d);
     const auto add = [&](std::array<std::uint8_t, 4> local, const TetShape& known) {
       if (interior) {
-        n += cases.count(known.order, (sides >> (2 * known.vertex[0]) & 3) | (sides >> (2 * known.vertex[1]) & 3) << 2 |
-                                          (sides >> (2 * known.vertex[2]) & 3) << 4 | (sides >> (2 * known.vertex[3]) & 3) << 6);
+        n += cases.count(known.order, shape_sides(known, sides));
         return;
       }
       const auto positions = domain_.positions(d, local);
       if (!Domain::exists(positions)) return;
       const TetShape s = shape_of(positions, local, d.row->belt);
-      n += cases.count(s.order, (sides >> (2 * s.vertex[0]) & 3) | (sides >> (2 * s.vertex[1]) & 3) << 2 | (sides >> (2 * s.vertex[2]) & 3) << 4 |
-                                    (sides >> (2 * s.vertex[3]) & 3) << 6);
+      n += cases.count(s.order, shape_sides(s, sides));
     };
     const unsigned tets = domain_.tets(d);
     if (!is_split) {
