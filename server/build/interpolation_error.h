@@ -23,8 +23,8 @@ struct Field {
   [[nodiscard]] double at(Vertex v) const { return double(samples[index(v)]); }
 };
 
-// The largest |F - linear interpolation| over all samples in one closed tetrahedron (not flat) with corners at samples. O(its bounding rectangle
-// in y and z + samples inside).
+// The largest |F - linear interpolation| over all samples in one closed tetrahedron (not flat) with corners at samples. O(rows of its bounding box +
+// samples inside).
 template <class T>
 double tet_error(const Field<T>& field, const std::array<Vertex, 4>& p) {
   using I3 = std::array<std::int64_t, 3>;
@@ -51,30 +51,46 @@ double tet_error(const Field<T>& field, const std::array<Vertex, 4>& p) {
   std::array<double, 3> g{};
   for (int k = 0; k < 3; ++k) g[k] = (f1 * double(c1[k]) + f2 * double(c2[k]) + f3 * double(c3[k])) / det;
 
-  const auto [x0, x1] = std::minmax({p[0].x, p[1].x, p[2].x, p[3].x});
-  const auto [y0, y1] = std::minmax({p[0].y, p[1].y, p[2].y, p[3].y});
-  const auto [z0, z1] = std::minmax({p[0].z, p[1].z, p[2].z, p[3].z});
+  // Rows go along x, where samples are neighbours in memory, unless the tetrahedron is much longer elsewhere.
+  std::array<std::int64_t, 3> low{}, high{}, stride{1, field.last.x + 1, std::int64_t(field.last.x + 1) * (field.last.y + 1)};  // of q - p0
+  for (int i = 1; i < 4; ++i) {
+    const I3 q = minus(p[i], p[0]);
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], q[k]);
+      high[k] = std::max(high[k], q[k]);
+    }
+  }
+  int u = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (high[k] - low[k] > 8 * (high[u] - low[u] + 1)) u = k;
+  }
+  const int v = (u + 1) % 3, w = (u + 2) % 3;
+  const T* const origin = &field.samples[field.index(p[0])];
   double worst = 0;
-  for (std::int32_t z = z0; z <= z1; ++z) {
-    for (std::int32_t y = y0; y <= y1; ++y) {
-      std::int64_t lo = x0 - p[0].x, hi = x1 - p[0].x;  // of x - p0.x
+  for (std::int64_t c = low[w]; c <= high[w]; ++c) {
+    for (std::int64_t b = low[v]; b <= high[v]; ++b) {
+      std::int64_t lo = low[u], hi = high[u];
       for (int i = 0; i < 4; ++i) {
-        const std::int64_t r = n[i][1] * (y - p[0].y) + n[i][2] * (z - p[0].z) + d[i], nx = n[i][0];
-        if (nx == 0) {
+        const std::int64_t r = n[i][v] * b + n[i][w] * c + d[i], nu = n[i][u];
+        if (nu == 0) {
           if (r < 0) hi = lo - 1;
-        } else if (nx > 0) {
-          lo = std::max(lo, nx == 1 ? -r : r <= 0 ? (-r + nx - 1) / nx : -(r / nx));
+        } else if (nu > 0) {
+          lo = std::max(lo, nu == 1 ? -r : r <= 0 ? (-r + nu - 1) / nu : -(r / nu));
         } else {
-          hi = std::min(hi, nx == -1 ? r : r >= 0 ? r / -nx : -((-r - nx - 1) / -nx));
+          hi = std::min(hi, nu == -1 ? r : r >= 0 ? r / -nu : -((-r - nu - 1) / -nu));
         }
       }
       if (lo > hi) continue;
-      const T* const row = &field.samples[field.index({std::int32_t(p[0].x + lo), y, z})];
-      const double start = f0 + g[1] * (y - p[0].y) + g[2] * (z - p[0].z) + g[0] * double(lo);
+      const T* const row = origin + (lo * stride[u] + b * stride[v] + c * stride[w]);
+      const double start = f0 + g[v] * double(b) + g[w] * double(c) + g[u] * double(lo);
       const int count = int(hi - lo) + 1;
       double most = 0;
+      if (u == 0) {
 #pragma omp simd reduction(max : most)
-      for (int i = 0; i < count; ++i) most = std::max(most, std::abs(double(row[i]) - (start + g[0] * i)));
+        for (int i = 0; i < count; ++i) most = std::max(most, std::abs(double(row[i]) - (start + g[0] * i)));
+      } else {
+        for (int i = 0; i < count; ++i) most = std::max(most, std::abs(double(row[i * stride[u]]) - (start + g[u] * i)));
+      }
       worst = std::max(worst, most);
     }
   }
