@@ -99,6 +99,8 @@ std::size_t IntervalVolume::memory_bytes() const {
 }
 
 Result<void> IntervalVolume::validate() const {
+  if (description_.max_error != (error_levels_.empty() ? 0.0 : double(error_levels_.back())))
+    return fail("the largest error is not that of any update");
   const auto base = decode_base(description_.base, domain_);
   if (!base) return tl::unexpected(base.error());
   Front front(description_.grid, *base);

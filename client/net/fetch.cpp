@@ -114,7 +114,9 @@ Result<void> Fetch::run(const std::function<void(const StreamClient&, const Fetc
 Result<void> Fetch::apply(const protocol::Batch& batch) {
   if (batch.sequence != sequence_++ || batch.epoch != kEpoch) return nonsense("a batch that is out of order");
   if (!grants_.spend(protocol::cost_of(batch))) return nonsense("more than it was granted");
+  const std::uint64_t before = client_->updates();
   if (auto applied = client_->apply(batch.payload); !applied) return nonsense(applied.error().message);
+  if (!client_->over_budget() && client_->updates() - before != batch.updates) return nonsense("a batch of another size than it says");
   note_first_mesh();
   figures_.remaining_error = batch.remaining_error;
   return grant();
