@@ -233,7 +233,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   if (slots != meta.updates) return fail("updates and supercubes do not fit");
   d.base = std::move(*raw[kBase]);
   parts.error_levels.resize(raw[kErrors]->size() / sizeof(float));
-  std::memcpy(parts.error_levels.data(), raw[kErrors]->data(), raw[kErrors]->size());
+  if (!parts.error_levels.empty()) std::memcpy(parts.error_levels.data(), raw[kErrors]->data(), raw[kErrors]->size());
   parts.set = SupercubeSet(*keys, std::move(occupancy));
   const auto levels = join_bytes(*raw[kLevels], 2);
   std::span<const std::uint8_t> first(*raw[kFirst]), other(*raw[kOther]);
