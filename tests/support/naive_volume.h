@@ -34,14 +34,8 @@ inline NaiveSum naive_sum(const Volume& v, const Range& range, const std::functi
   const int n = 1 << domain.levels();
   NaiveSum sum;
   std::function<void(const Tet&)> visit = [&](const Tet& t) {
-    int best = -1, a = 0, b = 0;
-    for (int i = 0; i < 4; ++i) {
-      for (int j = i + 1; j < 4; ++j) {
-        int d = 0;
-        for (int k = 0; k < 3; ++k) d += (t[i][k] - t[j][k]) * (t[i][k] - t[j][k]);
-        if (d > best) best = d, a = i, b = j;
-      }
-    }
+    const auto ends = longest_edge(t);
+    const int a = ends[0], b = ends[1];
     const Point c{t[a][0] + t[b][0], t[a][1] + t[b][1], t[a][2] + t[b][2]};
     const Vertex middle{c[0] / 2, c[1] / 2, c[2] / 2};
     const bool whole = c[0] % 2 == 0 && c[1] % 2 == 0 && c[2] % 2 == 0;
@@ -74,15 +68,7 @@ inline NaiveSum naive_sum(const Volume& v, const Range& range, const std::functi
     else
       sum.volume += size * (share_below(f, range.beta) - share_below(f, range.alpha));
   };
-  std::array<int, 3> axes{0, 1, 2};
-  do {
-    Tet t{};
-    for (int i = 1; i < 4; ++i) {
-      t[i] = t[i - 1];
-      t[i][axes[i - 1]] = n;
-    }
-    visit(t);
-  } while (std::next_permutation(axes.begin(), axes.end()));
+  for (const Tet& t : coarsest(n)) visit(t);
   return sum;
 }
 

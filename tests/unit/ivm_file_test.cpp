@@ -10,6 +10,7 @@
 
 #include "server/build/field_hierarchy.h"
 #include "support/analytic_fields.h"
+#include "support/parts.h"
 #include "support/temp_dir.h"
 
 namespace intervale {
@@ -163,17 +164,9 @@ TEST(IvmFile, AFileThatCannotBeWrittenIsAnErrorThatNamesIt) {
   EXPECT_THAT(saved.error().message, HasSubstr("x.ivm"));
 }
 
-IntervalVolume::Parts parts_of(const IntervalVolume& v) {
-  return {v.description(),
-          v.set(),
-          {v.codes().begin(), v.codes().end()},
-          {v.differences().begin(), v.differences().end()},
-          {v.error_levels().begin(), v.error_levels().end()}};
-}
-
 TEST(Assemble, PartsThatFitMakeAnEqualVolume) {
   const IntervalVolume sigma = small_volume();
-  const auto again = IntervalVolume::assemble(parts_of(sigma));
+  const auto again = IntervalVolume::assemble(testing::parts_of(sigma));
   ASSERT_TRUE(again) << again.error().message;
   expect_equal(sigma, *again);
 }
@@ -225,7 +218,7 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
       {"a range that is no number", [](Parts& p) { p.description.range.beta = std::numeric_limits<double>::quiet_NaN(); }},
   };
   for (const auto& c : cases) {
-    Parts parts = parts_of(sigma);
+    Parts parts = testing::parts_of(sigma);
     c.spoil(parts);
     const auto assembled = IntervalVolume::assemble(std::move(parts));
     ASSERT_FALSE(assembled) << c.what;
@@ -237,7 +230,7 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
 TEST(Assemble, PartsThatFitButMeanNothingAreNotValid) {
   const IntervalVolume sigma = small_volume();
   const auto refused = [&](auto spoil) {
-    auto parts = parts_of(sigma);
+    auto parts = testing::parts_of(sigma);
     spoil(parts);
     const auto assembled = IntervalVolume::assemble(std::move(parts));
     return !assembled || !assembled->validate();

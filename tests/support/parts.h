@@ -1,0 +1,16 @@
+// An interval volume taken apart, for tests that put it together wrongly.
+#pragma once
+
+#include "common/interval_volume.h"
+
+namespace intervale::testing {
+
+inline IntervalVolume::Parts parts_of(const IntervalVolume& v) {
+  return {v.description(),
+          v.set(),
+          {v.codes().begin(), v.codes().end()},
+          {v.differences().begin(), v.differences().end()},
+          {v.error_levels().begin(), v.error_levels().end()}};
+}
+
+}  // namespace intervale::testing
