@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <utility>
 
 #include "common/atomic_file.h"
 #include "common/planes.h"
@@ -58,6 +59,78 @@ std::vector<std::uint8_t> bytes_of(std::span<const T> values) {
   return {first, first + values.size_bytes()};
 }
 
+Meta meta_of(const IntervalVolume& volume) {
+  const Description& d = volume.description();
+  Meta meta{};
+  for (int i = 0; i < 3; ++i) {
+    meta.dims[i] = d.grid.dims[i];
+    meta.spacing[i] = d.grid.spacing[i];
+    meta.origin[i] = d.grid.origin[i];
+  }
+  meta.refine = std::uint32_t(d.refine);
+  meta.range[0] = d.range.alpha;
+  meta.range[1] = d.range.beta;
+  meta.max_error = d.max_error;
+  meta.updates = d.updates;
+  meta.coefficients = d.coefficients;
+  meta.supercubes = volume.set().supercubes();
+  meta.bricks = volume.set().bricks().size();
+  meta.full_vertices = d.full.vertices;
+  meta.full_tets = d.full.tets;
+  meta.content_hash = d.content_hash;
+  return meta;
+}
+
+// What a section holds, before compression.
+std::vector<std::uint8_t> section_bytes(const IntervalVolume& volume, Section section) {
+  std::vector<std::uint8_t> raw;
+  const auto bricks = volume.set().bricks();
+  const auto codes = volume.codes();
+  switch (section) {
+    case kMeta: {
+      const Meta meta = meta_of(volume);
+      return bytes_of(std::span<const Meta>(&meta, 1));
+    }
+    case kBase:
+      return volume.description().base;
+    case kErrors:
+      return bytes_of(volume.error_levels());
+    case kBricks: {
+      std::uint64_t previous = 0;
+      for (const SupercubeSet::Brick& b : bricks) append_varint(raw, (b.key >> 6) - std::exchange(previous, b.key >> 6));
+      return raw;
+    }
+    case kMasks: {
+      std::vector<std::uint64_t> masks;
+      for (const SupercubeSet::Brick& b : bricks) masks.push_back(b.mask);
+      return split_bytes(masks, 8);
+    }
+    case kOccupancy:
+      return split_bytes(volume.set().occupancy(), kSlotBytes);
+    case kShapes:
+      raw.reserve(codes.size());
+      for (const UpdateCode c : codes) raw.push_back(std::uint8_t(c.bits() & 127));
+      return raw;
+    case kLevels:  // as split_bytes would
+      raw.reserve(2 * codes.size());
+      for (const unsigned shift : {0u, 8u}) {
+        for (const UpdateCode c : codes) raw.push_back(std::uint8_t(c.error_level() >> shift));
+      }
+      return raw;
+    case kFirst:
+    case kOther:
+    case kSections:
+      break;
+  }
+  const std::uint8_t* differences = volume.differences().data();
+  for (const UpdateCode c : codes) {
+    const unsigned begin = section == kFirst ? 0 : c.first_cuts(), end = section == kFirst ? c.first_cuts() : c.coefficients();
+    raw.insert(raw.end(), differences + begin, differences + end);
+    differences += c.coefficients();
+  }
+  return raw;
+}
+
 std::uint64_t table_checksum(std::span<const std::byte> table) {
   std::vector<std::byte> copy(table.begin(), table.end());
   std::memset(copy.data() + offsetof(Header, checksum), 0, 8);
@@ -99,55 +172,16 @@ Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> s
 }  // namespace
 
 std::vector<std::byte> encode_ivm(const IntervalVolume& volume) {
-  const Description& d = volume.description();
-  Meta meta{};
-  for (int i = 0; i < 3; ++i) {
-    meta.dims[i] = d.grid.dims[i];
-    meta.spacing[i] = d.grid.spacing[i];
-    meta.origin[i] = d.grid.origin[i];
-  }
-  meta.refine = std::uint32_t(d.refine);
-  meta.range[0] = d.range.alpha;
-  meta.range[1] = d.range.beta;
-  meta.max_error = d.max_error;
-  meta.updates = d.updates;
-  meta.coefficients = d.coefficients;
-  meta.supercubes = volume.set().supercubes();
-  meta.bricks = volume.set().bricks().size();
-  meta.full_vertices = d.full.vertices;
-  meta.full_tets = d.full.tets;
-  meta.content_hash = d.content_hash;
-  std::vector<std::uint8_t> raw[kSections];
-  raw[kMeta] = bytes_of(std::span<const Meta>(&meta, 1));
-  raw[kBase] = d.base;
-  raw[kErrors] = bytes_of(volume.error_levels());
-  std::vector<std::uint64_t> masks;
-  std::uint64_t previous = 0;
-  for (const SupercubeSet::Brick& b : volume.set().bricks()) {
-    append_varint(raw[kBricks], (b.key >> 6) - previous);
-    previous = b.key >> 6;
-    masks.push_back(b.mask);
-  }
-  raw[kMasks] = split_bytes(masks, 8);
-  raw[kOccupancy] = split_bytes(volume.set().occupancy(), kSlotBytes);
-  std::vector<std::uint64_t> levels;
-  std::span<const std::uint8_t> differences = volume.differences();
-  for (const UpdateCode c : volume.codes()) {
-    raw[kShapes].push_back(std::uint8_t(c.bits() & 127));
-    levels.push_back(c.error_level());
-    raw[kFirst].insert(raw[kFirst].end(), differences.begin(), differences.begin() + c.first_cuts());
-    raw[kOther].insert(raw[kOther].end(), differences.begin() + c.first_cuts(), differences.begin() + c.coefficients());
-    differences = differences.subspan(c.coefficients());
-  }
-  raw[kLevels] = split_bytes(levels, 2);
   std::vector<std::byte> file(kTableBytes);
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   header.version = kIvmVersion;
   header.sections = kSections;
+  // One section at a time: together they would be as large as the volume that they come from.
   for (int s = 0; s < int(kSections); ++s) {
-    const auto stored = compress(raw[s]);
-    const Entry e{std::uint32_t(s), 0, file.size(), stored.size(), raw[s].size(), XXH3_64bits(stored.data(), stored.size())};
+    const std::vector<std::uint8_t> raw = section_bytes(volume, Section(s));
+    const std::vector<std::byte> stored = compress(raw);
+    const Entry e{std::uint32_t(s), 0, file.size(), stored.size(), raw.size(), XXH3_64bits(stored.data(), stored.size())};
     std::memcpy(file.data() + sizeof(Header) + s * sizeof(Entry), &e, sizeof e);
     file.insert(file.end(), stored.begin(), stored.end());
   }
