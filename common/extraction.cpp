@@ -14,6 +14,18 @@ tl::unexpected<Error> misfit(Vertex c) {
               ") does not fit the ones before it");
 }
 
+// The chosen updates as slots of each supercube.
+std::vector<std::uint64_t> slots_of(const SupercubeSet& set, const SplitSet& chosen) {
+  std::vector<std::uint64_t> slots(set.supercubes());
+  UpdateIndex i = 0;
+  for (std::size_t s = 0; s < slots.size(); ++s) {
+    for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
+      if (chosen.contains(i)) slots[s] |= left & (~left + 1);
+    }
+  }
+  return slots;
+}
+
 }  // namespace
 
 Result<Extraction> extract(const Grid& grid, const Base& base, const SupercubeSet& set, const SplitSet& split,
@@ -36,29 +48,30 @@ Result<Extraction> extract(const Grid& grid, const Base& base, const SupercubeSe
   return result;
 }
 
-Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const OnProgress& progress) {
+Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const OnProgress& progress, const ParallelFor& parallel) {
   if (auto ok = check_lod(lod); !ok) return tl::unexpected(ok.error());
   const auto base = decode_base(volume.description().base, volume.domain());
   if (!base) return tl::unexpected(base.error());
   const SplitSet chosen = select(volume, lod);
-  if (!lod.max_tets && !lod.max_updates) {
-    return extract(
-        volume.description().grid, *base, volume.set(), chosen,
-        [&volume](Front& front, Front::Handle handle, const Place& p) { return apply_update(front, handle, volume.update(p)).has_value(); },
-        progress);
-  }
   Extraction result{Front(volume.description().grid, *base)};
+  Front& front = result.front;
+  if (!lod.max_tets && !lod.max_updates) {
+    const auto wrong = front.split_all(
+        volume.set(), slots_of(volume.set(), chosen), [&volume](UpdateIndex i) { return volume.codes()[i].coefficients(); },
+        [&volume](const Place& p, const DiamondContext& context, std::uint8_t* q) { return decode_update(context, volume.update(p), q); }, parallel);
+    if (wrong) return misfit(*wrong);
+    result.updates = front.split_count();
+    return result;
+  }
   const std::vector<UpdateIndex> order = in_order(volume, chosen);
   for (UpdateIndex i : order) {
     if (lod.max_updates && result.updates == *lod.max_updates) break;
     const Place p = volume.set().place(i);
     const Vertex c = volume.set().centre(p);
-    const auto handle = result.front.find(c);
-    if (!handle) return misfit(c);
-    const auto spine = apply_update(result.front, *handle, volume.update(p));
-    if (!spine) return misfit(c);
-    if (lod.max_tets && result.front.tet_count() > *lod.max_tets) {
-      result.front.merge(c, *spine);
+    const auto handle = front.find(c);
+    if (!handle || !apply_update(front, *handle, volume.update(p))) return misfit(c);
+    if (lod.max_tets && front.tet_count() > *lod.max_tets) {
+      front.merge(c);
       break;
     }
     ++result.updates;

@@ -1,344 +1,150 @@
 #include "common/front.h"
 
+#include <algorithm>
 #include <cassert>
-#include <limits>
-#include <string>
+
+#include "common/tet_cases.h"
 
 namespace intervale {
 namespace {
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-constexpr std::int32_t kSteps = 512;  // of a point's coordinate in one sample
-constexpr int kFinest = 3;            // the slab of class 2 with h = 1
-constexpr int kSlabShift = 30;
+// A supercube's place in the index. Positions have no more than 19 bits.
+std::uint64_t index_key(int scale, Vertex p) {
+  return std::uint64_t(scale) << 57 | std::uint64_t(std::uint32_t(p.z)) << 38 | std::uint64_t(std::uint32_t(p.y)) << 19 | std::uint32_t(p.x);
+}
 
-std::uint64_t key(Vertex v) { return std::uint64_t(id_of(v)); }
+// Sides of the tetrahedra around a diamond, as of tet_sides.
+class Ring {
+ public:
+  Ring(std::uint32_t sides, int belt) : ends_{sides & 3, sides >> 2 & 3}, centre_(sides >> (2 * kCentre) & 3) {
+    belt_ = sides >> 4 & ((1u << (2 * belt)) - 1);
+    belt_ |= (belt_ & 3) << (2 * belt);  // the ring closes
+  }
+  [[nodiscard]] unsigned tet(int i) const { return ends_[0] | ends_[1] << 2 | (belt_ >> (2 * i) & 15) << 4; }
+  [[nodiscard]] unsigned half(int i, int end) const { return ends_[end] | centre_ << 2 | (belt_ >> (2 * i) & 15) << 4; }
+
+ private:
+  std::array<std::uint32_t, 2> ends_;
+  std::uint32_t belt_, centre_;
+};
 
 }  // namespace
 
+// The corners of the domain are no diamonds, but seven of them have the offsets of diamonds of scale N whose centres lie there, and the root's edges
+// are those diamonds' subdivision edges: the base is one more supercube.
 Front::Front(const Grid& grid, const Base& base) : grid_(grid), domain_(grid.dims) {
-  slabs_[0].stride = 8 + 19;
-  slabs_[1].stride = 6 + 13;
-  slabs_[2].stride = kMaxVertices + kMaxEdges;
-  slabs_[kFinest].stride = kMaxVertices + kMaxEdges + 1 + kMaxVertices;
   const Diamond root(domain_.root());
-  const std::uint32_t handle = obtain(root.centre);
-  auto [h, p] = record(handle);
-  const unsigned vertices = Domain::vertices(*root.row, h->tets), edges = Domain::edges(*root.row, h->tets);
-  for (int v = 0; v < root.row->vertices; ++v) {
-    h->sides |= std::uint32_t(base.side[v]) << (2 * v);
-    if ((vertices >> v & 1) && base.side[v] == Side::inside) p[v] = add_vertex(root.vertex(v));
+  const Existing e = existing(root);
+  const Links& links = link_table()[0][kSlotOfType[root.type]];
+  Block& corners = obtain_block(domain_.levels(), {});
+  std::uint32_t sides = 0;
+  for (int v = 0; v < kRootVertices; ++v) {
+    const Link link = links.vertex[v];
+    const Vertex corner = root.vertex(v);
+    const bool is_origin = (corner.x | corner.y | corner.z) == 0;
+    Block& block = is_origin ? corner_ : corners;
+    assert((is_origin || link.where == kCoarser) && "the other corners are in the supercube at (0, 0, 0)");
+    Split& s = block.of[is_origin ? 0 : link.slot];
+    block.split |= std::uint64_t(1) << (is_origin ? 0 : link.slot);
+    s.bits = std::uint32_t(base.side[v]) << kSideBit;
+    sides |= std::uint32_t(base.side[v]) << (2 * v);
+    // Its cuts in order of the other end's number, which is not the order of the root's edges.
+    std::array<const Cuts*, kMaxVertices> cuts{};
+    std::array<bool, kMaxVertices> turned{};
+    for (int k = 0; k < kRootEdges; ++k) {
+      if (links.edge[k].owner != v || !(e.edges >> k & 1)) continue;
+      cuts[links.edge[k].other] = &base.cuts[k];
+      turned[links.edge[k].other] = edge_ends(k, root.row->belt)[0] != v;
+      const auto [a, b] = edge_ends(k, root.row->belt);
+      const std::uint32_t two = unsigned(alpha_cuts(base.side[a], base.side[b])) | unsigned(beta_cuts(base.side[a], base.side[b])) << 1;
+      s.bits |= two << (2 * links.edge[k].other);
+    }
+    s.first = std::uint32_t(q_.size());
+    for (int other = 0; other < kMaxVertices; ++other) {
+      if (cuts[other] == nullptr) continue;
+      const Cuts c = turned[other] ? reversed(*cuts[other]) : *cuts[other];
+      q_.insert(q_.end(), c.q, c.q + c.count);
+    }
+    q_.push_back(0);
   }
-  for (int e = 0; e < root.row->edges; ++e) {
-    const auto [a, b] = edge_ends(e, root.row->belt);
-    if (edges >> e & 1) p[root.row->vertices + e] = add_cuts(root.vertex(a), root.vertex(b), base.side[a], base.side[b], base.cuts[e].q);
-  }
-  h->received = h->tets;
-  tet_count_ = count_tets(*h, *root.row);
+  tet_count_ = count_tets(root, e, sides);
 }
 
 std::optional<Front::Handle> Front::find(Vertex centre) const {
-  const auto found = diamonds_.find(key(centre));
-  if (found == diamonds_.end()) return {};
-  const Header& h = header(found->second);
-  if (h.split || h.received != h.tets || h.centre != centre) return {};
-  if (h.straddles && domain_.is_idle(Diamond(centre))) return {};
-  return Handle{found->second};
+  if ((centre.x | centre.y | centre.z) <= 0 || scale_of(centre) >= domain_.levels()) return {};
+  const std::int32_t most = 1 << domain_.levels();
+  if (centre.x > most || centre.y > most || centre.z > most) return {};
+  const Diamond d(centre);
+  const Vertex position{centre.x >> (d.scale + 2), centre.y >> (d.scale + 2), centre.z >> (d.scale + 2)};
+  Cursor cursor(*this);
+  cursor.move_to(d.scale, position);
+  const int slot = kSlotOfType[d.type];
+  if (cursor.look(slot) == nullptr || !cursor.can_be_split()) return {};
+  return Handle{supercube_key(d.scale, position), slot};
 }
 
 DiamondContext Front::context(Handle handle) const {
-  const Header& h = header(std::uint32_t(handle));
-  DiamondContext c;
-  c.row = &diamond_type(h.type);
-  const DiamondType& row = *c.row;
-  c.vertices = h.straddles ? Domain::vertices(row, h.tets) : (1u << row.vertices) - 1;
-  c.sides = h.sides;
-  for (int v = 0; v < row.vertices && h.straddles; ++v) {
-    if (!c.has(v)) c.sides &= ~(3u << (2 * v));
-  }
-  const std::uint32_t edges = h.straddles ? Domain::edges(row, h.tets) : (1u << row.edges) - 1;
-  const std::uint32_t* const p = points(std::uint32_t(handle)) + row.vertices;
-  const int shift = scale_of(h.centre);
-  for (int e = 0; e < row.edges; ++e) {
-    const auto [a, b] = edge_ends(e, row.belt);
-    const Side from = side(h, a), to = side(h, b);
-    if (from == to || !(edges >> e & 1)) continue;
-    const auto place = [&, a = a](std::uint32_t point) {
-      if (h.straddles) return place_on_edge(h, row, e, points_[point]);
-      const EdgeStep step = row.edge_step[e];
-      const Offset f = row.vertex[a];
-      const std::int32_t u = step.axis == 0   ? h.centre.x + (f.x << shift)
-                             : step.axis == 1 ? h.centre.y + (f.y << shift)
-                                              : h.centre.z + (f.z << shift);
-      const std::int32_t q = step.axis == 0 ? points_[point].x : step.axis == 1 ? points_[point].y : points_[point].z;
-      const std::int32_t far = step.step < 0 ? u * kSteps - q : q - u * kSteps;
-      return far >> (shift + ((step.step & 1) == 0 ? 1 : 0));
-    };
-    std::uint32_t point = p[e];
-    if (alpha_cuts(from, to)) c.cut[e][0] = std::uint16_t(place(point++));
-    if (beta_cuts(from, to)) c.cut[e][1] = std::uint16_t(place(point));
-  }
-  return c;
+  Cursor cursor(*this);
+  cursor.move_to(handle.supercube);
+  return *cursor.look(handle.slot);
 }
 
-Cuts Front::split(Handle handle, Side centre_side, std::span<const std::uint8_t> cuts) {
-  const Header h = header(std::uint32_t(handle));  // a copy: making the children moves records
-  const Diamond d(h.centre);
-  const DiamondType& row = *d.row;
-  assert(int(cuts.size()) == context(handle).count_cuts(centre_side).all && "the caller counted");
-  tet_count_ += count_halves(h, row, centre_side) - std::uint64_t(count_tets(h, row));
-
-  // The new points, then the old ones, by local numbers.
-  std::uint32_t vertex[kMaxVertices + 1], edge[kMaxEdges + kMaxVertices];
-  auto [mine, p] = record(std::uint32_t(handle));
-  std::copy_n(p, row.vertices, vertex);
-  std::copy_n(p + row.vertices, row.edges, edge);
-  vertex[kCentre] = centre_side == Side::inside ? add_vertex(d.centre) : kNone;
-  const unsigned vertices = h.straddles ? Domain::vertices(row, h.tets) : (1u << row.vertices) - 1;
-  const std::uint8_t* q = cuts.data();
-  for (int v = 0; v < row.vertices; ++v) {
-    edge[kSubdivision + v] = kNone;
-    const int n = vertices >> v & 1 ? cut_count(centre_side, side(h, v)) : 0;
-    if (n == 0) continue;
-    edge[kSubdivision + v] = add_cuts(d.centre, d.vertex(v), centre_side, side(h, v), q);
-    q += n;
-  }
-  const Cuts spine = cuts_of(h, row, 0, edge[0]);
-  drop_points(edge[0], spine.count, is_border(d.vertex(0)) || is_border(d.vertex(1)));
-
-  if (!d.has_children()) {
-    mine->split = true;
-    mine->sides |= std::uint32_t(centre_side) << (2 * kCentre);
-    std::uint32_t* const added = p + row.vertices + row.edges;
-    added[0] = vertex[kCentre];
-    std::copy_n(edge + kSubdivision, row.vertices, added + 1);
-    return spine;
-  }
-  if (h.straddles) {
-    Retired& kept = retired_[key(h.centre)];
-    kept.header = h;
-    std::copy_n(p, row.vertices + row.edges, kept.points.data());
-  }
-  diamonds_.erase(key(h.centre));
-  release(std::uint32_t(handle));
-  const std::uint32_t sides = h.sides | std::uint32_t(centre_side) << (2 * kCentre);
-  for (int k = 0; k < row.children; ++k) {
-    const Duet& duet = row.child[k];
-    unsigned handed = 0;
-    bool exists[2];
-    for (int i = 0; i < 2; ++i) {
-      exists[i] = !h.straddles || ((h.tets >> duet.half[i].tet & 1) && half_exists(h, row, duet.half[i].tet, duet.half[i].end));
-      if (exists[i]) handed |= 1u << duet.half[i].child_tet;
-    }
-    if (handed == 0) continue;
-    const Record child = record(obtain(d.child(k)));
-    Header* const c = child.header;
-    std::uint32_t* const cp = child.points;
-    std::uint32_t* const ce = cp + diamond_type(c->type).vertices;
-    c->received = std::uint8_t(c->received | handed);
-    const auto hand = [&](const auto& vertex_from, const auto& vertex_to, const auto& edge_from, const auto& edge_to) {
-      for (std::size_t i = 0; i < vertex_from.size(); ++i) {
-        const int from = vertex_from[i], to = vertex_to[i];
-        cp[to] = vertex[from];
-        c->sides = (c->sides & ~(3u << (2 * to))) | (sides >> (2 * from) & 3) << (2 * to);
-      }
-      for (std::size_t i = 0; i < edge_from.size(); ++i) ce[edge_to[i]] = edge[edge_from[i]];
-    };
-    if (exists[0] && exists[1]) {
-      hand(duet.vertex_from, duet.vertex_to, duet.edge_from, duet.edge_to);
-    } else {
-      const Duet::Half& half = duet.half[exists[0] ? 0 : 1];
-      hand(half.vertex_from, half.vertex_to, half.edge_from, half.edge_to);
-    }
-  }
-  return spine;
+void Front::split(Handle handle, Side side, std::span<const std::uint8_t> cuts) {
+  Cursor cursor(*this);
+  cursor.move_to(handle.supercube);
+  cursor.look(handle.slot);
+  cursor.split(side, cuts);
 }
 
-bool Front::merge(Vertex centre, const Cuts& spine) {
-  if (!domain_.contains(domain_.clamp(centre)) || (centre.x | centre.y | centre.z) == 0 || scale_of(centre) >= domain_.levels()) return false;
+bool Front::merge(Vertex centre) {
+  if ((centre.x | centre.y | centre.z) <= 0 || scale_of(centre) >= domain_.levels()) return false;
   const Diamond d(centre);
-  const DiamondType& row = *d.row;
-  std::uint32_t vertex[kMaxVertices + 1], edge[kMaxEdges + kMaxVertices];
-  std::fill(std::begin(vertex), std::end(vertex), kNone);
-  std::fill(std::begin(edge), std::end(edge), kNone);
-  std::uint32_t sides = 0, handle = kNone;
-  if (!d.has_children()) {
-    const auto found = diamonds_.find(key(centre));
-    if (found == diamonds_.end() || !header(found->second).split) return false;
-    handle = found->second;
-    auto [h, p] = record(handle);
-    sides = h->sides;
-    std::copy_n(p, row.vertices, vertex);
-    std::copy_n(p + row.vertices, row.edges, edge);
-    const std::uint32_t* const added = p + row.vertices + row.edges;
-    vertex[kCentre] = added[0];
-    std::copy_n(added + 1, row.vertices, edge + kSubdivision);
-    h->split = false;
-    h->sides &= ~(3u << (2 * kCentre));
-  } else {
-    if (diamonds_.contains(key(centre))) return false;  // not split
-    Header probe;
-    probe.centre = centre;
-    probe.tets = std::uint8_t(domain_.tets(d));
-    probe.straddles = !domain_.is_interior(d);
-    // Which halves each child has from this diamond; all of those children must be there, unsplit.
-    std::array<std::uint32_t, kMaxChildren> child;
-    std::array<std::uint8_t, kMaxChildren> handed{};
-    bool any = false;
-    for (int k = 0; k < row.children; ++k) {
-      for (const Duet::Half& half : row.child[k].half) {
-        if ((probe.tets >> half.tet & 1) && half_exists(probe, row, half.tet, half.end)) handed[k] = std::uint8_t(handed[k] | 1u << half.child_tet);
-      }
-      child[k] = kNone;
-      if (handed[k] == 0) continue;
-      const auto found = diamonds_.find(key(d.child(k)));
-      if (found == diamonds_.end()) return false;
-      const Header& c = header(found->second);
-      if (c.split || (c.received & handed[k]) != handed[k]) return false;
-      child[k] = found->second;
-      any = true;
-    }
-    if (!any) return false;
-    if (probe.straddles) {
-      // Where the clamped centre leaves the clamped spine, a tetrahedron can have lost both halves: its points are known from before.
-      const auto kept = retired_.find(key(centre));
-      if (kept == retired_.end()) return false;
-      sides = kept->second.header.sides;
-      std::copy_n(kept->second.points.data(), row.vertices, vertex);
-      std::copy_n(kept->second.points.data() + row.vertices, row.edges, edge);
-      retired_.erase(kept);
-    }
-    for (int k = 0; k < row.children; ++k) {
-      if (child[k] == kNone) continue;
-      auto [c, cp] = record(child[k]);
-      const std::uint32_t* const ce = cp + diamond_type(c->type).vertices;
-      for (const Duet::Half& half : row.child[k].half) {
-        if (!(handed[k] >> half.child_tet & 1)) continue;
-        for (int i = 0; i < 4; ++i) {
-          const int from = half.vertex_from[i], to = half.vertex_to[i];
-          vertex[from] = cp[to];
-          sides = (sides & ~(3u << (2 * from))) | (c->sides >> (2 * to) & 3) << (2 * from);
-        }
-        for (int i = 0; i < 6; ++i) edge[half.edge_from[i]] = ce[half.edge_to[i]];
-      }
-      c->received = std::uint8_t(c->received & ~handed[k]);
-      if (c->received == 0) {
-        diamonds_.erase(key(c->centre));
-        release(child[k]);
-      }
-    }
-    handle = obtain(centre);
-    auto [h, p] = record(handle);
-    h->sides = sides & ~(3u << (2 * kCentre));
-    h->received = h->tets;
-    std::copy_n(vertex, row.vertices, p);
-    std::copy_n(edge, row.edges, p + row.vertices);
+  const int slot = kSlotOfType[d.type];
+  const Block* const found = find_block(d.scale, {centre.x >> (d.scale + 2), centre.y >> (d.scale + 2), centre.z >> (d.scale + 2)});
+  if (found == nullptr || !(found->split >> slot & 1)) return false;
+  const Existing e = existing(d);
+  for (int k = 0; k < d.row->children && d.has_children(); ++k) {
+    const Diamond child(d.child(k));
+    bool handed = false;
+    for (const Duet::Half& half : d.row->child[k].half) handed = handed || ((e.tets >> half.tet & 1) && half_exists(d, half.tet, half.end));
+    if (!handed) continue;
+    const int up = child.scale + 2;
+    const Block* const block = find_block(child.scale, {child.centre.x >> up, child.centre.y >> up, child.centre.z >> up});
+    if (block != nullptr && (block->split >> kSlotOfType[child.type] & 1)) return false;
   }
-  // The points that splitting added go; the spine's come back.
-  const Side centre_side = Side(sides >> (2 * kCentre) & 3);
-  const bool border = is_border(centre);
-  if (centre_side == Side::inside) drop_points(vertex[kCentre], 1, border);
-  for (int v = 0; v < row.vertices; ++v) {
-    if (edge[kSubdivision + v] == kNone) continue;
-    drop_points(edge[kSubdivision + v], cut_count(centre_side, Side(sides >> (2 * v) & 3)), border || is_border(d.vertex(v)));
-  }
-  auto [h, p] = record(handle);
-  p[row.vertices] = add_cuts(d.vertex(0), d.vertex(1), side(*h, 0), side(*h, 1), spine.q);
-  tet_count_ += count_tets(*h, row) - std::uint64_t(count_halves(*h, row, centre_side));
+  Cursor cursor(*this);
+  cursor.move_to(d.scale, found->position);
+  const DiamondContext* const context = cursor.look(slot);
+  assert(context != nullptr && "the ancestors of a split diamond are split");
+  const std::uint32_t sides = context->sides | std::uint32_t(found->of[slot].side()) << (2 * kCentre);
+  tet_count_ += count_tets(d, e, sides) - count_halves(d, e, sides);
+  const_cast<Block*>(found)->split &= ~(std::uint64_t(1) << slot);
+  --split_count_;
   return true;
 }
 
-Mesh Front::mesh() const {
-  Mesh mesh;
-  mesh.tets.reserve(tet_count_);
-  std::vector<std::uint32_t> number(points_.size(), kNone);
-  for_each_tet([&](std::array<std::uint32_t, 4> tet) {
-    for (std::uint32_t& point : tet) {
-      std::uint32_t& n = number[point];
-      if (n == kNone) {
-        n = std::uint32_t(mesh.points.size());
-        const Point& q = points_[point];
-        mesh.points.push_back({grid_.origin[0] + grid_.spacing[0] * q.x / kSteps, grid_.origin[1] + grid_.spacing[1] * q.y / kSteps,
-                               grid_.origin[2] + grid_.spacing[2] * q.z / kSteps});
-        mesh.surface.push_back(q.surface);
-      }
-      point = n;
-    }
-    mesh.tets.push_back(tet);
-  });
-  return mesh;
+std::size_t Front::memory_bytes() const { return blocks_.size() * sizeof(Block) + index_.bucket_count() * 17 + q_.capacity(); }
+
+const Front::Block* Front::find_block(int scale, Vertex position) const {
+  const auto found = index_.find(index_key(scale, position));
+  return found == index_.end() ? nullptr : &blocks_[found->second];
 }
 
-std::size_t Front::memory_bytes() const {
-  std::size_t n = points_.capacity() * sizeof(Point) + diamonds_.bucket_count() * 17 + border_points_.bucket_count() * (sizeof(PointKey) + 5) +
-                  retired_.bucket_count() * (sizeof(Retired) + 9);
-  for (const Slab& s : slabs_) n += s.headers.capacity() * sizeof(Header) + s.points.capacity() * 4 + s.unused.capacity() * 4;
-  for (const auto& u : unused_points_) n += u.capacity() * 4;
-  return n;
-}
-
-Front::Record Front::record(std::uint32_t handle) {
-  Slab& slab = slabs_[handle >> kSlabShift];
-  const std::size_t i = handle & ((1u << kSlabShift) - 1);
-  return {&slab.headers[i], slab.points.data() + i * slab.stride};
-}
-
-const Front::Header& Front::header(std::uint32_t handle) const { return slabs_[handle >> kSlabShift].headers[handle & ((1u << kSlabShift) - 1)]; }
-
-const std::uint32_t* Front::points(std::uint32_t handle) const {
-  const Slab& slab = slabs_[handle >> kSlabShift];
-  return slab.points.data() + std::size_t(handle & ((1u << kSlabShift) - 1)) * slab.stride;
-}
-
-std::uint32_t Front::obtain(Vertex centre) {
-  const auto [place, is_new] = diamonds_.try_emplace(key(centre), 0);
-  if (!is_new) return place->second;
-  const Diamond d(centre);
-  const unsigned which = d.has_children() ? d.row->cls : kFinest;
-  Slab& slab = slabs_[which];
-  std::size_t i = slab.headers.size();
-  if (slab.unused.empty()) {
-    slab.headers.emplace_back();
-    slab.points.resize(slab.points.size() + slab.stride, kNone);
-  } else {
-    i = slab.unused.back();
-    slab.unused.pop_back();
-    std::fill_n(slab.points.data() + i * slab.stride, slab.stride, kNone);
+Front::Block& Front::obtain_block(int scale, Vertex position) {
+  const auto [place, is_new] = index_.try_emplace(index_key(scale, position), std::uint32_t(blocks_.size()));
+  if (is_new) {
+    blocks_.emplace_back();
+    blocks_.back().position = position;
+    blocks_.back().scale = scale;
   }
-  Header& h = slab.headers[i];
-  h = Header{};
-  h.centre = centre;
-  h.type = std::uint8_t(d.type);
-  h.straddles = !domain_.is_interior(d);
-  h.tets = std::uint8_t(domain_.tets(d));
-  place->second = which << kSlabShift | std::uint32_t(i);
-  return place->second;
+  return blocks_[place->second];
 }
 
-void Front::release(std::uint32_t handle) {
-  Slab& slab = slabs_[handle >> kSlabShift];
-  slab.headers[handle & ((1u << kSlabShift) - 1)].received = 0;
-  slab.unused.push_back(handle & ((1u << kSlabShift) - 1));
-}
-
-TetShape Front::shape(const Header& h, const DiamondType& row, int tet) const {
-  if (!h.straddles) return row.shape[tet];
-  const auto local = row.tet(tet);
-  return shape_of(domain_.positions(Diamond(h.centre), local), local, row.belt);
-}
-
-TetShape Front::half_shape(const Header& h, const DiamondType& row, int tet, int end) const {
-  if (!h.straddles) return row.half_shape[tet][end];
-  auto local = row.tet(tet);
-  local[1 - end] = kCentre;
-  return shape_of(domain_.positions(Diamond(h.centre), local), local, row.belt);
-}
-
-bool Front::half_exists(const Header& h, const DiamondType& row, int tet, int end) const {
-  if (!h.straddles) return true;
-  auto local = row.tet(tet);
-  local[1 - end] = kCentre;
-  return Domain::exists(domain_.positions(Diamond(h.centre), local));
+Front::Existing Front::existing(const Diamond& d) const {
+  const DiamondType& row = *d.row;
+  if (domain_.is_interior(d)) return {(1u << row.tets) - 1, (1u << row.vertices) - 1, (1u << row.edges) - 1, false};
+  const unsigned tets = domain_.tets(d);
+  return {tets, Domain::vertices(row, tets), Domain::edges(row, tets), true};
 }
 
 // On an axis that clamps, at or beyond the last sample. Only edges with such an end can share their place with another edge.
@@ -348,86 +154,175 @@ bool Front::is_border(Vertex v) const {
   return (last.x < n && v.x >= last.x) || (last.y < n && v.y >= last.y) || (last.z < n && v.z >= last.z);
 }
 
-std::uint32_t Front::add_points(const Point* points, int count, bool border) {
-  if (border) {
-    const auto [place, is_new] = border_points_.try_emplace(PointKey{points[0], points[count - 1]}, std::uint32_t(points_.size()));
-    if (is_new) points_.insert(points_.end(), points, points + count);
-    return place->second;
-  }
-  auto& unused = unused_points_[count - 1];
-  if (unused.empty()) {
-    points_.insert(points_.end(), points, points + count);
-    return std::uint32_t(points_.size() - count);
-  }
-  const std::uint32_t first = unused.back();
-  unused.pop_back();
-  std::copy_n(points, count, points_.begin() + first);
-  return first;
+bool Front::half_exists(const Diamond& d, int tet, int end) const {
+  auto local = d.row->tet(tet);
+  local[1 - end] = kCentre;
+  return Domain::exists(domain_.positions(d, local));
 }
 
-std::uint32_t Front::add_vertex(Vertex v) {
-  const Vertex c = domain_.clamp(v);
-  const Point p{c.x * kSteps, c.y * kSteps, c.z * kSteps, Surface::inside};
-  return add_points(&p, 1, is_border(v));
+TetShape Front::shape(const Diamond& d, const Existing& e, int tet) const {
+  const auto local = d.row->tet(tet);
+  return e.straddles ? shape_of(domain_.positions(d, local), local, d.row->belt) : d.row->shape[tet];
 }
 
-std::uint32_t Front::add_cuts(Vertex a, Vertex b, Side from, Side to, const std::uint8_t* q) {
-  Point points[2];
-  int n = 0;
-  const Vertex ca = domain_.clamp(a), cb = domain_.clamp(b);
-  const auto cut = [&](Surface surface) {
-    const std::int32_t t = 2 * q[n] + 1;
-    points[n++] = {ca.x * kSteps + (cb.x - ca.x) * t, ca.y * kSteps + (cb.y - ca.y) * t, ca.z * kSteps + (cb.z - ca.z) * t, surface};
-  };
-  if (alpha_cuts(from, to)) cut(Surface::alpha);
-  if (beta_cuts(from, to)) cut(Surface::beta);
-  return n == 0 ? kNone : add_points(points, n, is_border(a) || is_border(b));
+TetShape Front::half_shape(const Diamond& d, const Existing& e, int tet, int end) const {
+  if (!e.straddles) return d.row->half_shape[tet][end];
+  auto local = d.row->tet(tet);
+  local[1 - end] = kCentre;
+  return shape_of(domain_.positions(d, local), local, d.row->belt);
 }
 
-// Points of the border stay: they are few, and who else uses them is not known here.
-void Front::drop_points(std::uint32_t first, int count, bool border) {
-  if (count > 0 && !border) unused_points_[count - 1].push_back(first);
-}
-
-Cuts Front::cuts_of(const Header& h, const DiamondType& row, int edge, std::uint32_t first) const {
-  const auto [a, b] = edge_ends(edge, row.belt);
-  Cuts cuts;
-  cuts.count = std::uint8_t(cut_count(side(h, a), side(h, b)));
-  if (first == kNone) cuts.count = 0;
-  for (int i = 0; i < cuts.count; ++i) cuts.q[i] = std::uint8_t(place_on_edge(h, row, edge, points_[first + i]) / 2);
-  return cuts;
-}
-
-std::int32_t Front::place_on_edge(const Header& h, const DiamondType& row, int edge, const Point& p) const {
-  const auto [a, b] = edge_ends(edge, row.belt);
-  const Diamond d(h.centre);
-  const Vertex u = domain_.clamp(d.vertex(a)), v = domain_.clamp(d.vertex(b));
-  return u.x != v.x ? (p.x - u.x * kSteps) / (v.x - u.x) : u.y != v.y ? (p.y - u.y * kSteps) / (v.y - u.y) : (p.z - u.z * kSteps) / (v.z - u.z);
-}
-
-unsigned Front::count_tets(const Header& h, const DiamondType& row) const {
+std::uint64_t Front::count_tets(const Diamond& d, const Existing& e, std::uint32_t sides) const {
   const TetCases& cases = tet_cases();
-  unsigned n = 0;
-  for (int t = 0; t < row.tets; ++t) {
-    if (!(h.received >> t & 1)) continue;
-    const TetShape s = shape(h, row, t);
-    n += cases.count(s.order, shape_sides(s, h.sides));
+  const Ring ring(sides, d.row->belt);
+  std::uint64_t n = 0;
+  for (int t = 0; t < d.row->tets; ++t) {
+    if (!(e.tets >> t & 1)) continue;
+    unsigned count = cases.count(ring.tet(t));
+    if (count == TetCases::kDepends) {
+      const TetShape s = shape(d, e, t);
+      count = cases.count(s.order, shape_sides(s, sides));
+    }
+    n += count;
   }
   return n;
 }
 
-unsigned Front::count_halves(const Header& h, const DiamondType& row, Side centre) const {
+std::uint64_t Front::count_halves(const Diamond& d, const Existing& e, std::uint32_t sides) const {
   const TetCases& cases = tet_cases();
-  const std::uint32_t sides = h.sides | std::uint32_t(centre) << (2 * kCentre);
-  unsigned n = 0;
-  for (int t = 0; t < row.tets; ++t) {
-    for (int end = 0; end < 2 && (h.tets >> t & 1); ++end) {
-      if (!half_exists(h, row, t, end)) continue;
-      const TetShape s = half_shape(h, row, t, end);
-      n += cases.count(s.order, shape_sides(s, sides));
+  const Ring ring(sides, d.row->belt);
+  std::uint64_t n = 0;
+  for (int t = 0; t < d.row->tets; ++t) {
+    if (!(e.tets >> t & 1)) continue;
+    for (int end = 0; end < 2; ++end) {
+      if (e.straddles && !half_exists(d, t, end)) continue;
+      unsigned count = cases.count(ring.half(t, end));
+      if (count == TetCases::kDepends) {
+        const TetShape s = half_shape(d, e, t, end);
+        count = cases.count(s.order, shape_sides(s, sides));
+      }
+      n += count;
     }
   }
   return n;
+}
+
+void Front::Cursor::move_to(int scale, Vertex position) {
+  scale_ = scale;
+  position_ = position;
+  near_.fill(nullptr);
+  links_ = &link_table()[unsigned(position.x & 1) | unsigned(position.y & 1) << 1 | unsigned(position.z & 1) << 2];
+  // A diamond reaches h beyond its centre, which is 0 to 3 h from the supercube's corner.
+  const std::int32_t h = 1 << scale;
+  const auto corner = [&](std::int32_t cells, std::int32_t more) { return std::int32_t(cells * 4 + more) * h; };
+  interior_ = front_.domain_.contains({corner(position.x, -1), corner(position.y, -1), corner(position.z, -1)}) &&
+              front_.domain_.contains({corner(position.x, 4), corner(position.y, 4), corner(position.z, 4)});
+}
+
+Front::Cursor::Found Front::Cursor::resolve(std::uint8_t where) {
+  static const Block nothing{};
+  const Vertex p = position_;
+  const Block* found = nullptr;
+  if (where < kCoarser) {
+    const Vertex q{p.x + where % 3 - 1, p.y + where / 3 % 3 - 1, p.z + where / 9 - 1};
+    if ((q.x | q.y | q.z) >= 0) found = front_.find_block(scale_, q);
+  } else if (where < kCorner) {
+    const int w = where - kCoarser;
+    found = front_.find_block(scale_ + 1, {(p.x >> 1) + (w & 1), (p.y >> 1) + (w >> 1 & 1), (p.z >> 1) + (w >> 2)});
+  } else {
+    const int w = where - kCorner;
+    const Vertex v{(p.x + (w & 1)) << (scale_ + 2), (p.y + (w >> 1 & 1)) << (scale_ + 2), (p.z + (w >> 2)) << (scale_ + 2)};
+    if ((v.x | v.y | v.z) == 0) {
+      found = &front_.corner_;
+      corner_slot_[w] = 0;
+    } else {
+      const Diamond d(v);
+      found = front_.find_block(d.scale, {v.x >> (d.scale + 2), v.y >> (d.scale + 2), v.z >> (d.scale + 2)});
+      corner_slot_[w] = kSlotOfType[d.type];
+    }
+  }
+  near_[where] = found == nullptr ? &nothing : found;
+  return {near_[where], 0};
+}
+
+// Vertices and sides.
+bool Front::Cursor::gather(int slot) {
+  slot_ = slot;
+  const std::int32_t h = std::int32_t(1) << scale_;
+  const unsigned type = kTypeOfSlot[slot];
+  const DiamondType& row = diamond_type(type);
+  if (scale_ >= front_.domain_.levels()) return false;
+  diamond_.emplace(Vertex{(position_.x * 4 + int(type & 3)) * h, (position_.y * 4 + int(type >> 2 & 3)) * h, (position_.z * 4 + int(type >> 4)) * h});
+  if (interior_) {
+    existing_ = {(1u << row.tets) - 1, (1u << row.vertices) - 1, (1u << row.edges) - 1, false};
+  } else {
+    existing_ = front_.existing(*diamond_);
+    if (existing_.tets == 0) return false;
+  }
+  const Links& links = (*links_)[slot];
+  context_.row = &row;
+  context_.vertices = existing_.vertices;
+  std::uint32_t sides = 0;
+  for (int v = 0; v < row.vertices; ++v) {
+    if (!(existing_.vertices >> v & 1)) continue;
+    const Found found = at(links.vertex[v]);
+    if (!(found.block->split >> found.slot & 1)) return false;
+    split_[v] = found.block->of[found.slot];
+    sides |= std::uint32_t(split_[v].side()) << (2 * v);
+  }
+  context_.sides = sides;
+  return true;
+}
+
+const DiamondContext* Front::Cursor::look(int slot) {
+  if (!gather(slot)) return nullptr;
+  const DiamondType& row = *context_.row;
+  const Links& links = (*links_)[slot];
+  for (int e = 0; e < row.edges; ++e) {
+    auto& cut = context_.cut[e];
+    cut = {0, 0};
+    if (!(existing_.edges >> e & 1)) continue;
+    const Links::Edge edge = links.edge[e];
+    const Split& owner = split_[edge.owner];
+    const unsigned two = owner.bits >> (2 * edge.other) & 3;
+    if (two == 0) continue;
+    const std::uint8_t* q = front_.q_.data() + owner.cut(2 * edge.other);
+    // Seen from the owner; the context wants it from the edge's first end.
+    if (two & 1) cut[0] = std::uint16_t(2 * (*q++ ^ edge.flip) + 1);
+    if (two & 2) cut[1] = std::uint16_t(2 * (*q ^ edge.flip) + 1);
+  }
+  return &context_;
+}
+
+bool Front::Cursor::is_split() const {
+  const Block* const here = near_[kHere] != nullptr ? near_[kHere] : const_cast<Cursor*>(this)->resolve(kHere).block;
+  return (here->split >> slot_ & 1) != 0;
+}
+
+// Writes the diamond's split to where there is room for it. Returns how many more tetrahedra there are.
+std::int64_t Front::Cursor::write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first) {
+  Split& s = block.of[slot_];
+  s.first = first;
+  s.bits = context_.cut_bits(side) | std::uint32_t(side) << kSideBit;
+  std::copy(cuts.begin(), cuts.end(), front_.q_.begin() + first);
+  const std::uint32_t sides = context_.sides | std::uint32_t(side) << (2 * kCentre);
+  return std::int64_t(front_.count_halves(*diamond_, existing_, sides) - front_.count_tets(*diamond_, existing_, sides));
+}
+
+void Front::Cursor::split(Side side, std::span<const std::uint8_t> cuts) {
+  assert(int(cuts.size()) == context_.count_cuts(side).all && "the caller counted");
+  Block& block = front_.obtain_block(scale_, position_);
+  near_[kHere] = &block;
+  // Room that it had before is used again if it is the same split that comes back.
+  const Split before = block.of[slot_];
+  std::uint32_t first = before.first;
+  if (before.bits != (context_.cut_bits(side) | std::uint32_t(side) << kSideBit) || before.bits == 0) {
+    first = std::uint32_t(front_.q_.size());
+    front_.q_.resize(front_.q_.size() + cuts.size() + (side == Side::inside ? 1 : 0));
+  }
+  front_.tet_count_ += std::uint64_t(write(block, side, cuts, first));
+  block.split |= std::uint64_t(1) << slot_;
+  ++front_.split_count_;
 }
 
 }  // namespace intervale

@@ -1,37 +1,48 @@
-// The front: the unsplit diamonds of a mesh that is being refined and coarsened, and the mesh they make. It needs no field.
+// The mesh that is refined and coarsened, and the front: the unsplit diamonds that the split ones leave. It needs no field.
 //
-// Weiss and De Floriani 2008, sections 6 and 7. Every diamond of the front holds the sides of its vertices and the mesh points on its edges;
-// splitting it needs only the side of its centre and the cuts on its subdivision edges, and hands each child its duet. Two differences from the
-// paper: the diamonds of class 2 with h = 1, whose children never split, keep what splitting brings and make those children's tetrahedra themselves;
-// and a mesh point on the far faces of a box that clamps (domain.h) is found by its position, for there two edges can be one.
+// Weiss and De Floriani 2008, sections 6 and 7. In the paper each diamond of the front holds its vertices and edges, and a split hands each child its
+// duet. Here nothing is handed on: what splitting brought (the side of the centre, the cuts on the subdivision edges) is kept with the split diamond,
+// supercube by supercube, and a diamond that is looked at gathers its vertices and edges from its ancestors' splits (links.h). A split then writes
+// eight bytes and its cuts, a merge clears one bit, and the front is implied. The mesh is made of duets all the same: the halves that split diamonds
+// leave to children that are not split.
 //
 // After any sequence of splits and merges the mesh is conforming and positively oriented, and depends only on which diamonds are split.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <atomic>
+#include <bit>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/base.h"
 #include "common/diamond.h"
 #include "common/domain.h"
 #include "common/grid.h"
+#include "common/links.h"
 #include "common/mesh.h"
+#include "common/parallel.h"
 #include "common/prediction.h"
-#include "common/tet_cases.h"
+#include "common/supercube.h"
 
 namespace intervale {
 
 class Front {
  public:
-  // A diamond of the front that can be split now; valid until the next split or merge.
-  enum class Handle : std::uint32_t {};
-
   // The mesh of the root's patch. grid.dims in [kMinSide, kMaxSide].
   Front(const Grid& grid, const Base& base);
+
+  // A diamond of the front that can be split now; valid until the next split or merge.
+  struct Handle {
+    SupercubeKey supercube = 0;
+    int slot = 0;
+  };
 
   // The diamond with this centre, if it is in the front with all its tetrahedra, is not split and not idle. Any vertex will do, also one that is no
   // centre.
@@ -41,148 +52,199 @@ class Front {
   [[nodiscard]] DiamondContext context(Handle handle) const;
 
   // Splits a diamond. cuts: q (see Cuts) of each cut on the subdivision edges, centre to vertex, in order of local vertices, alpha before beta:
-  // context(handle).count_cuts(side).all of them. Returns the cuts of the spine, from vertex 0 to vertex 1, which merge() needs back.
-  Cuts split(Handle handle, Side side, std::span<const std::uint8_t> cuts);
+  // context(handle).count_cuts(side).all of them.
+  void split(Handle handle, Side side, std::span<const std::uint8_t> cuts);
 
   // Undoes the split of a diamond none of whose children is split. False, and nothing done, if there is no such.
-  bool merge(Vertex centre, const Cuts& spine);
+  bool merge(Vertex centre);
 
   [[nodiscard]] std::uint64_t tet_count() const { return tet_count_; }
-  [[nodiscard]] std::size_t diamond_count() const { return diamonds_.size(); }  // in the front, those that made their children's tetrahedra included
+  [[nodiscard]] std::uint64_t split_count() const { return split_count_; }  // diamonds that are split
   [[nodiscard]] std::size_t memory_bytes() const;
 
-  // Calls sink(std::array<std::uint32_t, 4>) for every tetrahedron, with point numbers below point_limit().
-  template <class Sink>
-  void for_each_tet(Sink&& sink) const;
-  [[nodiscard]] std::size_t point_limit() const { return points_.size(); }
-
-  // The mesh, in world coordinates; points in order of first use.
-  [[nodiscard]] Mesh mesh() const;
+  // The mesh, in world coordinates.
+  [[nodiscard]] Mesh mesh(const ParallelFor& parallel = in_turn) const;
 
   // Every invariant that can be checked from inside; the first one that does not hold, as a text. For tests; O(front).
   [[nodiscard]] std::optional<std::string> validate() const;
 
+  // Looks at the diamonds of one supercube at a time, and splits them. Sees splits made by itself only, until it moves.
+  class Cursor;
+
+  // Splits all diamonds of a set that is closed under parents, of a front that has no diamond split yet. Of each supercube, by number in `set`,
+  // slots[supercube] are those to split. cut_count(UpdateIndex): how many cuts the update brings; decode(Place, DiamondContext, q) writes as many
+  // and returns the side, or nothing if they do not fit. Both are called from many threads if `parallel` uses them. Returns the centre of an update
+  // that did not fit, and the front is then of no more use.
+  template <class CutCount, class Decode>
+  std::optional<Vertex> split_all(const SupercubeSet& set, std::span<const std::uint64_t> slots, const CutCount& cut_count, const Decode& decode,
+                                  const ParallelFor& parallel = in_turn);
+
  private:
-  struct Point {  // in 1/512 of a sample: every cut of every edge is whole there
-    std::int32_t x, y, z;
-    Surface surface;
-    friend bool operator==(const Point&, const Point&) = default;
+  friend class FrontMesh;
+
+  // A split, as bits: 2 v for a cut of alpha on the edge from the centre to local vertex v, 2 v + 1 for one of beta; above them the centre's side.
+  static constexpr int kSideBit = 2 * kMaxVertices;
+  static constexpr std::uint32_t kCutBits = (1u << kSideBit) - 1;
+  struct Split {
+    std::uint32_t bits = 0;
+    std::uint32_t first = 0;  // in q_: its cuts in order of their bits. So are mesh points named; the centre comes after the last cut.
+    [[nodiscard]] Side side() const { return Side(bits >> kSideBit); }
+    [[nodiscard]] std::uint32_t cut(int bit) const { return first + std::uint32_t(std::popcount(bits & ((1u << bit) - 1))); }
+    [[nodiscard]] std::uint32_t centre() const { return first + std::uint32_t(std::popcount(bits & kCutBits)); }
   };
-  // A record is a header and point numbers: its vertices', its edges' (the first cut's; a second one follows), and for a split diamond of class 2
-  // with h = 1 the centre's and the subdivision edges'.
-  struct Header {
-    Vertex centre;
-    std::uint32_t sides = 0;  // two bits each, by local vertex
-    std::uint8_t type = 0;
-    std::uint8_t tets = 0;      // those that exist
-    std::uint8_t received = 0;  // those whose parent is split
-    bool split = false;         // only class 2 with h = 1
-    bool straddles = false;     // not all inside the box
+  // All that is known in one supercube.
+  struct Block {
+    Vertex position;  // centre >> (scale + 2)
+    std::int32_t scale = 0;
+    std::uint64_t split = 0;  // slots
+    std::array<Split, kSlots> of{};
   };
-  struct Slab {  // records of one size
-    unsigned stride = 0;
-    std::vector<Header> headers;
-    std::vector<std::uint32_t> points;
-    std::vector<std::uint32_t> unused;
-  };
-  struct Record {
-    Header* header;
-    std::uint32_t* points;
-  };
-  struct Retired {  // a straddling diamond as it was before its split
-    Header header;
-    std::array<std::uint32_t, kMaxVertices + kMaxEdges> points{};
-  };
-  struct PointKey {
-    Point first, second;  // equal where there is but one
-    friend bool operator==(const PointKey&, const PointKey&) = default;
-  };
-  struct PointHash {
-    std::size_t operator()(const PointKey& k) const {
-      std::uint64_t h = 0;
-      for (const Point& p : {k.first, k.second}) {
-        for (const std::int32_t c : {p.x, p.y, p.z, std::int32_t(p.surface)}) h = (h ^ std::uint32_t(c)) * 0x9e3779b97f4a7c15u;
-      }
-      return std::size_t(h ^ h >> 32);
-    }
+  // What of a diamond exists: bits by local number.
+  struct Existing {
+    std::uint32_t tets = 0, vertices = 0, edges = 0;
+    bool straddles = false;  // is not all inside the box
   };
 
-  [[nodiscard]] Record record(std::uint32_t handle);
-  [[nodiscard]] const Header& header(std::uint32_t handle) const;
-  [[nodiscard]] const std::uint32_t* points(std::uint32_t handle) const;
-  std::uint32_t obtain(Vertex centre);  // the record of a diamond, made if it is not there
-  void release(std::uint32_t handle);
-  [[nodiscard]] static Side side(const Header& h, int local) { return Side(h.sides >> (2 * local) & 3); }
-  [[nodiscard]] TetShape shape(const Header& h, const DiamondType& row, int tet) const;
-  [[nodiscard]] TetShape half_shape(const Header& h, const DiamondType& row, int tet, int end) const;
-  [[nodiscard]] bool half_exists(const Header& h, const DiamondType& row, int tet, int end) const;
+  [[nodiscard]] const Block* find_block(int scale, Vertex position) const;
+  Block& obtain_block(int scale, Vertex position);
+  [[nodiscard]] Existing existing(const Diamond& d) const;
   [[nodiscard]] bool is_border(Vertex v) const;
-  std::uint32_t add_points(const Point* points, int count, bool border);
-  std::uint32_t add_cuts(Vertex a, Vertex b, Side from, Side to, const std::uint8_t* q);
-  std::uint32_t add_vertex(Vertex v);
-  void drop_points(std::uint32_t first, int count, bool border);
-  [[nodiscard]] Cuts cuts_of(const Header& h, const DiamondType& row, int edge, std::uint32_t first) const;
-  // 2 q + 1 of a point on an edge.
-  [[nodiscard]] std::int32_t place_on_edge(const Header& h, const DiamondType& row, int edge, const Point& p) const;
-  [[nodiscard]] unsigned count_tets(const Header& h, const DiamondType& row) const;
-  [[nodiscard]] unsigned count_halves(const Header& h, const DiamondType& row, Side centre) const;
+  [[nodiscard]] std::uint64_t count_tets(const Diamond& d, const Existing& e, std::uint32_t sides) const;
+  [[nodiscard]] std::uint64_t count_halves(const Diamond& d, const Existing& e, std::uint32_t sides) const;
+  [[nodiscard]] TetShape shape(const Diamond& d, const Existing& e, int tet) const;
+  [[nodiscard]] TetShape half_shape(const Diamond& d, const Existing& e, int tet, int end) const;
+  [[nodiscard]] bool half_exists(const Diamond& d, int tet, int end) const;
 
   Grid grid_;
   Domain domain_;
-  std::array<Slab, 4> slabs_;                                         // class 0, 1, 2, and class 2 with h = 1
-  boost::unordered_flat_map<std::uint64_t, std::uint32_t> diamonds_;  // DiamondId to handle
-  boost::unordered_flat_map<std::uint64_t, Retired> retired_;
-  std::vector<Point> points_;
-  std::array<std::vector<std::uint32_t>, 2> unused_points_;  // runs of 1 and of 2
-  boost::unordered_flat_map<PointKey, std::uint32_t, PointHash> border_points_;
-  std::uint64_t tet_count_ = 0;
+  std::deque<Block> blocks_;                                       // stay where they are
+  boost::unordered_flat_map<std::uint64_t, std::uint32_t> index_;  // of blocks, by scale and position
+  Block corner_;                                                   // vertex (0, 0, 0): slot 0
+  std::vector<std::uint8_t> q_;                                    // of every cut; one more for a centre inside
+  std::uint64_t tet_count_ = 0, split_count_ = 0;
 };
 
-template <class Sink>
-void Front::for_each_tet(Sink&& sink) const {
-  const TetCases& cases = tet_cases();
-  for (const Slab& slab : slabs_) {
-    for (std::size_t i = 0; i < slab.headers.size(); ++i) {
-      const Header& h = slab.headers[i];
-      if (h.received == 0) continue;
-      const DiamondType& row = diamond_type(h.type);
-      const std::uint32_t* const p = slab.points.data() + i * slab.stride;
-      const std::uint32_t* const edge = p + row.vertices;
-      const std::uint32_t* const added = edge + row.edges;  // the centre's point, then the subdivision edges'
-      const auto emit = [&](const TetShape& s) {
-        for (const auto& corners : cases.tets(s.order, shape_sides(s, h.sides))) {
-          std::array<std::uint32_t, 4> tet;
-          for (int k = 0; k < 4; ++k) {
-            const int c = corners[k];
-            if (c < 4) {
-              const int v = s.vertex[c];
-              tet[k] = v == kCentre ? added[0] : p[v];
-              continue;
-            }
-            const int e = s.edge[(c - 4) / 2];
-            tet[k] = e >= kSubdivision ? added[1 + e - kSubdivision] : edge[e];
-            if ((c & 1) == 1) {  // beta: after alpha, if alpha cuts this edge too
-              constexpr int ends[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
-              const auto [a, b] = ends[(c - 4) / 2];
-              tet[k] += alpha_cuts(side(h, s.vertex[a]), side(h, s.vertex[b]));
-            }
-          }
-          if (s.flip) std::swap(tet[2], tet[3]);
-          sink(tet);
-        }
-      };
-      for (int t = 0; t < row.tets; ++t) {
-        if (!(h.received >> t & 1)) continue;
-        if (!h.split) {
-          emit(shape(h, row, t));
-        } else {
-          for (int end = 0; end < 2; ++end) {
-            if (half_exists(h, row, t, end)) emit(half_shape(h, row, t, end));
-          }
-        }
-      }
+class Front::Cursor {
+ public:
+  explicit Cursor(Front& front) : front_(front) {}
+  // Of a front that is not to be changed: split() must not be called.
+  explicit Cursor(const Front& front) : front_(const_cast<Front&>(front)) {}
+
+  void move_to(SupercubeKey supercube) { move_to(scale_of_key(supercube), position_of_key(supercube)); }
+  void move_to(int scale, Vertex position);  // position: a diamond's centre >> (scale + 2)
+
+  // Gathers what a diamond knows: nothing if it has no tetrahedra, or not all of them are in the mesh or were there before its split. Valid until the
+  // next call.
+  const DiamondContext* look(int slot);
+
+  // Of the diamond looked at last.
+  [[nodiscard]] const Diamond& diamond() const { return *diamond_; }
+  [[nodiscard]] bool is_split() const;
+  [[nodiscard]] bool can_be_split() const { return !is_split() && !is_idle(); }
+
+  // Splits the diamond looked at last, which can_be_split(). As Front::split.
+  void split(Side side, std::span<const std::uint8_t> cuts);
+
+ private:
+  friend class Front;
+  friend class FrontMesh;
+  struct Found {
+    const Block* block;
+    int slot;
+  };
+  Found resolve(std::uint8_t where);
+  bool gather(int slot);
+  [[nodiscard]] Found at(Link link) {
+    const Block* const block = near_[link.where] != nullptr ? near_[link.where] : resolve(link.where).block;
+    return {block, link.where < kCorner ? link.slot : corner_slot_[link.where - kCorner]};
+  }
+  [[nodiscard]] bool is_idle() const { return existing_.straddles && front_.domain_.is_idle(*diamond_); }
+  std::int64_t write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first);
+
+  Front& front_;
+  int scale_ = 0, slot_ = 0;
+  Vertex position_;
+  bool interior_ = false;  // all diamonds of this supercube are inside the box
+  const std::array<Links, kSlots>* links_ = nullptr;
+  std::array<const Block*, kWheres> near_{};  // null: not looked for yet
+  std::array<std::uint8_t, 8> corner_slot_{};
+  std::optional<Diamond> diamond_;
+  Existing existing_;
+  std::array<Split, kMaxVertices> split_;  // of each vertex
+  DiamondContext context_;
+};
+
+template <class CutCount, class Decode>
+std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const std::uint64_t> slots, const CutCount& cut_count, const Decode& decode,
+                                       const ParallelFor& parallel) {
+  // First room for all, then pass by pass, parents before children: within a pass no diamond is another's ancestor.
+  struct Work {
+    Block* block;
+    std::uint32_t brick, supercube;
+    SupercubeKey key;
+  };
+  std::vector<Work> work;
+  std::array<std::size_t, kMaxLevels + 1> begin{};
+  for (int scale = kMaxLevels - 1; scale >= 0; --scale) {
+    begin[kMaxLevels - 1 - scale] = work.size();
+    const auto [first, last] = set.of_scale(scale);
+    for (std::uint32_t brick = first; brick < last; ++brick) {
+      set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+        if (slots[s] != 0) work.push_back({&obtain_block(scale, position_of_key(key)), brick, s, key});
+      });
     }
   }
+  begin[kMaxLevels] = work.size();
+  for (const Work& w : work) {
+    UpdateIndex i = set.first(w.brick, w.supercube);
+    for (std::uint64_t left = set.occupancy()[w.supercube]; left != 0; left &= left - 1, ++i) {
+      const int slot = std::countr_zero(left);
+      if (!(slots[w.supercube] >> slot & 1)) continue;
+      w.block->of[slot].first = std::uint32_t(q_.size());
+      q_.resize(q_.size() + cut_count(i) + 1);
+    }
+    // Said before it is so: whoever looks has come to a later pass than its ancestors.
+    w.block->split = slots[w.supercube];
+    split_count_ += std::uint64_t(std::popcount(slots[w.supercube]));
+  }
+  constexpr std::size_t kPiece = 32;  // supercubes
+  std::atomic<std::int64_t> added = 0;
+  std::atomic<bool> failed = false;
+  Vertex wrong;
+  for (int scale = kMaxLevels - 1; scale >= 0; --scale) {
+    const std::size_t first = begin[kMaxLevels - 1 - scale], last = begin[kMaxLevels - scale];
+    for (const std::uint64_t cls : kSlotsOfClass) {
+      parallel((last - first + kPiece - 1) / kPiece, [&](std::size_t piece) {
+        Cursor cursor(*this);
+        std::int64_t sum = 0;
+        std::array<std::uint8_t, kMaxCuts> q;
+        const std::size_t end = std::min(last, first + (piece + 1) * kPiece);
+        for (std::size_t k = first + piece * kPiece; k < end; ++k) {
+          const Work& w = work[k];
+          const std::uint64_t chosen = slots[w.supercube] & cls;
+          if (chosen == 0) continue;
+          cursor.move_to(scale, w.block->position);
+          for (std::uint64_t left = chosen; left != 0; left &= left - 1) {
+            const int slot = std::countr_zero(left);
+            const DiamondContext* const context = cursor.look(slot);
+            const Place place = set.place_in(w.brick, w.supercube, w.key, slot);
+            const auto n = std::size_t(cut_count(place.index));
+            const bool fits = context != nullptr && !cursor.is_idle();
+            const std::optional<Side> side = fits ? decode(place, *context, q.data()) : std::nullopt;
+            if (!side || std::size_t(context->count_cuts(*side).all) != n) {
+              if (!failed.exchange(true)) wrong = centre_of(w.key, slot);
+              return;
+            }
+            sum += cursor.write(*w.block, *side, std::span(q).first(n), w.block->of[slot].first);
+          }
+        }
+        added += sum;
+      });
+      if (failed) return wrong;
+    }
+  }
+  tet_count_ += std::uint64_t(added.load());
+  return {};
 }
 
 }  // namespace intervale

@@ -5,27 +5,34 @@
 namespace intervale {
 
 std::optional<std::string> Front::validate() const {
-  std::uint64_t tets = 0;
-  for (const auto& [id, handle] : diamonds_) {
-    const Header& h = header(handle);
-    const auto where = " at (" + std::to_string(h.centre.x) + ", " + std::to_string(h.centre.y) + ", " + std::to_string(h.centre.z) + ")";
-    if (std::uint64_t(id_of(h.centre)) != id) return "a diamond is filed under another's name" + where;
-    if (h.received == 0) return "a diamond without a tetrahedron is in the front" + where;
-    if ((h.received & ~h.tets) != 0) return "a diamond holds a tetrahedron that does not exist" + where;
-    const DiamondType& row = diamond_type(h.type);
-    const std::uint32_t* const p = points(handle);
-    const unsigned vertices = Domain::vertices(row, h.received), edges = Domain::edges(row, h.received);
-    for (int v = 0; v < row.vertices; ++v) {
-      if (!(vertices >> v & 1) || side(h, v) != Side::inside) continue;
-      if (p[v] >= points_.size() || points_[p[v]].surface != Surface::inside) return "an inside vertex has no point" + where;
+  std::uint64_t splits = 0;
+  Cursor cursor(*this);
+  const Diamond root(domain_.root());
+  cursor.move_to(root.scale, {});
+  const DiamondContext* context = cursor.look(kSlotOfType[root.type]);
+  if (context == nullptr) return "the root is not there";
+  std::uint64_t tets = count_tets(root, existing(root), context->sides);
+  for (const Block& block : blocks_) {
+    if (find_block(block.scale, block.position) != &block) return "a supercube is filed under another's name";
+    if (block.scale == domain_.levels()) continue;
+    cursor.move_to(block.scale, block.position);
+    for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+      const int slot = std::countr_zero(left);
+      const Diamond d(centre_of(supercube_key(block.scale, block.position), slot));
+      const auto where = " at (" + std::to_string(d.centre.x) + ", " + std::to_string(d.centre.y) + ", " + std::to_string(d.centre.z) + ")";
+      const Split& split = block.of[slot];
+      context = cursor.look(slot);
+      if (context == nullptr) return "a diamond is split before its parents" + where;
+      if (unsigned(split.side()) > 2) return "a side is none" + where;
+      if ((split.bits & kCutBits) != context->cut_bits(split.side())) return "the cuts do not fit the sides" + where;
+      if (std::size_t(split.centre()) + (split.side() == Side::inside ? 1 : 0) > q_.size()) return "a cut has no place" + where;
+      const Existing e = existing(d);
+      const std::uint32_t sides = context->sides | std::uint32_t(split.side()) << (2 * kCentre);
+      tets += count_halves(d, e, sides) - count_tets(d, e, sides);
+      ++splits;
     }
-    for (int e = h.split ? 1 : 0; e < row.edges; ++e) {
-      const auto [a, b] = edge_ends(e, row.belt);
-      const int n = edges >> e & 1 ? cut_count(side(h, a), side(h, b)) : 0;
-      if (n > 0 && std::size_t(p[row.vertices + e]) + n > points_.size()) return "a cut edge has no points" + where;
-    }
-    tets += h.split ? count_halves(h, row, side(h, kCentre)) : count_tets(h, row);
   }
+  if (splits != split_count_) return "the split diamonds are miscounted: " + std::to_string(split_count_) + " for " + std::to_string(splits);
   if (tets != tet_count_) return "the tetrahedra are miscounted: " + std::to_string(tet_count_) + " for " + std::to_string(tets);
   return {};
 }

@@ -1,6 +1,7 @@
 #include "common/prediction.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace intervale {
 namespace {
@@ -12,16 +13,8 @@ constexpr double kGuessWeight = 0.05;  // of what a vertex tells whose own dista
 }  // namespace
 
 DiamondContext::CutCount DiamondContext::count_cuts(Side centre) const {
-  CutCount n;
-  bool alpha = false, beta = false;
-  for (int v = 0; v < row->vertices; ++v) {
-    if (!has(v)) continue;
-    n.all += cut_count(centre, side(v));
-    alpha = alpha || alpha_cuts(centre, side(v));
-    beta = beta || beta_cuts(centre, side(v));
-  }
-  n.first = int(alpha) + int(beta);
-  return n;
+  const std::uint32_t bits = cut_bits(centre);
+  return {std::popcount(bits), int((bits & 0x55555) != 0) + int((bits & 0xaaaaa) != 0)};
 }
 
 Prediction::Prediction(const DiamondContext& context) : context_(context) {

@@ -31,6 +31,19 @@ struct DiamondContext {
   [[nodiscard]] Side side(int v) const { return Side(sides >> (2 * v) & 3); }
   [[nodiscard]] bool has(int v) const { return (vertices >> v & 1) != 0; }
 
+  // Which subdivision edges are cut if the centre lies there: bit 2 v by alpha and bit 2 v + 1 by beta on the edge to local vertex v.
+  [[nodiscard]] std::uint32_t cut_bits(Side centre) const {
+    constexpr std::uint32_t kPairs = 0x55555;
+    std::uint32_t exists = vertices;  // a bit each, spread to every second
+    exists = (exists | exists << 8) & 0x300ff;
+    exists = (exists | exists << 4) & 0x30f0f;
+    exists = (exists | exists << 2) & 0x33333;
+    exists = (exists | exists << 1) & kPairs;
+    const std::uint32_t inside = sides & kPairs, above = sides >> 1 & kPairs, below = kPairs & ~(inside | above);
+    const std::uint32_t alpha = centre == Side::below ? inside | above : below, beta = centre == Side::above ? inside | below : above;
+    return (alpha & exists) | (beta & exists) << 1;
+  }
+
   // How many cuts there are on the subdivision edges if the centre lies there, and how many of them are the first of their surface.
   struct CutCount {
     int all = 0, first = 0;

@@ -57,13 +57,7 @@ Vertex position_of_key(SupercubeKey key) {
   return {gather(morton), gather(morton >> 1), gather(morton >> 2)};
 }
 
-Vertex centre_of(SupercubeKey key, int slot) {
-  const int scale = scale_of_key(key);
-  const Vertex p = position_of_key(key);
-  const unsigned type = kTypeOfSlot[slot];
-  const auto coordinate = [scale](std::int32_t high, unsigned low) { return std::int32_t((std::uint32_t(high) << 2 | (low & 3)) << scale); };
-  return {coordinate(p.x, type), coordinate(p.y, type >> 2), coordinate(p.z, type >> 4)};
-}
+Vertex centre_of(SupercubeKey key, int slot) { return centre_of(scale_of_key(key), position_of_key(key), slot); }
 
 SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy) : occupancy_(std::move(occupancy)) {
   assert(keys.size() == occupancy_.size() && "one word for each supercube");

@@ -28,6 +28,11 @@ using SupercubeKey = std::uint64_t;
 [[nodiscard]] inline int scale_of_key(SupercubeKey key) { return kMaxLevels - int(key >> 57); }
 [[nodiscard]] Vertex position_of_key(SupercubeKey key);
 [[nodiscard]] Vertex centre_of(SupercubeKey key, int slot);
+[[nodiscard]] inline Vertex centre_of(int scale, Vertex position, int slot) {
+  const unsigned type = kTypeOfSlot[slot];
+  const auto coordinate = [scale](std::int32_t high, unsigned low) { return std::int32_t((std::uint32_t(high) << 2 | (low & 3)) << scale); };
+  return {coordinate(position.x, type), coordinate(position.y, type >> 2), coordinate(position.z, type >> 4)};
+}
 
 // Number of a diamond in a set.
 using UpdateIndex = std::uint32_t;

@@ -120,6 +120,11 @@ TetCases::TetCases() : entries_(kTetOrders * 256) {
       tets_.insert(tets_.end(), tets.begin(), tets.end());
     }
   }
+  for (unsigned sides = 0; sides < 256; ++sides) {
+    unsigned there = 0;
+    for (int i = 0; i < 4; ++i) there |= 1u << (sides >> (2 * i) & 3);
+    counts_[sides] = std::uint8_t(there == 7 ? kDepends : count(0, sides));
+  }
 }
 
 const TetCases& tet_cases() {

@@ -48,12 +48,18 @@ class TetCases {
   }
   [[nodiscard]] unsigned count(int order, unsigned sides) const { return entries_[order * 256 + sides].count; }
 
+  // How many there are whatever the order, vertices taken in any order too; kDepends for a tetrahedron with vertices below, inside and above in which
+  // that depends on it.
+  static constexpr unsigned kDepends = 255;
+  [[nodiscard]] unsigned count(unsigned sides) const { return counts_[sides]; }
+
  private:
   struct Entry {
     std::uint16_t first = 0, count = 0;
   };
   std::vector<Entry> entries_;
   std::vector<std::array<PatchCorner, 4>> tets_;
+  std::array<std::uint8_t, 256> counts_{};
 };
 
 // The table, made at first use.

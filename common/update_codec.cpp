@@ -1,6 +1,7 @@
 #include "common/update_codec.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/planes.h"
 #include "common/update.h"
@@ -105,18 +106,19 @@ Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, s
   const char* wrong = nullptr;
   std::size_t next = 0;
   std::span<const std::uint8_t> firsts(*first), others(*other);
+  Front::Cursor cursor(front);
+  SupercubeKey at = 0;
   for_each_update(*groups, [&](const BatchGroup& g, int slot) {
-    const Vertex c = centre_of(g.key, slot);
-    const auto handle = front.find(c);
+    if (std::exchange(at, g.key) != g.key) cursor.move_to(g.key);
+    const DiamondContext* const context = cursor.look(slot);
     const unsigned side_difference = pair_at(*sides, next++);
-    if (!handle || side_difference > 2) {
+    if (context == nullptr || !cursor.can_be_split() || side_difference > 2) {
       wrong = "it splits a diamond that cannot be split now";
       return false;
     }
-    const DiamondContext context = front.context(*handle);
-    Prediction prediction(context);
+    Prediction prediction(*context);
     const Side side = Side((unsigned(prediction.side()) + side_difference) % 3);
-    const auto count = context.count_cuts(side);
+    const auto count = context->count_cuts(side);
     const auto first_count = std::size_t(count.first), other_count = std::size_t(count.all - count.first);
     if (first_count > firsts.size() || other_count > others.size()) {
       wrong = "it has fewer coefficients than its updates call for";
@@ -127,9 +129,9 @@ Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, s
     firsts = firsts.subspan(first_count);
     others = others.subspan(other_count);
     prediction.decode(side, std::span(differences).first(std::size_t(count.all)), cuts.data());
-    const Cuts spine = front.split(*handle, side, std::span(cuts).first(std::size_t(count.all)));
+    cursor.split(side, std::span(cuts).first(std::size_t(count.all)));
     if (max_tets && front.tet_count() > *max_tets) {
-      front.merge(c, spine);
+      front.merge(cursor.diamond().centre);
       applied.over_budget = true;
       return false;
     }

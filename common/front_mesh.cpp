@@ -1,0 +1,326 @@
+// The mesh of a front: the halves that split diamonds leave to children that are not split, each cut into its patch.
+//
+// Which points it has is known before its tetrahedra: a cut is one as long as its edge is, which is until the diamond is split whose spine that is;
+// and a centre inside the range stays one. Only on the far faces of a box that clamps (domain.h), where edges can be one edge or none, do the
+// tetrahedra themselves have to say.
+#include <algorithm>
+#include <memory>
+
+#include "common/front.h"
+#include "common/tet_cases.h"
+
+namespace intervale {
+namespace {
+
+// The mesh points around one diamond: those of its vertices, then each edge's cut by alpha and by beta.
+constexpr int kCutsFrom = kMaxVertices + 1;
+using PointsAround = std::array<std::uint32_t, kCutsFrom + 2 * (kMaxEdges + kMaxVertices)>;
+
+// Where among the points around a diamond the corners of a tetrahedron's patch are.
+using Corners = std::array<std::uint8_t, kPatchCorners>;
+
+Corners corners_of(const TetShape& s) {
+  Corners corners;
+  for (int c = 0; c < kPatchCorners; ++c) corners[c] = c < 4 ? s.vertex[c] : std::uint8_t(kCutsFrom + 2 * s.edge[(c - 4) / 2] + (c & 1));
+  return corners;
+}
+
+// Of the halves of all types' tetrahedra.
+using HalfCorners = std::array<std::array<std::array<Corners, 2>, kMaxTets>, kSlots>;
+
+const HalfCorners& half_corners() {
+  static const std::unique_ptr<const HalfCorners> table = [] {
+    auto made = std::make_unique<HalfCorners>();
+    for (int slot = 0; slot < kSlots; ++slot) {
+      const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+      for (int t = 0; t < row.tets; ++t) {
+        for (int end = 0; end < 2; ++end) (*made)[slot][t][end] = corners_of(row.half_shape[t][end]);
+      }
+    }
+    return made;
+  }();
+  return *table;
+}
+
+}  // namespace
+
+class FrontMesh {
+ public:
+  FrontMesh(const Front& front, const ParallelFor& parallel)
+      : front_(front), parallel_(parallel), pieces_((front.blocks_.size() + kPiece - 1) / kPiece), used_(front.q_.size()), number_(front.q_.size()) {}
+
+  Mesh make() {
+    parallel_(pieces_, [this](std::size_t piece) { use_edges(piece); });
+    parallel_(pieces_, [this](std::size_t piece) { drop_spines(piece); });
+    if (!front_.domain_.is_whole()) use_border();
+    std::uint32_t points = 0;
+    for (std::size_t i = 0; i < used_.size(); ++i) {
+      number_[i] = points;
+      points += used_[i];
+    }
+    for (const auto& [point, same] : same_) number_[point] = number_[same];
+
+    Mesh mesh;
+    mesh.points.resize(points);
+    mesh.surface.resize(points);
+    mesh.tets.resize(front_.tet_count());
+    std::vector<std::vector<Tet>> tets(pieces_);
+    std::vector<std::size_t> first(pieces_);
+    parallel_(pieces_, [&](std::size_t piece) {
+      emit_piece(piece, number_, tets[piece]);
+      for_each_point(piece, [&](std::uint32_t point, const Position& p, Surface surface, bool) {
+        if (!used_[point]) return;
+        const std::uint32_t n = number_[point];
+        for (int i = 0; i < 3; ++i) mesh.points[n][i] = front_.grid_.origin[i] + front_.grid_.spacing[i] * p[i] / kSteps;
+        mesh.surface[n] = surface;
+      });
+    });
+    std::size_t count = 0;
+    for (std::size_t piece = 0; piece < pieces_; ++piece) {
+      first[piece] = count;
+      count += tets[piece].size();
+    }
+    parallel_(pieces_, [&](std::size_t piece) {
+      std::copy(tets[piece].begin(), tets[piece].end(), mesh.tets.begin() + std::ptrdiff_t(first[piece]));
+      tets[piece] = {};
+    });
+    return mesh;
+  }
+
+ private:
+  using Tet = std::array<std::uint32_t, 4>;
+  using Position = std::array<std::int32_t, 3>;  // in 1 / kSteps of a sample: every cut of every edge is whole there
+  static constexpr std::int32_t kSteps = 512;
+  static constexpr std::size_t kPiece = 64;  // supercubes
+
+  // Calls visit(block) for the supercubes of a piece.
+  template <class Visit>
+  void for_each_block(std::size_t piece, const Visit& visit) const {
+    const std::size_t end = std::min(front_.blocks_.size(), (piece + 1) * kPiece);
+    for (std::size_t b = piece * kPiece; b < end; ++b) visit(front_.blocks_[b]);
+  }
+  // Calls visit(centre, split) for what was split in a piece, and for the domain's corners.
+  template <class Visit>
+  void for_each_split(std::size_t piece, const Visit& visit) const {
+    if (piece == 0) visit(Vertex{}, front_.corner_.of[0]);
+    for_each_block(piece, [&](const Front::Block& block) {
+      for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+        const int slot = std::countr_zero(left);
+        visit(centre_of(block.scale, block.position, slot), block.of[slot]);
+      }
+    });
+  }
+  // Calls visit(point, position, surface, on the border) for the points that those brought.
+  template <class Visit>
+  void for_each_point(std::size_t piece, const Visit& visit) const {
+    for_each_split(piece, [&](Vertex centre, const Front::Split& split) {
+      const Vertex c = front_.domain_.clamp(centre);
+      const bool border = front_.is_border(centre);
+      std::uint32_t point = split.first;
+      for (std::uint32_t left = split.bits & Front::kCutBits; left != 0; left &= left - 1, ++point) {
+        const int bit = std::countr_zero(left);
+        const Vertex end = Diamond(centre).vertex(bit / 2), v = front_.domain_.clamp(end);
+        const std::int32_t t = 2 * front_.q_[point] + 1;
+        visit(point, Position{c.x * kSteps + (v.x - c.x) * t, c.y * kSteps + (v.y - c.y) * t, c.z * kSteps + (v.z - c.z) * t},
+              (bit & 1) == 0 ? Surface::alpha : Surface::beta, border || front_.is_border(end));
+      }
+      if (split.side() == Side::inside) visit(point, Position{c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, border);
+    });
+  }
+
+  // All points that splits brought, but for those on the border.
+  void use_edges(std::size_t piece) {
+    if (front_.domain_.is_whole()) {
+      for_each_split(piece, [&](Vertex, const Front::Split& split) {
+        std::fill(used_.begin() + split.first, used_.begin() + split.centre(), std::uint8_t(1));
+        if (split.side() == Side::inside) used_[split.centre()] = 1;
+      });
+      return;
+    }
+    for_each_point(piece, [&](std::uint32_t point, const Position&, Surface, bool border) { used_[point] = !border; });
+  }
+
+  // Less those on edges that were split.
+  void drop_spines(std::size_t piece) {
+    Front::Cursor cursor(front_);
+    for_each_block(piece, [&](const Front::Block& block) {
+      if (block.scale == front_.domain_.levels()) return;
+      cursor.move_to(block.scale, block.position);
+      for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+        const Links& links = (*cursor.links_)[std::countr_zero(left)];
+        const Links::Edge spine = links.edge[0];
+        const auto found = cursor.at(links.vertex[spine.owner]);
+        const Front::Split& owner = found.block->of[found.slot];
+        const int bit = 2 * spine.other;
+        for (std::uint32_t n = 0; n < std::uint32_t(std::popcount(owner.bits >> bit & 3)); ++n) used_[owner.cut(bit) + n] = 0;
+      }
+    });
+  }
+
+  // Points of the border: those that tetrahedra use, and of those at one place the first for all.
+  void use_border() {
+    std::vector<std::uint32_t> itself(used_.size());
+    for (std::size_t i = 0; i < itself.size(); ++i) itself[i] = std::uint32_t(i);
+    std::vector<Tet> tets;
+    for (std::size_t piece = 0; piece < pieces_; ++piece) {
+      Front::Cursor cursor(front_);
+      for_each_block(piece, [&](const Front::Block& block) {
+        const std::int32_t reach = 4 << block.scale;
+        const Vertex p = block.position;
+        if (!front_.is_border({(p.x + 1) * reach, (p.y + 1) * reach, (p.z + 1) * reach})) return;
+        tets.clear();
+        emit_block(cursor, block, itself, tets);
+        for (const Tet& tet : tets) {
+          for (std::uint32_t point : tet) used_[point] = 1;
+        }
+      });
+    }
+    struct Key {
+      Position position;
+      Surface surface;
+      bool operator==(const Key&) const = default;
+    };
+    struct Hash {
+      std::size_t operator()(const Key& k) const {
+        std::uint64_t h = std::uint64_t(k.surface);
+        for (const std::int32_t c : k.position) h = (h ^ std::uint32_t(c)) * 0x9e3779b97f4a7c15u;
+        return std::size_t(h ^ h >> 32);
+      }
+    };
+    boost::unordered_flat_map<Key, std::uint32_t, Hash> there;
+    for (std::size_t piece = 0; piece < pieces_; ++piece) {
+      for_each_point(piece, [&](std::uint32_t point, const Position& p, Surface surface, bool border) {
+        if (!border || !used_[point]) return;
+        const auto [place, is_new] = there.try_emplace(Key{p, surface}, point);
+        if (is_new) return;
+        used_[point] = 0;
+        same_.emplace_back(point, place->second);
+      });
+    }
+  }
+
+  void emit_piece(std::size_t piece, const std::vector<std::uint32_t>& names, std::vector<Tet>& out) const {
+    Front::Cursor cursor(front_);
+    for_each_block(piece, [&](const Front::Block& block) { emit_block(cursor, block, names, out); });
+  }
+
+  // The tetrahedra that splits in this supercube left, their points by name.
+  void emit_block(Front::Cursor& cursor, const Front::Block& block, const std::vector<std::uint32_t>& names, std::vector<Tet>& out) const {
+    if (block.scale == front_.domain_.levels()) {  // the corners: the mesh is the root's if that is not split
+      emit_root(names, out);
+      return;
+    }
+    if (block.split == 0) return;
+    cursor.move_to(block.scale, block.position);
+    for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+      const int slot = std::countr_zero(left);
+      const unsigned children = unsplit_children(cursor, slot);
+      if (children != 0 && cursor.gather(slot)) emit_halves(cursor, block.of[slot], children, names, out);
+    }
+  }
+
+  void emit_root(const std::vector<std::uint32_t>& names, std::vector<Tet>& out) const {
+    const Diamond root(front_.domain_.root());
+    Front::Cursor cursor(front_);
+    cursor.move_to(root.scale, {});
+    if (!cursor.gather(kSlotOfType[root.type]) || cursor.is_split()) return;
+    PointsAround points;
+    gather_points(cursor, names, points);
+    for (int t = 0; t < root.row->tets; ++t) {
+      if (!(cursor.existing_.tets >> t & 1)) continue;
+      const TetShape shape = front_.shape(root, cursor.existing_, t);
+      emit(shape, corners_of(shape), cursor.context_.sides, points, out);
+    }
+  }
+
+  // A bit for each child that is not split.
+  [[nodiscard]] unsigned unsplit_children(Front::Cursor& cursor, int slot) const {
+    const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+    unsigned unsplit = 0;
+    if (row.cls < 2) {
+      const Links& links = (*cursor.links_)[slot];
+      for (int k = 0; k < row.children; ++k) {
+        const auto found = cursor.at(links.child[k]);
+        unsplit |= unsigned(~found.block->split >> found.slot & 1) << k;
+      }
+      return unsplit;
+    }
+    if (cursor.scale_ == 0) return (1u << row.children) - 1;
+    const Diamond d(centre_of(cursor.scale_, cursor.position_, slot));
+    for (int k = 0; k < row.children; ++k) {
+      const Diamond child(d.child(k));
+      const int up = child.scale + 2;
+      const Vertex p{child.centre.x >> up, child.centre.y >> up, child.centre.z >> up};
+      const Front::Block* const block = (p.x | p.y | p.z) < 0 ? nullptr : front_.find_block(child.scale, p);
+      unsplit |= unsigned(block == nullptr || !(block->split >> kSlotOfType[child.type] & 1)) << k;
+    }
+    return unsplit;
+  }
+
+  static void gather_points(const Front::Cursor& cursor, const std::vector<std::uint32_t>& names, PointsAround& points) {
+    const DiamondType& row = *cursor.context_.row;
+    const Links& links = (*cursor.links_)[cursor.slot_];
+    for (int v = 0; v < row.vertices; ++v) {
+      if (cursor.context_.has(v) && cursor.context_.side(v) == Side::inside) points[v] = names[cursor.split_[v].centre()];
+    }
+    for (int e = 0; e < row.edges; ++e) {
+      if (!(cursor.existing_.edges >> e & 1)) continue;
+      const Links::Edge edge = links.edge[e];
+      const Front::Split& owner = cursor.split_[edge.owner];
+      const unsigned two = owner.bits >> (2 * edge.other) & 3;
+      if (two == 0) continue;
+      std::uint32_t point = owner.cut(2 * edge.other);
+      if (two & 1) points[kCutsFrom + 2 * e] = names[point++];
+      if (two & 2) points[kCutsFrom + 2 * e + 1] = names[point];
+    }
+  }
+
+  void emit_halves(const Front::Cursor& cursor, const Front::Split& split, unsigned children, const std::vector<std::uint32_t>& names,
+                   std::vector<Tet>& out) const {
+    const DiamondType& row = *cursor.context_.row;
+    const std::uint32_t sides = cursor.context_.sides | std::uint32_t(split.side()) << (2 * kCentre);
+    PointsAround points;
+    gather_points(cursor, names, points);
+    std::uint32_t point = split.first;
+    for (std::uint32_t left = split.bits & Front::kCutBits; left != 0; left &= left - 1) {
+      points[kCutsFrom + 2 * kSubdivision + std::countr_zero(left)] = names[point++];
+    }
+    if (split.side() == Side::inside) points[kCentre] = names[point];
+    const auto& corners = half_corners_[cursor.slot_];
+    for (; children != 0; children &= children - 1) {
+      for (const Duet::Half& half : row.child[std::countr_zero(children)].half) {
+        if (!cursor.existing_.straddles) {
+          emit(row.half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points, out);
+        } else if ((cursor.existing_.tets >> half.tet & 1) && front_.half_exists(*cursor.diamond_, half.tet, half.end)) {
+          const TetShape shape = front_.half_shape(*cursor.diamond_, cursor.existing_, half.tet, half.end);
+          emit(shape, corners_of(shape), sides, points, out);
+        }
+      }
+    }
+  }
+
+  // The patch of one tetrahedron.
+  void emit(const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points, std::vector<Tet>& out) const {
+    const auto tets = cases_.tets(shape.order, shape_sides(shape, sides));
+    if (tets.empty()) return;
+    const int second = shape.flip ? 3 : 2, third = shape.flip ? 2 : 3;
+    const std::size_t from = out.size();
+    out.resize(from + tets.size());
+    Tet* to = out.data() + from;
+    for (const auto& tet : tets)
+      *to++ = {points[corners[tet[0]]], points[corners[tet[1]]], points[corners[tet[second]]], points[corners[tet[third]]]};
+  }
+
+  const Front& front_;
+  const ParallelFor& parallel_;
+  const TetCases& cases_ = tet_cases();
+  const HalfCorners& half_corners_ = half_corners();
+  std::size_t pieces_;
+  std::vector<std::uint8_t> used_;                             // by point: 1 for those of the mesh
+  std::vector<std::uint32_t> number_;                          // in the mesh, by point
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> same_;  // points that are the same as an earlier one
+};
+
+Mesh Front::mesh(const ParallelFor& parallel) const { return FrontMesh(*this, parallel).make(); }
+
+}  // namespace intervale

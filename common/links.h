@@ -1,0 +1,45 @@
+// Where the vertices, edges and children of a supercube's diamonds are kept, by one table.
+//
+// Every vertex of a diamond is itself the centre of a diamond that was split before (or a corner of the domain), and every edge came into being when
+// the younger of its ends was inserted: it is one of that diamond's subdivision edges. So all that a diamond must know of its surroundings is found
+// in its vertices' updates, and where those are follows from the diamond's slot and the parity of its supercube's position: in one of the 27
+// supercubes around its own, in one of 8 of the next coarser scale, or, for a vertex that is 0 modulo 4h, at one of the 8 corners of the supercube.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "common/diamond.h"
+#include "common/supercube.h"
+
+namespace intervale {
+
+// Where something is kept, seen from a supercube at position P, of cells 4h wide.
+//   kSame + (x + 1) + 3 (y + 1) + 9 (z + 1): the supercube at P + (x, y, z), of the same scale; x, y, z in {-1, 0, 1}
+//   kCoarser + x + 2 y + 4 z:                the one at P / 2 + (x, y, z), of the next coarser scale; x, y, z in {0, 1}
+//   kCorner + x + 2 y + 4 z:                 the grid vertex at 4h (P + (x, y, z)), wherever that is
+inline constexpr int kSame = 0, kCoarser = 27, kCorner = 35, kWheres = 43;
+inline constexpr int kHere = 13;  // the supercube itself
+
+struct Link {
+  std::uint8_t where = 0;
+  std::uint8_t slot = 0;  // in that supercube; 0 and without meaning for a corner
+};
+
+// The surroundings of the diamond in one slot.
+struct Links {
+  std::array<Link, kMaxVertices> vertex{};  // by local vertex
+  struct Edge {
+    std::uint8_t owner = 0;  // local number of the younger end
+    std::uint8_t other = 0;  // what the older end is to the owner's diamond: its local number there
+    std::uint8_t flip = 0;   // 255 if the edge's first end is the older one, so that places of cuts want turning round; else 0
+  };
+  std::array<Edge, kMaxEdges> edge{};  // by local edge
+  std::array<Link, 6> child{};         // by number of the child; class 0 and 1 only: the children of class 2 are a scale finer
+};
+
+// Row for a slot of a supercube whose position has the parities p = (x & 1) + 2 (y & 1) + 4 (z & 1). The table is made at first use.
+using LinkTable = std::array<std::array<Links, kSlots>, 8>;
+[[nodiscard]] const LinkTable& link_table();
+
+}  // namespace intervale
