@@ -119,12 +119,6 @@ constexpr DiamondType around(unsigned type) {
   t.vertices = std::uint8_t(n);
   t.belt = t.tets = std::uint8_t(n - 2);
   t.edges = std::uint8_t(1 + 3 * t.belt);
-  for (int e = 0; e < t.edges; ++e) {
-    const auto ends = edge_ends(e, t.belt);
-    const Int3 d = minus(int3(t.vertex[ends[1]]), int3(t.vertex[ends[0]]));
-    const int axis = d[0] != 0 ? 0 : d[1] != 0 ? 1 : 2;
-    t.edge_step[e] = {std::uint8_t(axis), std::int8_t(d[axis])};
-  }
   return t;
 }
 
@@ -135,26 +129,8 @@ constexpr Int3 position(const DiamondType& t, int local) {
   return {2 * v[0], 2 * v[1], 2 * v[2]};
 }
 
-constexpr int find_vertex(const DiamondType& t, const Int3& unit) {
-  for (int i = 0; i < t.vertices; ++i) {
-    if (int3(t.vertex[i]) == unit) return i;
-  }
-  return -1;
-}
-
-// The type of a child at `unit` from a centre of this type: in units of h (same scale), or of h / 2 (one scale finer) for class 2.
-constexpr unsigned child_type(unsigned type, int cls, const Int3& unit) {
-  unsigned r = 0;
-  for (int i = 0; i < 3; ++i) {
-    const int c = int(type >> (2 * i) & 3);
-    r |= unsigned((cls == 2 ? 2 * c : c) + unit[i] + 8) % 4 << (2 * i);
-  }
-  return r;
-}
-
 // Adds the half of tetrahedron `tet` that keeps spine end `end` to the duet of the child it belongs to.
-constexpr void hand_down(std::array<DiamondType, 64>& all, unsigned type, int tet, int end, std::array<int, kMaxChildren>& halves, int& children) {
-  DiamondType& t = all[type];
+constexpr void hand_down(DiamondType& t, int tet, int end, std::array<int, kMaxChildren>& halves, int& children) {
   std::array<std::uint8_t, 4> local = t.tet(tet);
   local[1 - end] = kCentre;
   // The child's spine is the half's longest edge.
@@ -173,44 +149,7 @@ constexpr void hand_down(std::array<DiamondType, 64>& all, unsigned type, int te
   if (k == children) ++children;
   Duet& duet = t.child[k];
   duet.child = offset(centre);
-  duet.child_type = std::uint8_t(child_type(type, t.cls, centre));
-  const DiamondType& c = all[duet.child_type];
-  Duet::Half& half = duet.half[halves[k]++];
-  half.tet = std::uint8_t(tet);
-  half.end = std::uint8_t(end);
-  half.vertex_from = local;
-  for (int i = 0; i < 4; ++i) {
-    const Int3 p = position(t, local[i]);
-    half.vertex_to[i] = std::uint8_t(find_vertex(c, {p[0] / unit - centre[0], p[1] / unit - centre[1], p[2] / unit - centre[2]}));
-  }
-  int e = 0;
-  for (int i = 0; i < 4; ++i) {
-    for (int j = i + 1; j < 4; ++j, ++e) {
-      half.edge_from[e] = std::uint8_t(edge_between(local[i], local[j], t.belt));
-      half.edge_to[e] = std::uint8_t(edge_between(half.vertex_to[i], half.vertex_to[j], c.belt));
-    }
-  }
-  // The child's tetrahedron is the one between its two belt vertices.
-  int lo = 255, hi = 0;
-  for (int v : half.vertex_to) {
-    if (v > 1 && v < lo) lo = v;
-    if (v > hi) hi = v;
-  }
-  half.child_tet = std::uint8_t(hi - lo == 1 ? lo - 2 : hi - 2);
-}
-
-template <std::size_t N>
-constexpr void unite(const Duet& d, std::array<std::uint8_t, N>& from, std::array<std::uint8_t, N>& to, const auto& from_of, const auto& to_of) {
-  std::size_t n = 0;
-  for (const auto& half : d.half) {
-    for (std::size_t i = 0; i < from_of(half).size(); ++i) {
-      bool known = false;
-      for (std::size_t j = 0; j < n; ++j) known = known || to[j] == to_of(half)[i];
-      if (known) continue;
-      from[n] = from_of(half)[i];
-      to[n++] = to_of(half)[i];
-    }
-  }
+  duet.half[halves[k]++] = {std::uint8_t(tet), std::uint8_t(end)};
 }
 
 constexpr std::array<DiamondType, 64> generate() {
@@ -223,7 +162,7 @@ constexpr std::array<DiamondType, 64> generate() {
     int children = 0;
     for (int i = 0; i < t.tets; ++i) {
       for (int end = 0; end < 2; ++end) {
-        hand_down(all, type, i, end, halves, children);
+        hand_down(t, i, end, halves, children);
         std::array<std::uint8_t, 4> local = t.tet(i);
         local[1 - end] = kCentre;
         t.half_shape[i][end] =
@@ -231,13 +170,6 @@ constexpr std::array<DiamondType, 64> generate() {
       }
       const auto local = t.tet(i);
       t.shape[i] = shape<int>({position(t, local[0]), position(t, local[1]), position(t, local[2]), position(t, local[3])}, local, t.belt);
-    }
-    for (int k = 0; k < children; ++k) {
-      Duet& d = t.child[k];
-      unite(
-          d, d.vertex_from, d.vertex_to, [](const auto& h) { return h.vertex_from; }, [](const auto& h) { return h.vertex_to; });
-      unite(
-          d, d.edge_from, d.edge_to, [](const auto& h) { return h.edge_from; }, [](const auto& h) { return h.edge_to; });
     }
   }
   return all;

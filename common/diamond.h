@@ -30,12 +30,6 @@ struct Offset {
 // c + h * f
 [[nodiscard]] constexpr Vertex at(Vertex c, Offset f, std::int32_t h) { return {c.x + f.x * h, c.y + f.y * h, c.z + f.z * h}; }
 
-// A diamond's name: its centre in 63 bits. Centres with coordinates in [0, 2^20] only.
-enum class DiamondId : std::uint64_t {};
-[[nodiscard]] constexpr DiamondId id_of(Vertex c) {
-  return DiamondId{std::uint64_t(std::uint32_t(c.x)) | std::uint64_t(std::uint32_t(c.y)) << 21 | std::uint64_t(std::uint32_t(c.z)) << 42};
-}
-
 // Fewest trailing zero bits of a coordinate. N or more for a corner, which is no diamond's centre; undefined for (0, 0, 0).
 [[nodiscard]] constexpr int scale_of(Vertex c) { return std::countr_zero(std::uint32_t(c.x | c.y | c.z)); }
 
@@ -59,27 +53,15 @@ struct TetShape {
   bool flip = false;                     // whether those four, so ordered, are negatively oriented
 };
 
-// What splitting a diamond hands to one child: one or, inside the domain, two tetrahedra that share the child's spine and the parent's centre
-// (paper, figure 5). 5 vertices and 9 edges in all.
+// What splitting a diamond leaves to one child: one or, inside the domain, two tetrahedra that share the child's spine and the parent's centre
+// (paper, figure 5).
 struct Duet {
   Offset child;  // from the parent's centre; in units of h, or of h / 2 for a parent of class 2
-  std::uint8_t child_type = 0;
   struct Half {
-    std::uint8_t tet = 0;                                    // of the parent: the one that is halved
-    std::uint8_t end = 0;                                    // the spine's end that stays, 0 or 1; the other one gives way to the centre
-    std::uint8_t child_tet = 0;                              // of the child: what it is there
-    std::array<std::uint8_t, 4> vertex_from{}, vertex_to{};  // local vertices of the parent, and of the child
-    std::array<std::uint8_t, 6> edge_from{}, edge_to{};      // local edges of the parent, and of the child
+    std::uint8_t tet = 0;  // the tetrahedron that is halved
+    std::uint8_t end = 0;  // the spine's end that stays, 0 or 1; the other one gives way to the centre
   };
   std::array<Half, 2> half{};
-  std::array<std::uint8_t, 5> vertex_from{}, vertex_to{};  // the two halves together
-  std::array<std::uint8_t, 9> edge_from{}, edge_to{};
-};
-
-// The first axis on which an edge's ends differ, and by how much, second end minus first, in units of h.
-struct EdgeStep {
-  std::uint8_t axis = 0;
-  std::int8_t step = 0;  // -2, -1, 1 or 2
 };
 
 struct DiamondType {
@@ -88,7 +70,6 @@ struct DiamondType {
   std::array<Offset, kMaxVertices> vertex{};  // units of h
   std::array<Offset, kMaxParents> parent{};   // units of h
   std::array<Duet, kMaxChildren> child{};
-  std::array<EdgeStep, kMaxEdges> edge_step{};                            // of each edge, along edge_ends
   std::array<TetShape, kMaxTets> shape{};                                 // of each tetrahedron
   std::array<std::array<TetShape, 2>, kMaxTets> half_shape{};             // of its two halves: [tet][end that stays]
   [[nodiscard]] constexpr std::array<std::uint8_t, 4> tet(int i) const {  // local vertices

@@ -16,12 +16,10 @@ tl::unexpected<Error> misfit(Vertex c) {
 
 // The chosen updates as slots of each supercube.
 std::vector<std::uint64_t> slots_of(const SupercubeSet& set, const SplitSet& chosen) {
-  std::vector<std::uint64_t> slots(set.supercubes());
-  UpdateIndex i = 0;
-  for (std::size_t s = 0; s < slots.size(); ++s) {
-    for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
-      if (chosen.contains(i)) slots[s] |= left & (~left + 1);
-    }
+  std::vector<std::uint64_t> slots;
+  slots.reserve(set.supercubes());
+  for (std::uint32_t brick = 0; brick < set.bricks().size(); ++brick) {
+    set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey) { slots.push_back(chosen.slots(set, brick, s)); });
   }
   return slots;
 }

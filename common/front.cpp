@@ -79,20 +79,21 @@ std::optional<Front::Handle> Front::find(Vertex centre) const {
   Cursor cursor(*this);
   cursor.move_to(d.scale, position);
   const int slot = kSlotOfType[d.type];
-  if (cursor.look(slot) == nullptr || !cursor.can_be_split()) return {};
+  if (!cursor.find(slot)) return {};
   return Handle{supercube_key(d.scale, position), slot};
 }
 
 DiamondContext Front::context(Handle handle) const {
   Cursor cursor(*this);
   cursor.move_to(handle.supercube);
-  return *cursor.look(handle.slot);
+  cursor.gather(handle.slot);
+  return cursor.look_closer();
 }
 
 void Front::split(Handle handle, Side side, std::span<const std::uint8_t> cuts) {
   Cursor cursor(*this);
   cursor.move_to(handle.supercube);
-  cursor.look(handle.slot);
+  cursor.gather(handle.slot);
   cursor.split(side, cuts);
 }
 
@@ -114,9 +115,9 @@ bool Front::merge(Vertex centre) {
   }
   Cursor cursor(*this);
   cursor.move_to(d.scale, found->position);
-  const DiamondContext* const context = cursor.look(slot);
-  assert(context != nullptr && "the ancestors of a split diamond are split");
-  const std::uint32_t sides = context->sides | std::uint32_t(found->of[slot].side()) << (2 * kCentre);
+  [[maybe_unused]] const bool is_there = cursor.gather(slot);
+  assert(is_there && "the ancestors of a split diamond are split");
+  const std::uint32_t sides = cursor.context().sides | std::uint32_t(found->of[slot].side()) << (2 * kCentre);
   tet_count_ += count_tets(d, e, sides) - count_halves(d, e, sides);
   const_cast<Block*>(found)->split &= ~(std::uint64_t(1) << slot);
   --split_count_;
@@ -212,23 +213,16 @@ void Front::Cursor::move_to(int scale, Vertex position) {
   position_ = position;
   near_.fill(nullptr);
   links_ = &link_table()[unsigned(position.x & 1) | unsigned(position.y & 1) << 1 | unsigned(position.z & 1) << 2];
-  // A diamond reaches h beyond its centre, which is 0 to 3 h from the supercube's corner.
-  const std::int32_t h = 1 << scale;
-  const auto corner = [&](std::int32_t cells, std::int32_t more) { return std::int32_t(cells * 4 + more) * h; };
-  interior_ = front_.domain_.contains({corner(position.x, -1), corner(position.y, -1), corner(position.z, -1)}) &&
-              front_.domain_.contains({corner(position.x, 4), corner(position.y, 4), corner(position.z, 4)});
+  interior_ = is_interior(front_.domain_, scale, position);
 }
 
 Front::Cursor::Found Front::Cursor::resolve(std::uint8_t where) {
   static const Block nothing{};
   const Vertex p = position_;
   const Block* found = nullptr;
-  if (where < kCoarser) {
-    const Vertex q{p.x + where % 3 - 1, p.y + where / 3 % 3 - 1, p.z + where / 9 - 1};
-    if ((q.x | q.y | q.z) >= 0) found = front_.find_block(scale_, q);
-  } else if (where < kCorner) {
-    const int w = where - kCoarser;
-    found = front_.find_block(scale_ + 1, {(p.x >> 1) + (w & 1), (p.y >> 1) + (w >> 1 & 1), (p.z >> 1) + (w >> 2)});
+  if (where < kCorner) {
+    const SupercubePlace there = supercube_at(where, scale_, p);
+    if ((there.position.x | there.position.y | there.position.z) >= 0) found = front_.find_block(there.scale, there.position);
   } else {
     const int w = where - kCorner;
     const Vertex v{(p.x + (w & 1)) << (scale_ + 2), (p.y + (w >> 1 & 1)) << (scale_ + 2), (p.z + (w >> 2)) << (scale_ + 2)};
@@ -274,10 +268,21 @@ bool Front::Cursor::gather(int slot) {
   return true;
 }
 
-const DiamondContext* Front::Cursor::look(int slot) {
-  if (!gather(slot)) return nullptr;
-  const DiamondType& row = *context_.row;
+// A quick no for most of those that are not ready.
+bool Front::Cursor::parents_are_split(int slot) {
+  if (!interior_) return true;  // some parents may not exist: gather() tells
   const Links& links = (*links_)[slot];
+  const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+  for (int k = 0; k < row.parents; ++k) {
+    const Found parent = at(links.vertex[links.parent[k]]);
+    if (!(parent.block->split >> parent.slot & 1)) return false;
+  }
+  return true;
+}
+
+const DiamondContext& Front::Cursor::look_closer() {
+  const DiamondType& row = *context_.row;
+  const Links& links = (*links_)[slot_];
   for (int e = 0; e < row.edges; ++e) {
     auto& cut = context_.cut[e];
     cut = {0, 0};
@@ -291,13 +296,10 @@ const DiamondContext* Front::Cursor::look(int slot) {
     if (two & 1) cut[0] = std::uint16_t(2 * (*q++ ^ edge.flip) + 1);
     if (two & 2) cut[1] = std::uint16_t(2 * (*q ^ edge.flip) + 1);
   }
-  return &context_;
+  return context_;
 }
 
-bool Front::Cursor::is_split() const {
-  const Block* const here = near_[kHere] != nullptr ? near_[kHere] : const_cast<Cursor*>(this)->resolve(kHere).block;
-  return (here->split >> slot_ & 1) != 0;
-}
+std::uint64_t Front::Cursor::split_slots() { return at({kHere, 0}).block->split; }
 
 // Writes the diamond's split to where there is room for it. Returns how many more tetrahedra there are.
 std::int64_t Front::Cursor::write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first) {

@@ -133,16 +133,20 @@ class Front::Cursor {
   void move_to(SupercubeKey supercube) { move_to(scale_of_key(supercube), position_of_key(supercube)); }
   void move_to(int scale, Vertex position);  // position: a diamond's centre >> (scale + 2)
 
-  // Gathers what a diamond knows: nothing if it has no tetrahedra, or not all of them are in the mesh or were there before its split. Valid until the
-  // next call.
-  const DiamondContext* look(int slot);
+  // Finds a diamond that has tetrahedra and was or is in the mesh with all of them. False if there is none in this slot.
+  bool gather(int slot);
+  // ... that can be split now.
+  bool find(int slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_idle(); }
 
-  // Of the diamond looked at last.
+  // Of the diamond found last.
   [[nodiscard]] const Diamond& diamond() const { return *diamond_; }
-  [[nodiscard]] bool is_split() const;
-  [[nodiscard]] bool can_be_split() const { return !is_split() && !is_idle(); }
+  [[nodiscard]] const DiamondContext& context() const { return context_; }  // but for its cuts, which are those of any diamond
+  const DiamondContext& look_closer();                                      // with its cuts
+  [[nodiscard]] bool is_split() { return (split_slots() >> slot_ & 1) != 0; }
 
-  // Splits the diamond looked at last, which can_be_split(). As Front::split.
+  [[nodiscard]] std::uint64_t split_slots();  // of this supercube
+
+  // Splits the diamond found last, after a closer look. As Front::split.
   void split(Side side, std::span<const std::uint8_t> cuts);
 
  private:
@@ -153,7 +157,7 @@ class Front::Cursor {
     int slot;
   };
   Found resolve(std::uint8_t where);
-  bool gather(int slot);
+  [[nodiscard]] bool parents_are_split(int slot);
   [[nodiscard]] Found at(Link link) {
     const Block* const block = near_[link.where] != nullptr ? near_[link.where] : resolve(link.where).block;
     return {block, link.where < kCorner ? link.slot : corner_slot_[link.where - kCorner]};
@@ -226,12 +230,11 @@ std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const 
           cursor.move_to(scale, w.block->position);
           for (std::uint64_t left = chosen; left != 0; left &= left - 1) {
             const int slot = std::countr_zero(left);
-            const DiamondContext* const context = cursor.look(slot);
             const Place place = set.place_in(w.brick, w.supercube, w.key, slot);
             const auto n = std::size_t(cut_count(place.index));
-            const bool fits = context != nullptr && !cursor.is_idle();
-            const std::optional<Side> side = fits ? decode(place, *context, q.data()) : std::nullopt;
-            if (!side || std::size_t(context->count_cuts(*side).all) != n) {
+            const bool fits = cursor.gather(slot) && !cursor.is_idle();
+            const std::optional<Side> side = fits ? decode(place, cursor.look_closer(), q.data()) : std::nullopt;
+            if (!side || std::size_t(cursor.context().count_cuts(*side).all) != n) {
               if (!failed.exchange(true)) wrong = centre_of(w.key, slot);
               return;
             }

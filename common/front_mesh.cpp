@@ -63,11 +63,8 @@ class FrontMesh {
     Mesh mesh;
     mesh.points.resize(points);
     mesh.surface.resize(points);
-    mesh.tets.resize(front_.tet_count());
-    std::vector<std::vector<Tet>> tets(pieces_);
-    std::vector<std::size_t> first(pieces_);
+    mesh.tets.reserve(front_.tet_count());
     parallel_(pieces_, [&](std::size_t piece) {
-      emit_piece(piece, number_, tets[piece]);
       for_each_point(piece, [&](std::uint32_t point, const Position& p, Surface surface, bool) {
         if (!used_[point]) return;
         const std::uint32_t n = number_[point];
@@ -75,15 +72,16 @@ class FrontMesh {
         mesh.surface[n] = surface;
       });
     });
-    std::size_t count = 0;
-    for (std::size_t piece = 0; piece < pieces_; ++piece) {
-      first[piece] = count;
-      count += tets[piece].size();
+    // A few pieces at a time: what they make goes to its place while it is still in a cache.
+    std::array<std::vector<Tet>, kPiecesAtOnce> tets;
+    for (std::size_t first = 0; first < pieces_; first += kPiecesAtOnce) {
+      const std::size_t some = std::min(pieces_ - first, kPiecesAtOnce);
+      parallel_(some, [&](std::size_t i) {
+        tets[i].clear();
+        emit_piece(first + i, number_, tets[i]);
+      });
+      for (std::size_t i = 0; i < some; ++i) mesh.tets.insert(mesh.tets.end(), tets[i].begin(), tets[i].end());
     }
-    parallel_(pieces_, [&](std::size_t piece) {
-      std::copy(tets[piece].begin(), tets[piece].end(), mesh.tets.begin() + std::ptrdiff_t(first[piece]));
-      tets[piece] = {};
-    });
     return mesh;
   }
 
@@ -92,6 +90,7 @@ class FrontMesh {
   using Position = std::array<std::int32_t, 3>;  // in 1 / kSteps of a sample: every cut of every edge is whole there
   static constexpr std::int32_t kSteps = 512;
   static constexpr std::size_t kPiece = 64;  // supercubes
+  static constexpr std::size_t kPiecesAtOnce = 16;
 
   // Calls visit(block) for the supercubes of a piece.
   template <class Visit>
@@ -99,45 +98,53 @@ class FrontMesh {
     const std::size_t end = std::min(front_.blocks_.size(), (piece + 1) * kPiece);
     for (std::size_t b = piece * kPiece; b < end; ++b) visit(front_.blocks_[b]);
   }
-  // Calls visit(centre, split) for what was split in a piece, and for the domain's corners.
-  template <class Visit>
-  void for_each_split(std::size_t piece, const Visit& visit) const {
-    if (piece == 0) visit(Vertex{}, front_.corner_.of[0]);
-    for_each_block(piece, [&](const Front::Block& block) {
-      for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
-        const int slot = std::countr_zero(left);
-        visit(centre_of(block.scale, block.position, slot), block.of[slot]);
-      }
-    });
+  // Whether diamonds of this supercube reach the border.
+  [[nodiscard]] bool is_at_border(const Front::Block& block) const {
+    const std::int32_t reach = 4 << block.scale;
+    const Vertex p = block.position;
+    return front_.is_border({(p.x + 1) * reach, (p.y + 1) * reach, (p.z + 1) * reach});
   }
-  // Calls visit(point, position, surface, on the border) for the points that those brought.
+  // Calls visit(point, position, surface, on the border) for the points that splits brought, in a piece or in a supercube. The domain's corners
+  // count as split.
   template <class Visit>
   void for_each_point(std::size_t piece, const Visit& visit) const {
-    for_each_split(piece, [&](Vertex centre, const Front::Split& split) {
-      const Vertex c = front_.domain_.clamp(centre);
-      const bool border = front_.is_border(centre);
-      std::uint32_t point = split.first;
-      for (std::uint32_t left = split.bits & Front::kCutBits; left != 0; left &= left - 1, ++point) {
-        const int bit = std::countr_zero(left);
-        const Vertex end = Diamond(centre).vertex(bit / 2), v = front_.domain_.clamp(end);
-        const std::int32_t t = 2 * front_.q_[point] + 1;
-        visit(point, Position{c.x * kSteps + (v.x - c.x) * t, c.y * kSteps + (v.y - c.y) * t, c.z * kSteps + (v.z - c.z) * t},
-              (bit & 1) == 0 ? Surface::alpha : Surface::beta, border || front_.is_border(end));
-      }
-      if (split.side() == Side::inside) visit(point, Position{c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, border);
-    });
+    if (piece == 0) for_each_point({}, front_.corner_.of[0], visit);
+    for_each_block(piece, [&](const Front::Block& block) { for_each_point(block, visit); });
+  }
+  template <class Visit>
+  void for_each_point(const Front::Block& block, const Visit& visit) const {
+    for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+      const int slot = std::countr_zero(left);
+      for_each_point(centre_of(block.scale, block.position, slot), block.of[slot], visit);
+    }
+  }
+  template <class Visit>
+  void for_each_point(Vertex centre, const Front::Split& split, const Visit& visit) const {
+    const Diamond d(centre);
+    const Vertex c = front_.domain_.clamp(centre);
+    const bool border = front_.is_border(centre);
+    std::uint32_t point = split.first;
+    for (std::uint32_t left = split.bits & Front::kCutBits; left != 0; left &= left - 1, ++point) {
+      const int bit = std::countr_zero(left);
+      const Vertex end = d.vertex(bit / 2), v = front_.domain_.clamp(end);
+      const std::int32_t t = 2 * front_.q_[point] + 1;
+      visit(point, Position{c.x * kSteps + (v.x - c.x) * t, c.y * kSteps + (v.y - c.y) * t, c.z * kSteps + (v.z - c.z) * t},
+            (bit & 1) == 0 ? Surface::alpha : Surface::beta, border || front_.is_border(end));
+    }
+    if (split.side() == Side::inside) visit(point, Position{c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, border);
   }
 
   // All points that splits brought, but for those on the border.
   void use_edges(std::size_t piece) {
-    if (front_.domain_.is_whole()) {
-      for_each_split(piece, [&](Vertex, const Front::Split& split) {
-        std::fill(used_.begin() + split.first, used_.begin() + split.centre(), std::uint8_t(1));
-        if (split.side() == Side::inside) used_[split.centre()] = 1;
-      });
-      return;
-    }
-    for_each_point(piece, [&](std::uint32_t point, const Position&, Surface, bool border) { used_[point] = !border; });
+    const auto use = [this](std::uint32_t point, const Position&, Surface, bool border) { used_[point] = !border; };
+    if (piece == 0) for_each_point({}, front_.corner_.of[0], use);
+    for_each_block(piece, [&](const Front::Block& block) {
+      if (is_at_border(block)) return for_each_point(block, use);
+      for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+        const Front::Split& split = block.of[std::countr_zero(left)];
+        std::fill(used_.begin() + split.first, used_.begin() + split.centre() + (split.side() == Side::inside), std::uint8_t(1));
+      }
+    });
   }
 
   // Less those on edges that were split.
@@ -165,9 +172,7 @@ class FrontMesh {
     for (std::size_t piece = 0; piece < pieces_; ++piece) {
       Front::Cursor cursor(front_);
       for_each_block(piece, [&](const Front::Block& block) {
-        const std::int32_t reach = 4 << block.scale;
-        const Vertex p = block.position;
-        if (!front_.is_border({(p.x + 1) * reach, (p.y + 1) * reach, (p.z + 1) * reach})) return;
+        if (!is_at_border(block)) return;
         tets.clear();
         emit_block(cursor, block, itself, tets);
         for (const Tet& tet : tets) {
@@ -188,13 +193,16 @@ class FrontMesh {
       }
     };
     boost::unordered_flat_map<Key, std::uint32_t, Hash> there;
+    const auto unite = [&](std::uint32_t point, const Position& p, Surface surface, bool border) {
+      if (!border || !used_[point]) return;
+      const auto [place, is_new] = there.try_emplace(Key{p, surface}, point);
+      if (is_new) return;
+      used_[point] = 0;
+      same_.emplace_back(point, place->second);
+    };
     for (std::size_t piece = 0; piece < pieces_; ++piece) {
-      for_each_point(piece, [&](std::uint32_t point, const Position& p, Surface surface, bool border) {
-        if (!border || !used_[point]) return;
-        const auto [place, is_new] = there.try_emplace(Key{p, surface}, point);
-        if (is_new) return;
-        used_[point] = 0;
-        same_.emplace_back(point, place->second);
+      for_each_block(piece, [&](const Front::Block& block) {
+        if (is_at_border(block)) for_each_point(block, unite);
       });
     }
   }

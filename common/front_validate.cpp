@@ -9,9 +9,9 @@ std::optional<std::string> Front::validate() const {
   Cursor cursor(*this);
   const Diamond root(domain_.root());
   cursor.move_to(root.scale, {});
-  const DiamondContext* context = cursor.look(kSlotOfType[root.type]);
-  if (context == nullptr) return "the root is not there";
-  std::uint64_t tets = count_tets(root, existing(root), context->sides);
+  if (!cursor.gather(kSlotOfType[root.type])) return "the root is not there";
+  const DiamondContext& context = cursor.context();
+  std::uint64_t tets = count_tets(root, existing(root), context.sides);
   for (const Block& block : blocks_) {
     if (find_block(block.scale, block.position) != &block) return "a supercube is filed under another's name";
     if (block.scale == domain_.levels()) continue;
@@ -21,13 +21,12 @@ std::optional<std::string> Front::validate() const {
       const Diamond d(centre_of(supercube_key(block.scale, block.position), slot));
       const auto where = " at (" + std::to_string(d.centre.x) + ", " + std::to_string(d.centre.y) + ", " + std::to_string(d.centre.z) + ")";
       const Split& split = block.of[slot];
-      context = cursor.look(slot);
-      if (context == nullptr) return "a diamond is split before its parents" + where;
+      if (!cursor.gather(slot)) return "a diamond is split before its parents" + where;
       if (unsigned(split.side()) > 2) return "a side is none" + where;
-      if ((split.bits & kCutBits) != context->cut_bits(split.side())) return "the cuts do not fit the sides" + where;
+      if ((split.bits & kCutBits) != context.cut_bits(split.side())) return "the cuts do not fit the sides" + where;
       if (std::size_t(split.centre()) + (split.side() == Side::inside ? 1 : 0) > q_.size()) return "a cut has no place" + where;
       const Existing e = existing(d);
-      const std::uint32_t sides = context->sides | std::uint32_t(split.side()) << (2 * kCentre);
+      const std::uint32_t sides = context.sides | std::uint32_t(split.side()) << (2 * kCentre);
       tets += count_halves(d, e, sides) - count_tets(d, e, sides);
       ++splits;
     }

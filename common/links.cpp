@@ -61,6 +61,9 @@ Links links_of(int slot, unsigned parity) {
     assert(local < owner_row.vertices && "every edge is a subdivision edge of its younger end");
     links.edge[e] = {std::uint8_t(owner), std::uint8_t(local), std::uint8_t(edge_ends(e, row.belt)[0] == owner ? 0 : 255)};
   }
+  for (int k = 0; k < row.parents; ++k) {
+    while (row.vertex[links.parent[k]] != row.parent[k]) ++links.parent[k];
+  }
   for (int k = 0; k < row.children && row.cls < 2; ++k) links.child[k] = link_to(near_of(type, row.child[k].child), parity);
   return links;
 }

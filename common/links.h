@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "common/diamond.h"
+#include "common/domain.h"
 #include "common/supercube.h"
 
 namespace intervale {
@@ -28,7 +29,8 @@ struct Link {
 
 // The surroundings of the diamond in one slot.
 struct Links {
-  std::array<Link, kMaxVertices> vertex{};  // by local vertex
+  std::array<Link, kMaxVertices> vertex{};         // by local vertex
+  std::array<std::uint8_t, kMaxParents> parent{};  // local numbers of those vertices that are parents
   struct Edge {
     std::uint8_t owner = 0;  // local number of the younger end
     std::uint8_t other = 0;  // what the older end is to the owner's diamond: its local number there
@@ -37,6 +39,23 @@ struct Links {
   std::array<Edge, kMaxEdges> edge{};  // by local edge
   std::array<Link, 6> child{};         // by number of the child; class 0 and 1 only: the children of class 2 are a scale finer
 };
+
+// The scale and position of the supercube at `where` (below kCorner) from another one; the position is negative outside the domain.
+struct SupercubePlace {
+  int scale = 0;
+  Vertex position;
+};
+[[nodiscard]] inline SupercubePlace supercube_at(int where, int scale, Vertex p) {
+  if (where < kCoarser) return {scale, {p.x + where % 3 - 1, p.y + where / 3 % 3 - 1, p.z + where / 9 - 1}};
+  const int w = where - kCoarser;
+  return {scale + 1, {(p.x >> 1) + (w & 1), (p.y >> 1) + (w >> 1 & 1), (p.z >> 1) + (w >> 2)}};
+}
+
+// Whether all diamonds of a supercube lie inside the box: they reach from h before its corner to 4 h behind.
+[[nodiscard]] inline bool is_interior(const Domain& domain, int scale, Vertex p) {
+  const auto corner = [scale](std::int32_t cells, std::int32_t more) { return (cells * 4 + more) * (std::int32_t(1) << scale); };
+  return domain.contains({corner(p.x, -1), corner(p.y, -1), corner(p.z, -1)}) && domain.contains({corner(p.x, 4), corner(p.y, 4), corner(p.z, 4)});
+}
 
 // Row for a slot of a supercube whose position has the parities p = (x & 1) + 2 (y & 1) + 4 (z & 1). The table is made at first use.
 using LinkTable = std::array<std::array<Links, kSlots>, 8>;

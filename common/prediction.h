@@ -44,6 +44,13 @@ struct DiamondContext {
     return (alpha & exists) | (beta & exists) << 1;
   }
 
+  // Whether vertices lie on different sides: such a diamond is relevant.
+  [[nodiscard]] bool is_mixed() const {
+    bool there[3] = {};
+    for (int v = 0; v < row->vertices; ++v) there[int(side(v))] |= has(v);
+    return int(there[0]) + int(there[1]) + int(there[2]) > 1;
+  }
+
   // How many cuts there are on the subdivision edges if the centre lies there, and how many of them are the first of their surface.
   struct CutCount {
     int all = 0, first = 0;

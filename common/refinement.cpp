@@ -24,12 +24,6 @@ bool meets(const Diamond& d, const SampleBox& box) {
 
 }  // namespace
 
-std::uint64_t SplitSet::count() const {
-  std::uint64_t n = 0;
-  for (std::uint64_t w : words_) n += std::popcount(w);
-  return n;
-}
-
 Result<void> check_lod(const Lod& lod) {
   if (!std::isfinite(lod.error) || lod.error < 0) return misuse("the error of a level of detail must be a number that is not negative");
   if (lod.error_percent && !(*lod.error_percent >= 0 && *lod.error_percent <= 100)) return misuse("the error percent must be a number from 0 to 100");

@@ -15,23 +15,9 @@
 #include "common/interval_volume.h"
 #include "common/lod.h"
 #include "common/result.h"
+#include "common/split_set.h"
 
 namespace intervale {
-
-// A set of updates: one bit for each, by number.
-class SplitSet {
- public:
-  explicit SplitSet(UpdateIndex size = 0) : words_((std::size_t(size) + 63) / 64) {}
-  [[nodiscard]] bool contains(UpdateIndex i) const { return words_[i / 64] >> (i % 64) & 1; }
-  void insert(UpdateIndex i) { words_[i / 64] |= std::uint64_t(1) << (i % 64); }
-  void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }
-  [[nodiscard]] std::uint64_t count() const;
-  [[nodiscard]] std::vector<std::uint64_t>& words() { return words_; }
-  friend bool operator==(const SplitSet&, const SplitSet&) = default;
-
- private:
-  std::vector<std::uint64_t> words_;
-};
 
 // Whether an update is wanted for its own sake.
 using Criterion = std::function<bool(const Diamond&, double error)>;

@@ -89,21 +89,26 @@ std::size_t SupercubeSet::home(SupercubeKey brick_key) const {
   return std::size_t((unsigned __int128)(h)*directory_.size() >> 64);
 }
 
-std::optional<Place> SupercubeSet::find(const Diamond& d) const {
-  if (bricks_.empty() || d.row->cls == 3 || d.scale >= kMaxLevels) return {};
-  const int up = d.scale + 2;
-  const SupercubeKey key = supercube_key(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up}), brick = key & ~SupercubeKey(63);
+std::optional<SupercubeSet::Supercube> SupercubeSet::find_supercube(int scale, Vertex position) const {
+  if (bricks_.empty() || scale >= kMaxLevels) return {};
+  const SupercubeKey key = supercube_key(scale, position), brick = key & ~SupercubeKey(63);
   for (std::size_t i = home(brick); directory_[i] != 0; i = i + 1 == directory_.size() ? 0 : i + 1) {
     const std::uint32_t b = directory_[i] - 1;
     if (bricks_[b].key != brick) continue;
     const std::uint64_t bit = std::uint64_t(1) << (key & 63);
     if (!(bricks_[b].mask & bit)) return {};
-    const std::uint32_t s = bricks_[b].first_supercube + std::uint32_t(std::popcount(bricks_[b].mask & (bit - 1)));
-    const int slot = kSlotOfType[d.type];
-    if (!(occupancy_[s] >> slot & 1)) return {};
-    return place_in(b, s, key, slot);
+    return Supercube{b, bricks_[b].first_supercube + std::uint32_t(std::popcount(bricks_[b].mask & (bit - 1))), key};
   }
   return {};
+}
+
+std::optional<Place> SupercubeSet::find(const Diamond& d) const {
+  if (d.row->cls == 3) return {};
+  const int up = d.scale + 2;
+  const auto found = find_supercube(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
+  const int slot = kSlotOfType[d.type];
+  if (!found || !(occupancy_[found->supercube] >> slot & 1)) return {};
+  return place_in(found->brick, found->supercube, found->key, slot);
 }
 
 Place SupercubeSet::place(UpdateIndex index) const {

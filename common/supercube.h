@@ -68,6 +68,13 @@ class SupercubeSet {
   [[nodiscard]] std::optional<Place> find(Vertex centre) const { return find(Diamond(centre)); }
   [[nodiscard]] std::optional<Place> find(const Diamond& d) const;
 
+  // The supercube at a position (not negative), if it is in the set. O(1).
+  struct Supercube {
+    std::uint32_t brick = 0, supercube = 0;
+    SupercubeKey key = 0;
+  };
+  [[nodiscard]] std::optional<Supercube> find_supercube(int scale, Vertex position) const;
+
   [[nodiscard]] static Vertex centre(const Place& p) { return centre_of(p.key, int(p.slot)); }
 
   // The place of a number. O(log bricks).

@@ -1,8 +1,10 @@
 // Updates on the wire: a batch as bytes, and back into a front.
 //
-// A batch names its diamonds by brick, supercube and slot, and holds like with like: names, then differences of sides, then of each surface's first
-// cuts, then of all other cuts; each plane compressed by itself. Updates stand in the order in which they are applied: scale by scale from coarse to
-// fine; within one scale all of class 0, then class 1, then class 2; then by supercube and slot. PROTOCOL.md has the layout.
+// A batch names supercubes, and says of each diamond in them that can be split whether it is: one bit, in one of six planes, for both sides know
+// which those are, whether their vertices lie on different sides (then the diamond is surely relevant, and hardly ever left out) and their class.
+// Then come differences of sides, of each surface's first cuts, and of all other cuts; each plane is compressed by itself. Updates stand in the order
+// in which they are applied: scale by scale from coarse to fine; within one scale all of class 0, then class 1, then class 2; then by supercube and
+// slot. PROTOCOL.md has the layout.
 #pragma once
 
 #include <cstddef>
@@ -14,6 +16,7 @@
 #include "common/front.h"
 #include "common/interval_volume.h"
 #include "common/result.h"
+#include "common/split_set.h"
 
 namespace intervale {
 
@@ -26,8 +29,9 @@ struct BatchGroup {
   std::uint64_t slots = 0;  // not 0
 };
 
-// The batch of these groups: keys strictly ascending; at most kBatchUpdatesMost updates.
-[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, std::span<const BatchGroup> groups);
+// The batch of these groups: keys strictly ascending; at most kBatchUpdatesMost updates. split: what the client has split once the batch is applied,
+// closed under parents; the groups' updates are in it.
+[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const BatchGroup> groups);
 
 struct Applied {
   std::uint64_t updates = 0;

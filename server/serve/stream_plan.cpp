@@ -119,7 +119,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   for (const auto& [supercube, group] : chunk.groups) groups.push_back(group);
   std::sort(groups.begin(), groups.end(), [](const BatchGroup& a, const BatchGroup& b) { return a.supercube < b.supercube; });
   Batch batch;
-  batch.payload = encode_batch(*volume_, groups);
+  batch.payload = encode_batch(*volume_, sent_, groups);
   batch.updates = chunk.updates;
   for (unsigned level = kErrorLevels; level-- > 0;) {
     if (waiting_[level] == 0) continue;

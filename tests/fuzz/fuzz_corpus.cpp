@@ -38,8 +38,8 @@ void add_batches(const Corpus& corpus) {
     const IntervalVolume& v = testing::small_volumes()[i];
     const auto queue = in_order(v, select(v, {}));
     for (const std::size_t stage : {0u, 5u, 7u}) {
-      const auto left = std::span(queue).subspan(queue.size() * stage / 8);
-      const auto bytes = testing::batch_of(v, left.first(std::min<std::size_t>(left.size(), 60)));
+      const auto before = std::span(queue).first(queue.size() * stage / 8), left = std::span(queue).subspan(before.size());
+      const auto bytes = testing::batch_of(v, left.first(std::min<std::size_t>(left.size(), 60)), before);
       const std::string name = "volume" + std::to_string(i) + "-stage" + std::to_string(stage);
       corpus.add("update_batch", name, {char(i), char(stage)}, bytes);
       if (stage == 5) corpus.add("update_batch", name + "-budget", {char(i), char(0xb8 | stage)}, bytes);

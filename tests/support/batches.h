@@ -9,8 +9,12 @@
 
 namespace intervale::testing {
 
-// The batch of these updates, in any order; each once.
-inline std::vector<std::uint8_t> batch_of(const IntervalVolume& volume, std::span<const UpdateIndex> updates) {
+// The batch of these updates, in any order; each once; for a client that has `before` already.
+inline std::vector<std::uint8_t> batch_of(const IntervalVolume& volume, std::span<const UpdateIndex> updates,
+                                          std::span<const UpdateIndex> before = {}) {
+  SplitSet split(volume.size());
+  for (UpdateIndex i : before) split.insert(i);
+  for (UpdateIndex i : updates) split.insert(i);
   std::vector<UpdateIndex> sorted(updates.begin(), updates.end());
   std::sort(sorted.begin(), sorted.end());
   std::vector<BatchGroup> groups;
@@ -19,7 +23,7 @@ inline std::vector<std::uint8_t> batch_of(const IntervalVolume& volume, std::spa
     if (groups.empty() || groups.back().supercube != p.supercube) groups.push_back({p.brick, p.supercube, p.key, 0});
     groups.back().slots |= std::uint64_t(1) << p.slot;
   }
-  return encode_batch(volume, groups);
+  return encode_batch(volume, split, groups);
 }
 
 }  // namespace intervale::testing

@@ -67,7 +67,7 @@ TEST(UpdateCodec, AnySplitIntoBatchesGivesTheExtractedMesh) {
       Front front = root_of(v);
       for (std::size_t i = 0, n = 0; i < queue.size(); i += n) {
         n = std::min(queue.size() - i, seed < 2 ? most : 1 + random() % most);
-        const auto applied = apply_exact(front, batch_of(v, std::span(queue).subspan(i, n)));
+        const auto applied = apply_exact(front, batch_of(v, std::span(queue).subspan(i, n), std::span(queue).first(i)));
         ASSERT_TRUE(applied) << applied.error().message;
         ASSERT_EQ(applied->updates, n);
         ASSERT_FALSE(applied->over_budget);
@@ -109,7 +109,7 @@ TEST(UpdateCodec, EveryFlippedByteFailsOrLeavesAFrontThatHolds) {
     const auto queue = queue_of(v);
     const std::size_t start = queue.size() / 3, n = std::min<std::size_t>(queue.size() - start, 200);
     const Front stage = after(v, start);
-    const Bytes bytes = batch_of(v, std::span(queue).subspan(start, n));
+    const Bytes bytes = batch_of(v, std::span(queue).subspan(start, n), std::span(queue).first(start));
     std::mt19937 random(7);
     for (std::size_t i = 0; i < bytes.size(); ++i) {
       for (const unsigned mask : {1u << random() % 8, 1 + unsigned(random() % 255), 0x80u}) {
@@ -149,11 +149,12 @@ TEST(UpdateCodec, WhatDoesNotFitTheFrontIsRefused) {
     const auto queue = queue_of(v);
     const std::size_t half = queue.size() / 2;
     Front front = after(v, half);
-    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(half / 2, half)))) << "updates a second time";
+    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(half / 2, half), std::span(queue).first(half / 2))))
+        << "updates a second time";
     front = root_of(v);
-    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(1)))) << "children without the root";
+    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(1), std::span(queue).first(1)))) << "children without the root";
     front = root_of(v);
-    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(half)))) << "children before parents";
+    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(half), std::span(queue).first(half)))) << "children before parents";
     for (const IntervalVolume& other : all) {
       if (&other == &v) continue;
       front = root_of(v);

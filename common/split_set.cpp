@@ -1,0 +1,71 @@
+#include "common/split_set.h"
+
+#include <bit>
+
+namespace intervale {
+
+std::uint64_t SplitSet::count() const {
+  std::uint64_t n = 0;
+  for (std::uint64_t w : words_) n += std::uint64_t(std::popcount(w));
+  return n;
+}
+
+std::uint64_t SplitSet::slots(const SupercubeSet& set, std::uint32_t brick, std::uint32_t supercube) const {
+  // The supercube's bits stand together, in at most two words.
+  const UpdateIndex first = set.first(brick, supercube);
+  const std::uint64_t occupancy = set.occupancy()[supercube];
+  const unsigned shift = first % 64, count = unsigned(std::popcount(occupancy));
+  std::uint64_t bits = words_[first / 64] >> shift;
+  if (shift + count > 64) bits |= words_[first / 64 + 1] << (64 - shift);
+  std::uint64_t slots = 0;
+  for (std::uint64_t left = occupancy; left != 0; left &= left - 1, bits >>= 1) slots |= left & (~left + 1) & (~(bits & 1) + 1);
+  return slots;
+}
+
+void Readiness::move_to(SupercubeKey key) {
+  scale_ = scale_of_key(key);
+  position_ = position_of_key(key);
+  links_ = &link_table()[unsigned(position_.x & 1) | unsigned(position_.y & 1) << 1 | unsigned(position_.z & 1) << 2];
+  known_ = 0;
+}
+
+bool Readiness::is_split(Link link) {
+  std::uint64_t& slots = slots_[link.where];
+  if (!(known_ >> link.where & 1)) {
+    known_ |= std::uint64_t(1) << link.where;
+    const auto [scale, position] = supercube_at(link.where, scale_, position_);
+    slots = 0;
+    if (scale == domain_.levels()) {
+      slots = ~std::uint64_t(0);  // the corners of the domain
+    } else if ((position.x | position.y | position.z) >= 0) {
+      if (const auto found = set_.find_supercube(scale, position)) slots = split_.slots(set_, found->brick, found->supercube);
+    }
+  }
+  return (slots >> link.slot & 1) != 0;
+}
+
+std::uint64_t Readiness::ready() {
+  std::uint64_t ready = 0;
+  if (scale_ >= domain_.levels()) return ready;
+  const bool interior = is_interior(domain_, scale_, position_);
+  for (int slot = 0; slot < kSlots; ++slot) {
+    const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+    std::uint32_t vertices = ~std::uint32_t(0);
+    if (!interior) {
+      const Diamond d(centre_of(scale_, position_, slot));
+      const unsigned tets = domain_.tets(d);
+      if (tets == 0 || domain_.is_idle(d)) continue;
+      vertices = Domain::vertices(row, tets);
+    }
+    const Links& links = (*links_)[slot];
+    bool all = true;
+    for (int k = 0; k < row.parents && all; ++k) {
+      const int v = links.parent[k];
+      all = !(vertices >> v & 1) || is_split(links.vertex[v]);
+    }
+    ready |= std::uint64_t(all) << slot;
+  }
+  return ready;
+}
+
+}  // namespace intervale

@@ -1,0 +1,53 @@
+// Split diamonds as a set of updates, and what can be split next: all that a server knows of a client's mesh.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/domain.h"
+#include "common/links.h"
+#include "common/supercube.h"
+
+namespace intervale {
+
+// A set of updates: one bit for each, by number.
+class SplitSet {
+ public:
+  explicit SplitSet(UpdateIndex size = 0) : words_((std::size_t(size) + 63) / 64) {}
+  [[nodiscard]] bool contains(UpdateIndex i) const { return words_[i / 64] >> (i % 64) & 1; }
+  void insert(UpdateIndex i) { words_[i / 64] |= std::uint64_t(1) << (i % 64); }
+  void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }
+  [[nodiscard]] std::uint64_t count() const;
+  [[nodiscard]] std::uint64_t slots(const SupercubeSet& set, std::uint32_t brick, std::uint32_t supercube) const;  // of a supercube, that are in it
+  [[nodiscard]] std::vector<std::uint64_t>& words() { return words_; }
+  friend bool operator==(const SplitSet&, const SplitSet&) = default;
+
+ private:
+  std::vector<std::uint64_t> words_;
+};
+
+// Tells which diamonds of a supercube have all their parents split.
+class Readiness {
+ public:
+  // All must outlive it; `split` is not to change between move_to() and ready().
+  Readiness(const SupercubeSet& set, const Domain& domain, const SplitSet& split) : set_(set), domain_(domain), split_(split) {}
+
+  void move_to(SupercubeKey key);
+
+  // The slots of diamonds that exist, are not idle, and whose parents are split; whether they are split themselves or not.
+  [[nodiscard]] std::uint64_t ready();
+
+ private:
+  [[nodiscard]] bool is_split(Link link);
+  const SupercubeSet& set_;
+  const Domain& domain_;
+  const SplitSet& split_;
+  int scale_ = 0;
+  Vertex position_;
+  const std::array<Links, kSlots>* links_ = nullptr;
+  std::array<std::uint64_t, kCorner> slots_{};  // split ones of the supercubes around
+  std::uint64_t known_ = 0;                     // which of those were looked up
+};
+
+}  // namespace intervale
