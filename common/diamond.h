@@ -84,6 +84,9 @@ extern const std::array<DiamondType, 64> kDiamondTypes;
 // A diamond, taken apart.
 struct Diamond {
   explicit Diamond(Vertex c) : centre(c), scale(scale_of(c)), h(std::int32_t(1) << scale), type(type_of(c, scale)), row(&diamond_type(type)) {}
+  // ... whose scale and type are known.
+  Diamond(Vertex c, int scale_of_c, unsigned type_of_c)
+      : centre(c), scale(scale_of_c), h(std::int32_t(1) << scale), type(type_of_c), row(&diamond_type(type)) {}
   Vertex centre;
   int scale;
   std::int32_t h;

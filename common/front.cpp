@@ -70,6 +70,29 @@ Front::Front(const Grid& grid, const Base& base) : grid_(grid), domain_(grid.dim
   tet_count_ = count_tets(root, e, sides);
 }
 
+Front::Front(const Front& other)
+    : grid_(other.grid_),
+      domain_(other.domain_),
+      blocks_(other.blocks_),
+      corner_(other.corner_),
+      q_(other.q_),
+      tet_count_(other.tet_count_),
+      split_count_(other.split_count_) {
+  for (Block& block : blocks_) index_.emplace(index_key(block.scale, block.position), &block);
+}
+
+Front& Front::operator=(Front other) noexcept {
+  grid_ = other.grid_;
+  domain_ = other.domain_;
+  blocks_.swap(other.blocks_);
+  index_.swap(other.index_);
+  corner_ = other.corner_;
+  q_.swap(other.q_);
+  tet_count_ = other.tet_count_;
+  split_count_ = other.split_count_;
+  return *this;
+}
+
 std::optional<Front::Handle> Front::find(Vertex centre) const {
   if ((centre.x | centre.y | centre.z) <= 0 || scale_of(centre) >= domain_.levels()) return {};
   const std::int32_t most = 1 << domain_.levels();
@@ -128,17 +151,18 @@ std::size_t Front::memory_bytes() const { return blocks_.size() * sizeof(Block) 
 
 const Front::Block* Front::find_block(int scale, Vertex position) const {
   const auto found = index_.find(index_key(scale, position));
-  return found == index_.end() ? nullptr : &blocks_[found->second];
+  return found == index_.end() ? nullptr : found->second;
 }
 
 Front::Block& Front::obtain_block(int scale, Vertex position) {
-  const auto [place, is_new] = index_.try_emplace(index_key(scale, position), std::uint32_t(blocks_.size()));
+  const auto [place, is_new] = index_.try_emplace(index_key(scale, position), nullptr);
   if (is_new) {
     blocks_.emplace_back();
     blocks_.back().position = position;
     blocks_.back().scale = scale;
+    place->second = &blocks_.back();
   }
-  return blocks_[place->second];
+  return *place->second;
 }
 
 Front::Existing Front::existing(const Diamond& d) const {
@@ -216,7 +240,7 @@ void Front::Cursor::move_to(int scale, Vertex position) {
   interior_ = is_interior(front_.domain_, scale, position);
 }
 
-Front::Cursor::Found Front::Cursor::resolve(std::uint8_t where) {
+const Front::Block* Front::Cursor::resolve(std::uint8_t where) {
   static const Block nothing{};
   const Vertex p = position_;
   const Block* found = nullptr;
@@ -228,25 +252,23 @@ Front::Cursor::Found Front::Cursor::resolve(std::uint8_t where) {
     const Vertex v{(p.x + (w & 1)) << (scale_ + 2), (p.y + (w >> 1 & 1)) << (scale_ + 2), (p.z + (w >> 2)) << (scale_ + 2)};
     if ((v.x | v.y | v.z) == 0) {
       found = &front_.corner_;
-      corner_slot_[w] = 0;
+      corner_slot_[where] = 0;
     } else {
       const Diamond d(v);
       found = front_.find_block(d.scale, {v.x >> (d.scale + 2), v.y >> (d.scale + 2), v.z >> (d.scale + 2)});
-      corner_slot_[w] = kSlotOfType[d.type];
+      corner_slot_[where] = kSlotOfType[d.type];
     }
   }
   near_[where] = found == nullptr ? &nothing : found;
-  return {near_[where], 0};
+  return near_[where];
 }
 
 // Vertices and sides.
 bool Front::Cursor::gather(int slot) {
   slot_ = slot;
-  const std::int32_t h = std::int32_t(1) << scale_;
-  const unsigned type = kTypeOfSlot[slot];
-  const DiamondType& row = diamond_type(type);
+  const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
   if (scale_ >= front_.domain_.levels()) return false;
-  diamond_.emplace(Vertex{(position_.x * 4 + int(type & 3)) * h, (position_.y * 4 + int(type >> 2 & 3)) * h, (position_.z * 4 + int(type >> 4)) * h});
+  diamond_ = Diamond(centre_of(scale_, position_, slot), scale_, kTypeOfSlot[slot]);
   if (interior_) {
     existing_ = {(1u << row.tets) - 1, (1u << row.vertices) - 1, (1u << row.edges) - 1, false};
   } else {

@@ -37,6 +37,10 @@ class Front {
  public:
   // The mesh of the root's patch. grid.dims in [kMinSide, kMaxSide].
   Front(const Grid& grid, const Base& base);
+  Front(const Front& other);
+  Front(Front&&) = default;
+  Front& operator=(Front other) noexcept;
+  ~Front() = default;
 
   // A diamond of the front that can be split now; valid until the next split or merge.
   struct Handle {
@@ -117,10 +121,10 @@ class Front {
 
   Grid grid_;
   Domain domain_;
-  std::deque<Block> blocks_;                                       // stay where they are
-  boost::unordered_flat_map<std::uint64_t, std::uint32_t> index_;  // of blocks, by scale and position
-  Block corner_;                                                   // vertex (0, 0, 0): slot 0
-  std::vector<std::uint8_t> q_;                                    // of every cut; one more for a centre inside
+  std::deque<Block> blocks_;                                // stay where they are
+  boost::unordered_flat_map<std::uint64_t, Block*> index_;  // by scale and position
+  Block corner_;                                            // vertex (0, 0, 0): slot 0
+  std::vector<std::uint8_t> q_;                             // of every cut; one more for a centre inside
   std::uint64_t tet_count_ = 0, split_count_ = 0;
 };
 
@@ -156,11 +160,12 @@ class Front::Cursor {
     const Block* block;
     int slot;
   };
-  Found resolve(std::uint8_t where);
+  const Block* resolve(std::uint8_t where);
   [[nodiscard]] bool parents_are_split(int slot);
   [[nodiscard]] Found at(Link link) {
-    const Block* const block = near_[link.where] != nullptr ? near_[link.where] : resolve(link.where).block;
-    return {block, link.where < kCorner ? link.slot : corner_slot_[link.where - kCorner]};
+    const Block* block = near_[link.where];
+    if (block == nullptr) block = resolve(link.where);
+    return {block, link.slot | corner_slot_[link.where]};
   }
   [[nodiscard]] bool is_idle() const { return existing_.straddles && front_.domain_.is_idle(*diamond_); }
   std::int64_t write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first);
@@ -170,8 +175,8 @@ class Front::Cursor {
   Vertex position_;
   bool interior_ = false;  // all diamonds of this supercube are inside the box
   const std::array<Links, kSlots>* links_ = nullptr;
-  std::array<const Block*, kWheres> near_{};  // null: not looked for yet
-  std::array<std::uint8_t, 8> corner_slot_{};
+  std::array<const Block*, kWheres> near_{};         // null: not looked for yet
+  std::array<std::uint8_t, kWheres> corner_slot_{};  // of a corner's vertex; 0 elsewhere
   std::optional<Diamond> diamond_;
   Existing existing_;
   std::array<Split, kMaxVertices> split_;  // of each vertex
