@@ -14,16 +14,6 @@ tl::unexpected<Error> misfit(Vertex c) {
               ") does not fit the ones before it");
 }
 
-// The chosen updates as slots of each supercube.
-std::vector<std::uint64_t> slots_of(const SupercubeSet& set, const SplitSet& chosen) {
-  std::vector<std::uint64_t> slots;
-  slots.reserve(set.supercubes());
-  for (std::uint32_t brick = 0; brick < set.bricks().size(); ++brick) {
-    set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey) { slots.push_back(chosen.slots(set, brick, s)); });
-  }
-  return slots;
-}
-
 }  // namespace
 
 Result<Extraction> extract(const Grid& grid, const Base& base, const SupercubeSet& set, const SplitSet& split,
@@ -55,7 +45,7 @@ Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const O
   Front& front = result.front;
   if (!lod.max_tets && !lod.max_updates) {
     const auto wrong = front.split_all(
-        volume.set(), slots_of(volume.set(), chosen), [&volume](UpdateIndex i) { return volume.codes()[i].coefficients(); },
+        volume.set(), chosen.groups(volume.set()), [&volume](UpdateIndex i) { return volume.codes()[i].coefficients(); },
         [&volume](const Place& p, const DiamondContext& context, std::uint8_t* q) { return decode_update(context, volume.update(p), q); }, parallel);
     if (wrong) return misfit(*wrong);
     result.updates = front.split_count();

@@ -75,12 +75,12 @@ class Front {
   // Looks at the diamonds of one supercube at a time, and splits them. Sees splits made by itself only, until it moves.
   class Cursor;
 
-  // Splits all diamonds of a set that is closed under parents, of a front that has no diamond split yet. Of each supercube, by number in `set`,
-  // slots[supercube] are those to split. cut_count(UpdateIndex): how many cuts the update brings; decode(Place, DiamondContext, q) writes as many
-  // and returns the side, or nothing if they do not fit. Both are called from many threads if `parallel` uses them. Returns the centre of an update
-  // that did not fit, and the front is then of no more use.
+  // Splits many diamonds of a front that has none split yet: groups of `set`, keys strictly ascending, together closed under parents.
+  // cut_count(UpdateIndex): how many cuts the update brings; decode(Place, DiamondContext, q) writes as many and returns the side, or nothing if they
+  // do not fit. Both are called from many threads if `parallel` uses them. Returns the centre of an update that did not fit, and the front is then of
+  // no more use.
   template <class CutCount, class Decode>
-  std::optional<Vertex> split_all(const SupercubeSet& set, std::span<const std::uint64_t> slots, const CutCount& cut_count, const Decode& decode,
+  std::optional<Vertex> split_all(const SupercubeSet& set, std::span<const SlotGroup> groups, const CutCount& cut_count, const Decode& decode,
                                   const ParallelFor& parallel = in_turn);
 
  private:
@@ -184,44 +184,34 @@ class Front::Cursor {
 };
 
 template <class CutCount, class Decode>
-std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const std::uint64_t> slots, const CutCount& cut_count, const Decode& decode,
+std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const SlotGroup> groups, const CutCount& cut_count, const Decode& decode,
                                        const ParallelFor& parallel) {
   // First room for all, then pass by pass, parents before children: within a pass no diamond is another's ancestor.
-  struct Work {
-    Block* block;
-    std::uint32_t brick, supercube;
-    SupercubeKey key;
-  };
-  std::vector<Work> work;
-  std::array<std::size_t, kMaxLevels + 1> begin{};
-  for (int scale = kMaxLevels - 1; scale >= 0; --scale) {
-    begin[kMaxLevels - 1 - scale] = work.size();
-    const auto [first, last] = set.of_scale(scale);
-    for (std::uint32_t brick = first; brick < last; ++brick) {
-      set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
-        if (slots[s] != 0) work.push_back({&obtain_block(scale, position_of_key(key)), brick, s, key});
-      });
-    }
-  }
-  begin[kMaxLevels] = work.size();
-  for (const Work& w : work) {
-    UpdateIndex i = set.first(w.brick, w.supercube);
-    for (std::uint64_t left = set.occupancy()[w.supercube]; left != 0; left &= left - 1, ++i) {
+  std::vector<Block*> blocks;
+  blocks.reserve(groups.size());
+  std::size_t size = q_.size();
+  for (const SlotGroup& g : groups) {
+    Block* const block = &obtain_block(scale_of_key(g.key), position_of_key(g.key));
+    blocks.push_back(block);
+    UpdateIndex i = set.first(g.brick, g.supercube);
+    for (std::uint64_t left = set.occupancy()[g.supercube]; left != 0; left &= left - 1, ++i) {
       const int slot = std::countr_zero(left);
-      if (!(slots[w.supercube] >> slot & 1)) continue;
-      w.block->of[slot].first = std::uint32_t(q_.size());
-      q_.resize(q_.size() + cut_count(i) + 1);
+      if (!(g.slots >> slot & 1)) continue;
+      block->of[slot].first = std::uint32_t(size);
+      size += cut_count(i) + 1;
     }
     // Said before it is so: whoever looks has come to a later pass than its ancestors.
-    w.block->split = slots[w.supercube];
-    split_count_ += std::uint64_t(std::popcount(slots[w.supercube]));
+    block->split = g.slots;
+    split_count_ += std::uint64_t(std::popcount(g.slots));
   }
+  q_.resize(size);
   constexpr std::size_t kPiece = 32;  // supercubes
   std::atomic<std::int64_t> added = 0;
   std::atomic<bool> failed = false;
   Vertex wrong;
-  for (int scale = kMaxLevels - 1; scale >= 0; --scale) {
-    const std::size_t first = begin[kMaxLevels - 1 - scale], last = begin[kMaxLevels - scale];
+  for (std::size_t first = 0, last = 0; first < groups.size(); first = last) {
+    const int scale = scale_of_key(groups[first].key);
+    while (last < groups.size() && scale_of_key(groups[last].key) == scale) ++last;
     for (const std::uint64_t cls : kSlotsOfClass) {
       parallel((last - first + kPiece - 1) / kPiece, [&](std::size_t piece) {
         Cursor cursor(*this);
@@ -229,21 +219,21 @@ std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const 
         std::array<std::uint8_t, kMaxCuts> q;
         const std::size_t end = std::min(last, first + (piece + 1) * kPiece);
         for (std::size_t k = first + piece * kPiece; k < end; ++k) {
-          const Work& w = work[k];
-          const std::uint64_t chosen = slots[w.supercube] & cls;
+          const SlotGroup& g = groups[k];
+          const std::uint64_t chosen = g.slots & cls;
           if (chosen == 0) continue;
-          cursor.move_to(scale, w.block->position);
+          cursor.move_to(scale, blocks[k]->position);
           for (std::uint64_t left = chosen; left != 0; left &= left - 1) {
             const int slot = std::countr_zero(left);
-            const Place place = set.place_in(w.brick, w.supercube, w.key, slot);
+            const Place place = set.place_in(g.brick, g.supercube, g.key, slot);
             const auto n = std::size_t(cut_count(place.index));
             const bool fits = cursor.gather(slot) && !cursor.is_idle();
             const std::optional<Side> side = fits ? decode(place, cursor.look_closer(), q.data()) : std::nullopt;
             if (!side || std::size_t(cursor.context().count_cuts(*side).all) != n) {
-              if (!failed.exchange(true)) wrong = centre_of(w.key, slot);
+              if (!failed.exchange(true)) wrong = centre_of(g.key, slot);
               return;
             }
-            sum += cursor.write(*w.block, *side, std::span(q).first(n), w.block->of[slot].first);
+            sum += cursor.write(*blocks[k], *side, std::span(q).first(n), blocks[k]->of[slot].first);
           }
         }
         added += sum;

@@ -2,6 +2,7 @@
 
 #include <xxhash.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -50,13 +51,18 @@ IntervalVolume::IntervalVolume(Parts parts)
       error_levels_(std::move(parts.error_levels)) {
   brick_first_.reserve(set_.bricks().size());
   first_in_brick_.reserve(set_.supercubes());
+  brick_level_.reserve(set_.bricks().size());
   std::uint32_t n = 0;
   for (std::uint32_t b = 0; b < set_.bricks().size(); ++b) {
     brick_first_.push_back(n);
+    brick_level_.push_back(0);
     set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey) {
       first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
       const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
-      for (UpdateIndex i = first; i < end; ++i) n += codes_[i].coefficients();
+      for (UpdateIndex i = first; i < end; ++i) {
+        n += codes_[i].coefficients();
+        brick_level_[b] = std::max(brick_level_[b], std::uint16_t(codes_[i].error_level()));
+      }
     });
   }
 }
@@ -95,7 +101,7 @@ UpdateView IntervalVolume::update(const Place& p) const {
 
 std::size_t IntervalVolume::memory_bytes() const {
   return sizeof *this + description_.base.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
-         first_in_brick_.size() * 2 + differences_.size() + error_levels_.size() * sizeof(float);
+         brick_level_.size() * 2 + first_in_brick_.size() * 2 + differences_.size() + error_levels_.size() * sizeof(float);
 }
 
 Result<void> IntervalVolume::validate() const {

@@ -70,6 +70,7 @@ class IntervalVolume {
   // Saturated error in the field's units, rounded up: no smaller than that of any child. Monotone in error_level.
   [[nodiscard]] float error(UpdateIndex i) const { return error_levels_[codes_[i].error_level()]; }
   [[nodiscard]] unsigned error_level(UpdateIndex i) const { return codes_[i].error_level(); }
+  [[nodiscard]] unsigned brick_error_level(std::uint32_t brick) const { return brick_level_[brick]; }  // the highest of a brick's updates
   [[nodiscard]] std::span<const float> error_levels() const { return error_levels_; }
   [[nodiscard]] std::span<const UpdateCode> codes() const { return codes_; }
   [[nodiscard]] std::span<const std::uint8_t> differences() const { return differences_; }
@@ -89,6 +90,7 @@ class IntervalVolume {
   std::vector<UpdateCode> codes_;
   std::vector<std::uint32_t> brick_first_;     // difference, of each brick
   std::vector<std::uint16_t> first_in_brick_;  // difference, of each supercube: 64 supercubes have no more than 57344
+  std::vector<std::uint16_t> brick_level_;     // the highest level of error, of each brick
   std::vector<std::uint8_t> differences_;
   std::vector<float> error_levels_;
 };

@@ -85,8 +85,13 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
   unsigned level = 0;
   while (threshold > 0 && level < volume.error_levels().size() && volume.error_levels()[level] <= threshold) ++level;
   SplitSet chosen(volume.size());
-  for (UpdateIndex i = 0; i < volume.size(); ++i) {
-    if (volume.error_level(i) >= level) chosen.insert(i);
+  const auto bricks = volume.set().bricks();
+  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
+    if (volume.brick_error_level(b) < level) continue;
+    const UpdateIndex end = b + 1 < bricks.size() ? bricks[b + 1].first : volume.size();
+    for (UpdateIndex i = bricks[b].first; i < end; ++i) {
+      if (volume.error_level(i) >= level) chosen.insert(i);
+    }
   }
   return chosen;
 }

@@ -1,5 +1,6 @@
 #include "common/split_set.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace intervale {
@@ -20,6 +21,20 @@ std::uint64_t SplitSet::slots(const SupercubeSet& set, std::uint32_t brick, std:
   std::uint64_t slots = 0;
   for (std::uint64_t left = occupancy; left != 0; left &= left - 1, bits >>= 1) slots |= left & (~left + 1) & (~(bits & 1) + 1);
   return slots;
+}
+
+std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {
+  std::vector<SlotGroup> groups;
+  const auto bricks = set.bricks();
+  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
+    const UpdateIndex first = bricks[b].first, end = b + 1 < bricks.size() ? bricks[b + 1].first : set.size();
+    const auto from = words_.begin() + first / 64, to = words_.begin() + (end + 63) / 64;
+    if (std::all_of(from, to, [](std::uint64_t w) { return w == 0; })) continue;
+    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+      if (const std::uint64_t some = slots(set, b, s)) groups.push_back({b, s, key, some});
+    });
+  }
+  return groups;
 }
 
 void Readiness::move_to(SupercubeKey key) {

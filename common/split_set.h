@@ -20,6 +20,7 @@ class SplitSet {
   void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }
   [[nodiscard]] std::uint64_t count() const;
   [[nodiscard]] std::uint64_t slots(const SupercubeSet& set, std::uint32_t brick, std::uint32_t supercube) const;  // of a supercube, that are in it
+  [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;                                      // all of it, in order
   [[nodiscard]] std::vector<std::uint64_t>& words() { return words_; }
   friend bool operator==(const SplitSet&, const SplitSet&) = default;
 

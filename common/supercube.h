@@ -44,6 +44,13 @@ struct Place {
   UpdateIndex index = 0;
 };
 
+// Some diamonds of one supercube.
+struct SlotGroup {
+  std::uint32_t brick = 0, supercube = 0;  // numbers in the set
+  SupercubeKey key = 0;
+  std::uint64_t slots = 0;
+};
+
 // An immutable set of diamonds. Supercubes in turn stand in bricks: the 4 x 4 x 4 of one scale whose keys differ in the lowest six bits only.
 class SupercubeSet {
  public:

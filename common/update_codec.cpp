@@ -93,7 +93,7 @@ Result<std::vector<SupercubeKey>> take_supercubes(std::span<const std::uint8_t>&
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const BatchGroup> groups) {
+std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) {
   const SupercubeSet& set = volume.set();
   std::vector<std::uint8_t> steps, sides, first, other;
   std::vector<std::uint64_t> masks;
@@ -106,7 +106,7 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
   std::vector<Candidates> candidates;
   candidates.reserve(groups.size());
   Readiness readiness(set, volume.domain(), split);
-  for (const BatchGroup& g : groups) {
+  for (const SlotGroup& g : groups) {
     const std::uint64_t brick = g.key >> 6;
     if (masks.empty() || brick != previous) {
       append_varint(steps, brick - previous);
@@ -133,7 +133,7 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
   for_each_class(
       groups.size(), [&](std::size_t g) { return groups[g].key; },
       [&](std::size_t k, int cls) {
-        const BatchGroup& g = groups[k];
+        const SlotGroup& g = groups[k];
         for (std::uint64_t left = candidates[k].ready & kSlotsOfClass[cls]; left != 0; left &= left - 1) {
           const int slot = std::countr_zero(left);
           const bool is_named = (g.slots >> slot & 1) != 0;

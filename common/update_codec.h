@@ -22,16 +22,9 @@ namespace intervale {
 
 inline constexpr std::size_t kBatchUpdatesMost = 1 << 17;  // in one batch; what a reader makes room for
 
-// The updates of one supercube in a batch.
-struct BatchGroup {
-  std::uint32_t brick = 0, supercube = 0;
-  SupercubeKey key = 0;
-  std::uint64_t slots = 0;  // not 0
-};
-
-// The batch of these groups: keys strictly ascending; at most kBatchUpdatesMost updates. split: what the client has split once the batch is applied,
-// closed under parents; the groups' updates are in it.
-[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const BatchGroup> groups);
+// The batch of these groups: keys strictly ascending, slots not 0; at most kBatchUpdatesMost updates. split: what the client has split once the batch
+// is applied, closed under parents; the groups' updates are in it.
+[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups);
 
 struct Applied {
   std::uint64_t updates = 0;

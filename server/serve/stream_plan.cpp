@@ -18,7 +18,7 @@ constexpr std::size_t kSmallBatch = 8 << 10;  // a band's end closes a batch no 
 
 // The batch being put together.
 struct StreamPlan::Chunk {
-  boost::unordered_flat_map<std::uint32_t, BatchGroup> groups;  // by supercube
+  boost::unordered_flat_map<std::uint32_t, SlotGroup> groups;  // by supercube
   boost::unordered_flat_set<std::uint32_t> bricks;
   std::size_t max_bytes = 0, bytes = kPlaneBytes;
   std::uint32_t updates = 0;
@@ -76,7 +76,7 @@ bool StreamPlan::take(const Place& place, Chunk& chunk) {
   ++chunk.updates;
   if (group == chunk.groups.end()) {
     chunk.bricks.insert(place.brick);
-    chunk.groups.emplace(place.supercube, BatchGroup{place.brick, place.supercube, place.key, std::uint64_t(1) << place.slot});
+    chunk.groups.emplace(place.supercube, SlotGroup{place.brick, place.supercube, place.key, std::uint64_t(1) << place.slot});
   } else {
     group->second.slots |= std::uint64_t(1) << place.slot;
   }
@@ -114,10 +114,10 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
     if (full) next_supercube_ = s + 1;  // there is more of it
   }
   if (chunk.updates == 0) return {};
-  std::vector<BatchGroup> groups;
+  std::vector<SlotGroup> groups;
   groups.reserve(chunk.groups.size());
   for (const auto& [supercube, group] : chunk.groups) groups.push_back(group);
-  std::sort(groups.begin(), groups.end(), [](const BatchGroup& a, const BatchGroup& b) { return a.supercube < b.supercube; });
+  std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
   Batch batch;
   batch.payload = encode_batch(*volume_, sent_, groups);
   batch.updates = chunk.updates;

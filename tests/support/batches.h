@@ -17,7 +17,7 @@ inline std::vector<std::uint8_t> batch_of(const IntervalVolume& volume, std::spa
   for (UpdateIndex i : updates) split.insert(i);
   std::vector<UpdateIndex> sorted(updates.begin(), updates.end());
   std::sort(sorted.begin(), sorted.end());
-  std::vector<BatchGroup> groups;
+  std::vector<SlotGroup> groups;
   for (UpdateIndex i : sorted) {
     const Place p = volume.set().place(i);
     if (groups.empty() || groups.back().supercube != p.supercube) groups.push_back({p.brick, p.supercube, p.key, 0});

@@ -1,0 +1,118 @@
+#include "bench/cases.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "server/volume/read_volume.h"
+#include "server/volume/samples.h"
+
+namespace intervale::bench {
+namespace {
+
+// The paper's range for the buckyball; for the others one that meets a good part of the volume.
+const std::map<std::string_view, Range> kSampleRanges{
+    {"buckyball", {128, 188}}, {"gyroid", {-0.5, 0.5}}, {"marschner-lobb", {100, 140}}, {"hydrogen", {20, 120}}};
+
+std::vector<std::string> parts_of(std::string_view text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == separator) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+std::optional<double> number(const std::string& text) {
+  try {
+    std::size_t used = 0;
+    const double value = std::stod(text, &used);
+    if (used == text.size() && !std::isnan(value)) return value;
+  } catch (const std::exception&) {
+    // no number
+  }
+  return {};
+}
+
+template <class T>
+bool read_three(const std::string& text, std::array<T, 3>& out) {
+  const auto parts = parts_of(text, 'x');
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto value = parts.size() == 3 ? number(parts[i]) : std::nullopt;
+    if (!value) return false;
+    out[i] = T(*value);
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<Case> read_case(std::string_view text) {
+  const auto wrong = [&](const std::string& what) { return misuse("'" + std::string(text) + "': " + what + "; give " + kCaseSyntax); };
+  const auto parts = parts_of(text, ',');
+  const auto low = parts.size() < 3 ? std::nullopt : number(parts[1]), high = parts.size() < 3 ? std::nullopt : number(parts[2]);
+  if (!low || !high || *low > *high) return wrong("no range");
+  Case c;
+  c.range = {*low, *high};
+  RawLayout layout;
+  std::string source = parts[0];  // what the volume depends on
+  bool raw = false;
+  for (std::size_t i = 3; i < parts.size(); ++i) {
+    const std::string& part = parts[i];
+    const auto value = part.substr(std::min(part.size(), part.find('=') + 1));
+    if (part.starts_with("name=")) {
+      c.name = value;
+      continue;
+    }
+    if (part == "refine=uniform" || part == "refine=boundary") {
+      c.refine = value == "uniform" ? Refine::uniform : Refine::boundary;
+      continue;
+    }
+    raw = true;
+    source += "," + part;
+    if (part == "big-endian") {
+      layout.big_endian = true;
+    } else if (part.starts_with("type=")) {
+      const auto type = parse_sample_type(value);
+      if (!type) return tl::unexpected(type.error());
+      layout.type = *type;
+    } else if (!(part.starts_with("dims=") && read_three(value, layout.dims)) &&
+               !(part.starts_with("spacing=") && read_three(value, layout.spacing))) {
+      return wrong("'" + part + "' is none of what may follow");
+    }
+  }
+  static std::string last_source;
+  static std::shared_ptr<const Volume> last;
+  if (source != last_source || !last) {
+    auto read = read_volume(parts[0], raw ? std::optional(layout) : std::nullopt);
+    if (!read) return tl::unexpected(read.error());
+    if (auto finite = check_finite(*read, {}); !finite) return tl::unexpected(finite.error());
+    last = std::make_shared<const Volume>(std::move(*read));
+    last_source = source;
+  }
+  c.volume = last;
+  if (c.name.empty()) c.name = last->name;
+  return c;
+}
+
+Result<Case> sample_case(std::string_view name, int size) {
+  auto made = make_sample(name, size);
+  if (!made) return tl::unexpected(made.error());
+  const auto range = kSampleRanges.find(name);
+  return Case{std::string(name), std::make_shared<const Volume>(std::move(*made)), range == kSampleRanges.end() ? Range{0, 1} : range->second,
+              Refine::boundary};
+}
+
+std::string range_text(const Case& c) {
+  return fmt::format("[{}, {}]{}", c.range.alpha, c.range.beta, c.refine == Refine::uniform ? ", uniform" : "");
+}
+
+}  // namespace intervale::bench

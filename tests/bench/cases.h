@@ -1,0 +1,33 @@
+// What is measured: volumes, and a range of each.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "common/description.h"
+#include "common/result.h"
+#include "server/volume/volume.h"
+
+namespace intervale::bench {
+
+struct Case {
+  std::string name;
+  std::shared_ptr<const Volume> volume;  // shared by the cases that differ in nothing but range and refine
+  Range range;
+  Refine refine = Refine::boundary;
+};
+
+inline constexpr const char* kCaseSyntax =
+    "PATH,LO,HI and then, as needed: dims=XxYxZ, type=u8, big-endian, spacing=XxYxZ (raw samples), refine=uniform, name=NAME";
+
+// Reads a case from the text above; misuse if it is none. A volume that the last call read is not read again. One thread.
+[[nodiscard]] Result<Case> read_case(std::string_view text);
+
+// One of the product's own samples, with a range that suits it.
+[[nodiscard]] Result<Case> sample_case(std::string_view name, int size);
+
+// "[59.1, 124.1]", with ", uniform" after it where that is so.
+[[nodiscard]] std::string range_text(const Case& c);
+
+}  // namespace intervale::bench

@@ -1,0 +1,324 @@
+#include "bench/delta.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <boost/unordered/unordered_flat_map.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "common/base.h"
+#include "common/supercube.h"
+#include "server/build/interpolation_error.h"
+
+namespace intervale::bench {
+namespace {
+
+constexpr const char* kTooSoon = "Delta wants a diamond split before its parents";
+
+// A diamond's name: its centre in 63 bits.
+std::uint64_t id_of(Vertex c) { return std::uint64_t(c.x) | std::uint64_t(c.y) << 21 | std::uint64_t(c.z) << 42; }
+
+float round_up(double error) {
+  const float f = float(std::min(error, double(std::numeric_limits<float>::max())));
+  return double(f) < error ? std::nextafter(f, std::numeric_limits<float>::max()) : f;
+}
+
+// Offsets of every type's vertices and children in an array of samples; times h, or for children of class 2 times h / 2.
+struct Steps {
+  std::array<std::ptrdiff_t, kMaxVertices> vertex{};
+  std::array<std::ptrdiff_t, kMaxChildren> child{};
+};
+
+template <class T>
+class TypedDelta final : public Delta {
+ public:
+  TypedDelta(const Grid& grid, std::span<const T> samples) : grid_(grid), domain_(grid.dims), field_{samples, domain_.last()} {
+    const std::ptrdiff_t row = domain_.last().x + 1, slice = row * (domain_.last().y + 1);
+    for (unsigned type = 0; type < steps_.size(); ++type) {
+      const DiamondType& t = diamond_type(type);
+      const auto step = [&](Offset f) { return f.x + f.y * row + f.z * slice; };
+      for (int v = 0; v < t.vertices; ++v) steps_[type].vertex[v] = step(t.vertex[v]);
+      for (int k = 0; k < t.children; ++k) steps_[type].child[k] = step(t.child[k].child);
+    }
+    nodes_.resize(samples.size());
+    find_outside();
+    for (int scale = 0; scale < domain_.levels(); ++scale) {
+      for (int cls = 2; cls >= 0; --cls) measure(scale, cls);
+    }
+  }
+
+  [[nodiscard]] Refined refine(const Range& range, Refine mode, double error, Walk walk) const override {
+    return mode == Refine::boundary ? refine_as<Refine::boundary>(range, error, walk) : refine_as<Refine::uniform>(range, error, walk);
+  }
+
+  [[nodiscard]] std::size_t memory_bytes() const override { return nodes_.size() * sizeof(Node) + outside_.size() * 16; }
+
+ private:
+  // Of one diamond. Together, so that a query finds all it tests in one place.
+  struct Node {
+    float error = -1;  // saturated: no smaller than any child's; -1: there is no diamond, or it is idle
+    T min{}, max{};    // over the diamond's vertices and centre, and over those of all that descend from it
+  };
+  using Index = std::uint32_t;  // of a node: the centre's sample; centres beyond the box come after all samples
+  static constexpr Index kNowhere = std::numeric_limits<Index>::max();
+
+  [[nodiscard]] Index index_of(Vertex v) const {
+    if (domain_.contains(v)) return Index(field_.index(v));
+    if ((v.x | v.y | v.z) < 0) return kNowhere;
+    const auto found = outside_.find(id_of(v));
+    return found == outside_.end() ? kNowhere : found->second;
+  }
+
+  // Centres of a scale lie at multiples of h, none further out than the first one beyond the box.
+  [[nodiscard]] Vertex places(int scale) const {
+    const auto count = [scale](std::int32_t last) { return std::int32_t(((std::int64_t(last) + (1 << scale) - 1) >> scale) + 1); };
+    return {count(field_.last.x), count(field_.last.y), count(field_.last.z)};
+  }
+  template <class Visit>
+  void for_each_in_slice(int scale, std::int32_t z, Visit&& visit) const {
+    const Vertex n = places(scale);
+    for (std::int32_t y = 0; y < n.y; ++y) {
+      for (std::int32_t x = 0; x < n.x; ++x) {
+        if (((x | y | z) & 1) != 0) visit(Diamond({x << scale, y << scale, z << scale}));
+      }
+    }
+  }
+
+  void find_outside() {
+    for (int scale = 0; scale < domain_.levels(); ++scale) {
+      for (std::int32_t z = 0; z < places(scale).z; ++z) {
+        for_each_in_slice(scale, z, [&](const Diamond& d) {
+          if (domain_.contains(d.centre) || domain_.tets(d) == 0) return;
+          outside_.emplace(id_of(d.centre), Index(nodes_.size()));
+          nodes_.emplace_back();
+        });
+      }
+    }
+  }
+
+  // Diamonds of one scale and class are children of none of their own: slices in any order.
+  void measure(int scale, int cls) {
+    tbb::parallel_for(std::int32_t(0), places(scale).z, [&](std::int32_t z) {
+      for_each_in_slice(scale, z, [&](const Diamond& d) {
+        if (d.row->cls != cls) return;
+        const Index index = index_of(d.centre);
+        if (index == kNowhere) return;
+        const unsigned tets = domain_.tets(d);
+        if (tets == 0 || domain_.is_idle(d)) return;
+        Node& node = nodes_[index];
+        node.error = round_up(diamond_error(field_, domain_, d, tets));
+        node.min = node.max = sample(d.centre);
+        const auto take = [&node](T low, T high) {
+          node.min = std::min(node.min, low);
+          node.max = std::max(node.max, high);
+        };
+        const unsigned vertices = Domain::vertices(*d.row, tets);
+        for (int v = 0; v < d.row->vertices; ++v) {
+          if (vertices >> v & 1) take(sample(d.vertex(v)), sample(d.vertex(v)));
+        }
+        for (int k = 0; k < d.row->children && d.has_children(); ++k) {
+          const Index child = index_of(d.child(k));
+          if (child == kNowhere || nodes_[child].error < 0) continue;
+          node.error = std::max(node.error, nodes_[child].error);
+          take(nodes_[child].min, nodes_[child].max);
+        }
+      });
+    });
+  }
+
+  [[nodiscard]] T sample(Vertex v) const { return field_.samples[field_.index(domain_.clamp(v))]; }
+
+  // Sides ascend with values; and where they differ among the vertices in a diamond, they do so across an edge of a diamond there, which is then
+  // relevant by itself. So this asks neither too much nor too little: at error 0 it splits what Sigma holds.
+  template <Refine mode>
+  [[nodiscard]] static bool is_wanted(const Node& node, const Range& range, double threshold) {
+    if (!(double(node.error) > threshold)) return false;
+    const Side low = side_of(double(node.min), range), high = side_of(double(node.max), range);
+    return mode == Refine::boundary ? low != high : low != Side::above && high != Side::below;
+  }
+
+  [[nodiscard]] Base base(const Range& range) const {
+    const Diamond root(domain_.root());
+    const unsigned edges = Domain::edges(*root.row, domain_.tets(root));
+    Base base;
+    for (int v = 0; v < kRootVertices; ++v) base.side[v] = side_of(double(sample(root.vertex(v))), range);
+    for (int e = 0; e < kRootEdges; ++e) {
+      const auto [a, b] = edge_ends(e, root.row->belt);
+      if (edges >> e & 1) base.cuts[e] = cuts_between(double(sample(root.vertex(a))), double(sample(root.vertex(b))), range);
+    }
+    return base;
+  }
+
+  template <Refine mode>
+  [[nodiscard]] Refined refine_as(const Range& range, double error, Walk walk) const {
+    const double threshold = error > 0 ? error : -0.5;  // at 0 every relevant diamond, also those without an error
+    Refined refined{Front(grid_, base(range))};
+    const auto wanted = [&](Index i) { return is_wanted<mode>(nodes_[i], range, threshold); };
+    if (walk == Walk::diamonds) {
+      refine_diamonds(refined, range, wanted);
+    } else {
+      refine_supercubes(refined, range, wanted);
+    }
+    return refined;
+  }
+
+  // Top down, generation by generation: all parents of a diamond are of the generation before its own. Errors and values are saturated, so whatever
+  // is wanted has all its parents split by the time its turn comes, and none has to be forced.
+  template <class Wanted>
+  void refine_diamonds(Refined& refined, const Range& range, const Wanted& wanted) const {
+    struct Reached {
+      Vertex centre;
+      Index index;
+    };
+    std::vector<std::uint64_t> seen((nodes_.size() + 63) / 64);
+    std::vector<Reached> now, next;
+    const auto reach = [&](Vertex centre, Index index) {
+      std::uint64_t& word = seen[index / 64];
+      const std::uint64_t bit = std::uint64_t(1) << (index % 64);
+      if ((word & bit) != 0) return;
+      word |= bit;
+      if (wanted(index)) next.push_back({centre, index});
+    };
+    reach(domain_.root(), index_of(domain_.root()));
+    Front::Cursor cursor(refined.front);
+    while (!next.empty()) {
+      now.swap(next);
+      next.clear();
+      for (const Reached& r : now) {
+        const Diamond d(r.centre);
+        const bool interior = domain_.is_interior(d);
+        const int up = d.scale + 2;
+        cursor.move_to(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
+        if (!cursor.gather(kSlotOfType[d.type])) throw std::logic_error(kTooSoon);
+        const Update u = update(d, interior, range);
+        cursor.split(u.side, std::span(u.cuts).first(u.count));
+        for_each_child(d, interior, reach);
+      }
+      refined.updates += now.size();
+    }
+  }
+
+  // The diamonds of one scale in a query, by supercubes in a dense grid.
+  struct Level {
+    struct Word {
+      std::uint64_t seen = 0, wanted = 0;  // slots
+    };
+    Vertex dims;  // in supercubes
+    std::vector<Word> words;
+    std::vector<std::uint32_t> touched;  // those with a wanted slot, in order of the first
+
+    explicit Level(Vertex places) : dims{((places.x - 1) >> 2) + 1, ((places.y - 1) >> 2) + 1, ((places.z - 1) >> 2) + 1} {
+      words.resize(std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z));
+    }
+    [[nodiscard]] std::uint32_t at(Vertex p) const { return std::uint32_t((p.z * dims.y + p.y) * dims.x + p.x); }
+    [[nodiscard]] Vertex position(std::uint32_t i) const {
+      const auto nx = std::uint32_t(dims.x), ny = std::uint32_t(dims.y);
+      return {std::int32_t(i % nx), std::int32_t(i / nx % ny), std::int32_t(i / (nx * ny))};
+    }
+  };
+
+  // The same scale by scale and class by class, which are the generations, in supercubes: there the front looks around quickest.
+  template <class Wanted>
+  void refine_supercubes(Refined& refined, const Range& range, const Wanted& wanted) const {
+    std::vector<Level> levels;
+    for (int scale = 0; scale < domain_.levels(); ++scale) levels.emplace_back(places(scale));
+    const auto reach = [&](Vertex centre, Index index) {
+      const int scale = scale_of(centre), up = scale + 2;
+      Level& level = levels[std::size_t(scale)];
+      const std::uint32_t i = level.at({centre.x >> up, centre.y >> up, centre.z >> up});
+      typename Level::Word& word = level.words[i];
+      const std::uint64_t bit = std::uint64_t(1) << kSlotOfType[type_of(centre, scale)];
+      if ((word.seen & bit) != 0) return;
+      word.seen |= bit;
+      if (!wanted(index)) return;
+      if (word.wanted == 0) level.touched.push_back(i);
+      word.wanted |= bit;
+    };
+    reach(domain_.root(), index_of(domain_.root()));
+    Front::Cursor cursor(refined.front);
+    for (int scale = domain_.levels() - 1; scale >= 0; --scale) {
+      Level& level = levels[std::size_t(scale)];
+      for (const std::uint64_t cls : kSlotsOfClass) {
+        for (std::size_t k = 0; k < level.touched.size(); ++k) {  // grows
+          const Vertex p = level.position(level.touched[k]);
+          std::uint64_t left = level.words[level.touched[k]].wanted & cls;
+          if (left != 0) cursor.move_to(scale, p);
+          for (; left != 0; left &= left - 1) {
+            const int slot = std::countr_zero(left);
+            if (!cursor.gather(slot)) throw std::logic_error(kTooSoon);
+            const Diamond& d = cursor.diamond();
+            const bool interior = domain_.is_interior(d);
+            const Update u = update(d, interior, range);
+            cursor.split(u.side, std::span(u.cuts).first(u.count));
+            ++refined.updates;
+            for_each_child(d, interior, reach);
+          }
+        }
+      }
+    }
+  }
+
+  // Calls reach(centre, index) for the children of a diamond that there may be.
+  template <class Reach>
+  void for_each_child(const Diamond& d, bool interior, const Reach& reach) const {
+    if (!d.has_children()) return;
+    if (!interior) {
+      for (int k = 0; k < d.row->children; ++k) {
+        const Index index = index_of(d.child(k));
+        if (index != kNowhere) reach(d.child(k), index);
+      }
+      return;
+    }
+    const auto here = std::ptrdiff_t(field_.index(d.centre));
+    const std::ptrdiff_t step = d.row->cls == 2 ? d.h / 2 : d.h;
+    for (int k = 0; k < d.row->children; ++k) reach(d.child(k), Index(here + steps_[d.type].child[k] * step));
+  }
+
+  struct Update {
+    Side side;
+    std::size_t count = 0;
+    std::array<std::uint8_t, kMaxCuts> cuts;
+  };
+  [[nodiscard]] Update update(const Diamond& d, bool interior, const Range& range) const {
+    const T* const at_centre = &field_.samples[field_.index(interior ? d.centre : domain_.clamp(d.centre))];
+    const double centre = double(*at_centre);
+    Update u;
+    u.side = side_of(centre, range);
+    const auto cut = [&](double value) {
+      if (side_of(value, range) == u.side) return;
+      const Cuts q = cuts_between(centre, value, range);
+      for (int i = 0; i < q.count; ++i) u.cuts[u.count++] = q.q[i];
+    };
+    if (interior) {
+      for (int v = 0; v < d.row->vertices; ++v) cut(double(at_centre[steps_[d.type].vertex[v] * d.h]));
+    } else {
+      const unsigned vertices = Domain::vertices(*d.row, domain_.tets(d));
+      for (int v = 0; v < d.row->vertices; ++v) {
+        if (vertices >> v & 1) cut(double(sample(d.vertex(v))));
+      }
+    }
+    return u;
+  }
+
+  Grid grid_;
+  Domain domain_;
+  Field<T> field_;
+  std::array<Steps, 64> steps_;
+  std::vector<Node> nodes_;
+  boost::unordered_flat_map<std::uint64_t, Index> outside_;  // id_of the straddling diamonds whose centre is no sample
+};
+
+}  // namespace
+
+std::unique_ptr<Delta> make_delta(const Volume& volume) {
+  return visit_samples(
+      volume, [&]<class T>(std::span<const T> samples) -> std::unique_ptr<Delta> { return std::make_unique<TypedDelta<T>>(volume.grid, samples); });
+}
+
+}  // namespace intervale::bench
