@@ -108,8 +108,12 @@ class FrontMesh {
   // count as split.
   template <class Visit>
   void for_each_point(std::size_t piece, const Visit& visit) const {
-    if (piece == 0) for_each_point({}, front_.corner_.of[0], visit);
+    if (piece == 0) for_corner(visit);
     for_each_block(piece, [&](const Front::Block& block) { for_each_point(block, visit); });
+  }
+  template <class Visit>
+  void for_corner(const Visit& visit) const {  // (0, 0, 0), the oldest vertex: no edge is its own
+    if (front_.corner_.of[0].side() == Side::inside) visit(front_.corner_.of[0].centre(), Position{}, Surface::inside, false);
   }
   template <class Visit>
   void for_each_point(const Front::Block& block, const Visit& visit) const {
@@ -137,7 +141,7 @@ class FrontMesh {
   // All points that splits brought, but for those on the border.
   void use_edges(std::size_t piece) {
     const auto use = [this](std::uint32_t point, const Position&, Surface, bool border) { used_[point] = !border; };
-    if (piece == 0) for_each_point({}, front_.corner_.of[0], use);
+    if (piece == 0) for_corner(use);
     for_each_block(piece, [&](const Front::Block& block) {
       if (is_at_border(block)) return for_each_point(block, use);
       for (std::uint64_t left = block.split; left != 0; left &= left - 1) {

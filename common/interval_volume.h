@@ -33,12 +33,13 @@ class UpdateCode {
       : bits_(std::uint16_t(side_difference | (first == 2 ? all + 9 : all) << 2 | error_level << 7)) {}
   [[nodiscard]] std::uint16_t bits() const { return bits_; }
   [[nodiscard]] unsigned side_difference() const { return bits_ & 3u; }
-  [[nodiscard]] unsigned coefficients() const { return shape() > 10 ? shape() - 9 : shape(); }
-  [[nodiscard]] unsigned first_cuts() const { return shape() == 0 ? 0 : shape() > 10 ? 2 : 1; }
+  [[nodiscard]] unsigned coefficients() const { return counts() > 10 ? counts() - 9 : counts(); }
+  [[nodiscard]] unsigned first_cuts() const { return counts() == 0 ? 0 : counts() > 10 ? 2 : 1; }
   [[nodiscard]] unsigned error_level() const { return bits_ >> 7; }
+  [[nodiscard]] std::uint8_t shape() const { return bits_ & 127u; }  // all but the error
 
  private:
-  [[nodiscard]] unsigned shape() const { return bits_ >> 2 & 31u; }
+  [[nodiscard]] unsigned counts() const { return bits_ >> 2 & 31u; }
   std::uint16_t bits_ = 0;
 };
 

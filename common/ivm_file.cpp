@@ -3,6 +3,7 @@
 #include <xxhash.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "common/atomic_file.h"
+#include "common/difference_coder.h"
 #include "common/planes.h"
 
 namespace intervale {
@@ -21,10 +23,10 @@ static_assert(std::endian::native == std::endian::little, "arrays are stored as 
 constexpr char kMagic[8] = {'\x89', 'I', 'V', 'M', '\r', '\n', '\x1a', '\n'};
 constexpr int kCompression = 9;               // zstd; 19 gains a few percent and takes ten times as long
 constexpr unsigned kSlotBytes = 7;            // of an occupancy word: 56 slots
-constexpr std::uint64_t kMaxRatio = 1 << 15;  // zstd's own: a block of 128 KiB in 4 bytes
+constexpr std::uint64_t kMaxRatio = 1 << 15;  // zstd's own: a block of 128 KiB in 4 bytes; a range coder's is less
 
-enum Section : std::uint32_t { kMeta, kBase, kErrors, kBricks, kMasks, kOccupancy, kShapes, kLevels, kFirst, kOther, kSections };
-constexpr const char* kSectionNames[kSections] = {"meta", "base", "errors", "bricks", "masks", "occupancy", "shapes", "levels", "first", "other"};
+enum Section : std::uint32_t { kMeta, kBase, kErrors, kBricks, kMasks, kOccupancy, kLevels, kShapes, kDifferences, kSections };
+constexpr const char* kSectionNames[kSections] = {"meta", "base", "errors", "bricks", "masks", "occupancy", "levels", "shapes", "differences"};
 
 struct Header {
   char magic[8];
@@ -47,10 +49,74 @@ static_assert(sizeof(Header) == 32 && sizeof(Entry) == 40 && sizeof(Meta) == 144
 
 constexpr std::size_t kTableBytes = sizeof(Header) + kSections * sizeof(Entry);
 
-std::vector<std::byte> compress(std::span<const std::uint8_t> raw) {
-  std::vector<std::byte> out(ZSTD_compressBound(raw.size()));
-  out.resize(ZSTD_compress(out.data(), out.size(), raw.data(), raw.size(), kCompression));
-  return out;
+// What a section holds, in the file and decompressed.
+struct Stored {
+  std::vector<std::uint8_t> bytes;
+  std::uint64_t raw_bytes = 0;
+};
+
+Stored compressed(const std::vector<std::uint8_t>& raw) {
+  Stored s{std::vector<std::uint8_t>(ZSTD_compressBound(raw.size())), raw.size()};
+  s.bytes.resize(ZSTD_compress(s.bytes.data(), s.bytes.size(), raw.data(), raw.size(), kCompression));
+  return s;
+}
+
+// Calls visit(number) for those of an update's parents that are in the set.
+template <class Visit>
+void for_each_parent(const SupercubeSet& set, const Place& p, Visit&& visit) {
+  const Diamond d(set.centre(p));
+  for (int k = 0; k < d.row->parents; ++k) {
+    const Vertex c = d.parent(k);
+    if ((c.x | c.y | c.z) < 0) continue;
+    if (const auto parent = set.find(c)) visit(parent->index);
+  }
+}
+
+// The three below write what is in their last argument, or read into it: by number of the update.
+
+// An error is no smaller than its children's, and often their largest. Fine to coarse.
+template <class Coder>
+void code_levels(Coder& coder, const SupercubeSet& set, std::span<std::uint16_t> levels) {
+  std::array<std::array<NumberModel<9>, 2>, 3> without_children;
+  std::array<std::array<SmallNumberModel, 2>, 3> above_children;
+  std::vector<std::uint16_t> least(set.size());  // the largest level of a child and 1, 0 without children
+  static_assert(kErrorLevels == 512);
+  set.for_each_up([&](const Place& p) {
+    const int cls = class_of_slot(int(p.slot)), finest = scale_of_key(p.key) == 0;
+    std::uint16_t& level = levels[p.index];
+    const unsigned from = least[p.index];
+    if (from == 0) {
+      level = std::uint16_t(without_children[cls][finest].code(coder, level));
+    } else {
+      level = std::uint16_t((from - 1 + above_children[cls][finest].code(coder, (level - from + 1) & 511u)) & 511u);
+    }
+    for_each_parent(set, p, [&](UpdateIndex parent) { least[parent] = std::max(least[parent], std::uint16_t(level + 1)); });
+  });
+}
+
+// Where the parents have many cuts, so has an update. Coarse to fine.
+template <class Coder>
+void code_shapes(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> shapes) {
+  std::array<std::array<std::array<NumberModel<7>, 16>, 2>, 3> model;
+  set.for_each_down([&](const Place& p) {
+    unsigned cuts = 0;
+    for_each_parent(set, p, [&](UpdateIndex parent) { cuts += UpdateCode(shapes[parent]).coefficients(); });
+    std::uint8_t& shape = shapes[p.index];
+    shape = std::uint8_t(model[class_of_slot(int(p.slot))][scale_of_key(p.key) == 0][std::min(cuts, 15u)].code(coder, shape));
+  });
+}
+
+template <class Coder>
+void code_differences(Coder& coder, const SupercubeSet& set, std::span<const std::uint8_t> shapes, std::span<std::uint8_t> differences) {
+  DifferenceCoder model;
+  std::uint8_t* next = differences.data();
+  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+    set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
+      const UpdateCode code(shapes[p.index]);
+      model.code_cuts(coder, class_of_slot(int(p.slot)), code.side_difference(), code.coefficients(), code.first_cuts(), next);
+      next += code.coefficients();
+    });
+  }
 }
 
 template <class T>
@@ -81,54 +147,53 @@ Meta meta_of(const IntervalVolume& volume) {
   return meta;
 }
 
-// What a section holds, before compression.
-std::vector<std::uint8_t> section_bytes(const IntervalVolume& volume, Section section) {
+Stored stored(const IntervalVolume& volume, Section section) {
   std::vector<std::uint8_t> raw;
-  const auto bricks = volume.set().bricks();
+  const SupercubeSet& set = volume.set();
   const auto codes = volume.codes();
   switch (section) {
     case kMeta: {
       const Meta meta = meta_of(volume);
-      return bytes_of(std::span<const Meta>(&meta, 1));
+      return compressed(bytes_of(std::span<const Meta>(&meta, 1)));
     }
     case kBase:
-      return volume.description().base;
+      return compressed(volume.description().base);
     case kErrors:
-      return bytes_of(volume.error_levels());
+      return compressed(bytes_of(volume.error_levels()));
     case kBricks: {
       std::uint64_t previous = 0;
-      for (const SupercubeSet::Brick& b : bricks) append_varint(raw, (b.key >> 6) - std::exchange(previous, b.key >> 6));
-      return raw;
+      for (const SupercubeSet::Brick& b : set.bricks()) append_varint(raw, (b.key >> 6) - std::exchange(previous, b.key >> 6));
+      return compressed(raw);
     }
     case kMasks: {
       std::vector<std::uint64_t> masks;
-      for (const SupercubeSet::Brick& b : bricks) masks.push_back(b.mask);
-      return split_bytes(masks, 8);
+      for (const SupercubeSet::Brick& b : set.bricks()) masks.push_back(b.mask);
+      return compressed(split_bytes(masks, 8));
     }
     case kOccupancy:
-      return split_bytes(volume.set().occupancy(), kSlotBytes);
+      return compressed(split_bytes(set.occupancy(), kSlotBytes));
+    case kLevels:
     case kShapes:
-      raw.reserve(codes.size());
-      for (const UpdateCode c : codes) raw.push_back(std::uint8_t(c.bits() & 127));
-      return raw;
-    case kLevels:  // as split_bytes would
-      raw.reserve(2 * codes.size());
-      for (const unsigned shift : {0u, 8u}) {
-        for (const UpdateCode c : codes) raw.push_back(std::uint8_t(c.error_level() >> shift));
-      }
-      return raw;
-    case kFirst:
-    case kOther:
+    case kDifferences:
     case kSections:
       break;
   }
-  const std::uint8_t* differences = volume.differences().data();
-  for (const UpdateCode c : codes) {
-    const unsigned begin = section == kFirst ? 0 : c.first_cuts(), end = section == kFirst ? c.first_cuts() : c.coefficients();
-    raw.insert(raw.end(), differences + begin, differences + end);
-    differences += c.coefficients();
+  RangeEncoder coder;
+  if (section == kLevels) {
+    std::vector<std::uint16_t> levels;
+    levels.reserve(codes.size());
+    for (const UpdateCode c : codes) levels.push_back(std::uint16_t(c.error_level()));
+    code_levels(coder, set, levels);
+    return {coder.finish(), 2 * levels.size()};
   }
-  return raw;
+  for (const UpdateCode c : codes) raw.push_back(c.shape());
+  if (section == kShapes) {
+    code_shapes(coder, set, raw);
+    return {coder.finish(), raw.size()};
+  }
+  std::vector<std::uint8_t> differences(volume.differences().begin(), volume.differences().end());
+  code_differences(coder, set, raw, differences);
+  return {coder.finish(), differences.size()};
 }
 
 std::uint64_t table_checksum(std::span<const std::byte> table) {
@@ -137,15 +202,16 @@ std::uint64_t table_checksum(std::span<const std::byte> table) {
   return XXH3_64bits(copy.data(), copy.size());
 }
 
-// The raw bytes of a section, of which there must be `expected`.
-Result<std::vector<std::uint8_t>> read(std::span<const std::byte> file, const Entry& e, std::uint64_t expected) {
-  const std::string name = kSectionNames[e.section];
-  if (e.raw_bytes != expected)
-    return fail("section '" + name + "' has " + std::to_string(e.raw_bytes) + " bytes, " + std::to_string(expected) + " expected");
-  const auto stored = file.subspan(e.offset, e.stored_bytes);
+tl::unexpected<Error> does_not_decompress(const Entry& e) {
+  return fail(std::string("section '") + kSectionNames[e.section] + "' does not decompress");
+}
+
+// The raw bytes of a section that zstd compressed.
+Result<std::vector<std::uint8_t>> read(std::span<const std::uint8_t> file, const Entry& e) {
+  const auto bytes = file.subspan(e.offset, e.stored_bytes);
   std::vector<std::uint8_t> raw(e.raw_bytes);
-  const std::size_t got = ZSTD_decompress(raw.data(), raw.size(), stored.data(), stored.size());
-  if (ZSTD_isError(got) || got != raw.size()) return fail("section '" + name + "' does not decompress");
+  const std::size_t got = ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size());
+  if (ZSTD_isError(got) || got != raw.size()) return does_not_decompress(e);
   return raw;
 }
 
@@ -163,6 +229,8 @@ Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> s
     for (std::uint64_t mask = masks[b]; mask != 0; mask &= mask - 1) {
       if (keys.size() == count) return fail("more supercubes than there should be");
       keys.push_back(first + unsigned(std::countr_zero(mask)));
+      const Vertex p = position_of_key(keys.back());
+      if (std::max({p.x, p.y, p.z}) > (1 << kMaxLevels) >> (scale_of_key(first) + 2)) return fail("a supercube beyond any grid");
     }
   }
   if (keys.size() != count || !steps.empty()) return fail("bricks and supercubes do not fit");
@@ -179,11 +247,11 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume) {
   header.sections = kSections;
   // One section at a time: together they would be as large as the volume that they come from.
   for (int s = 0; s < int(kSections); ++s) {
-    const std::vector<std::uint8_t> raw = section_bytes(volume, Section(s));
-    const std::vector<std::byte> stored = compress(raw);
-    const Entry e{std::uint32_t(s), 0, file.size(), stored.size(), raw.size(), XXH3_64bits(stored.data(), stored.size())};
+    const Stored section = stored(volume, Section(s));
+    const auto bytes = std::as_bytes(std::span(section.bytes));
+    const Entry e{std::uint32_t(s), 0, file.size(), bytes.size(), section.raw_bytes, XXH3_64bits(bytes.data(), bytes.size())};
     std::memcpy(file.data() + sizeof(Header) + s * sizeof(Entry), &e, sizeof e);
-    file.insert(file.end(), stored.begin(), stored.end());
+    file.insert(file.end(), bytes.begin(), bytes.end());
   }
   header.file_bytes = file.size();
   std::memcpy(file.data(), &header, sizeof header);
@@ -223,7 +291,15 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   }
   if (next != file.size()) return fail("bytes after the last section");
 
-  const auto meta_bytes = read(file, entries[kMeta], sizeof(Meta));
+  const auto is_size = [&entries](Section section, std::uint64_t expected) -> Result<void> {
+    const std::uint64_t bytes = entries[section].raw_bytes;
+    if (bytes == expected) return {};
+    return fail(std::string("section '") + kSectionNames[section] + "' has " + std::to_string(bytes) + " bytes, " + std::to_string(expected) +
+                " expected");
+  };
+  const std::span all(reinterpret_cast<const std::uint8_t*>(file.data()), file.size());
+  if (auto ok = is_size(kMeta, sizeof(Meta)); !ok) return tl::unexpected(ok.error());
+  const auto meta_bytes = read(all, entries[kMeta]);
   if (!meta_bytes) return tl::unexpected(meta_bytes.error());
   Meta meta;
   std::memcpy(&meta, meta_bytes->data(), sizeof meta);
@@ -247,13 +323,17 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
       meta.coefficients > meta.updates * kMaxCuts || meta.updates > std::numeric_limits<UpdateIndex>::max()) {
     return fail("the counts do not fit");
   }
-  Result<std::vector<std::uint8_t>> raw[kSections];
-  const std::uint64_t expected[kSections] = {
-      sizeof(Meta), entries[kBase].raw_bytes, entries[kErrors].raw_bytes, entries[kBricks].raw_bytes, meta.bricks * 8, meta.supercubes * kSlotBytes,
-      meta.updates, meta.updates * 2,         entries[kFirst].raw_bytes,  entries[kOther].raw_bytes};
-  if (entries[kFirst].raw_bytes + entries[kOther].raw_bytes != meta.coefficients) return fail("updates and coefficients do not fit");
-  for (int s = kBase; s < int(kSections); ++s) {
-    raw[s] = read(file, entries[s], expected[s]);
+  const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},
+                                                        {kOccupancy, meta.supercubes * kSlotBytes},
+                                                        {kLevels, 2 * meta.updates},
+                                                        {kShapes, meta.updates},
+                                                        {kDifferences, meta.coefficients}};
+  for (const auto& [section, bytes] : expected) {
+    if (auto ok = is_size(section, bytes); !ok) return tl::unexpected(ok.error());
+  }
+  Result<std::vector<std::uint8_t>> raw[kLevels];
+  for (int s = kBase; s < int(kLevels); ++s) {
+    raw[s] = read(all, entries[s]);
     if (!raw[s]) return tl::unexpected(raw[s].error());
   }
   const auto keys = supercube_keys(*raw[kBricks], join_bytes(*raw[kMasks], 8), meta.supercubes);
@@ -269,22 +349,28 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   parts.error_levels.resize(raw[kErrors]->size() / sizeof(float));
   if (!parts.error_levels.empty()) std::memcpy(parts.error_levels.data(), raw[kErrors]->data(), raw[kErrors]->size());
   parts.set = SupercubeSet(*keys, std::move(occupancy));
-  const auto levels = join_bytes(*raw[kLevels], 2);
-  std::span<const std::uint8_t> first(*raw[kFirst]), other(*raw[kOther]);
+  const auto coded = [&](Section section) { return all.subspan(entries[section].offset, entries[section].stored_bytes); };
+  std::vector<std::uint16_t> levels(meta.updates);
+  RangeDecoder level_coder(coded(kLevels));
+  code_levels(level_coder, parts.set, levels);
+  if (!level_coder.is_spent()) return does_not_decompress(entries[kLevels]);
+  std::vector<std::uint8_t> shapes(meta.updates);
+  RangeDecoder shape_coder(coded(kShapes));
+  code_shapes(shape_coder, parts.set, shapes);
+  if (!shape_coder.is_spent()) return does_not_decompress(entries[kShapes]);
   parts.codes.reserve(meta.updates);
-  parts.differences.reserve(meta.coefficients);
+  std::uint64_t coefficients = 0;
   for (std::size_t i = 0; i < levels.size(); ++i) {
-    const unsigned shape = (*raw[kShapes])[i];
-    if (shape > 127 || levels[i] >= kErrorLevels) return fail("an update's code is none");
-    const UpdateCode code(std::uint16_t(shape | unsigned(levels[i]) << 7));
-    const std::size_t firsts = code.first_cuts(), others = code.coefficients() - firsts;
-    if (firsts > first.size() || others > other.size()) return fail("updates and coefficients do not fit");
+    const UpdateCode code(std::uint16_t(shapes[i] | levels[i] << 7));
+    if (code.side_difference() > 2 || code.coefficients() > kMaxCuts) return fail("an update's code is none");
     parts.codes.push_back(code);
-    parts.differences.insert(parts.differences.end(), first.begin(), first.begin() + std::ptrdiff_t(firsts));
-    parts.differences.insert(parts.differences.end(), other.begin(), other.begin() + std::ptrdiff_t(others));
-    first = first.subspan(firsts);
-    other = other.subspan(others);
+    coefficients += code.coefficients();
   }
+  if (coefficients != meta.coefficients) return fail("updates and coefficients do not fit");
+  parts.differences.resize(meta.coefficients);
+  RangeDecoder difference_coder(coded(kDifferences));
+  code_differences(difference_coder, parts.set, shapes, parts.differences);
+  if (!difference_coder.is_spent()) return does_not_decompress(entries[kDifferences]);
   auto volume = IntervalVolume::assemble(std::move(parts));
   if (volume && volume->description().content_hash != meta.content_hash) return fail("the contents are not those that were written (content hash)");
   return volume;

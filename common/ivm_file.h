@@ -12,7 +12,7 @@
 
 namespace intervale {
 
-inline constexpr std::uint32_t kIvmVersion = 1;
+inline constexpr std::uint32_t kIvmVersion = 2;
 
 // The file's bytes. Equal volumes give equal bytes; the name is not stored.
 [[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume);

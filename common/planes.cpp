@@ -50,12 +50,6 @@ std::optional<std::uint64_t> take_varint(std::span<const std::uint8_t>& bytes) {
   return {};
 }
 
-std::vector<std::uint8_t> pack_pairs(std::span<const std::uint8_t> values) {
-  std::vector<std::uint8_t> packed((values.size() + 3) / 4);
-  for (std::size_t i = 0; i < values.size(); ++i) packed[i / 4] = std::uint8_t(packed[i / 4] | values[i] << (2 * (i % 4)));
-  return packed;
-}
-
 std::vector<std::uint8_t> split_bytes(std::span<const std::uint64_t> words, unsigned width) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(words.size() * width);

@@ -20,10 +20,6 @@ void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> 
 void append_varint(std::vector<std::uint8_t>& out, std::uint64_t value);
 [[nodiscard]] std::optional<std::uint64_t> take_varint(std::span<const std::uint8_t>& bytes);
 
-// Values of a few bits packed into bytes, lowest first: four of two bits a byte.
-[[nodiscard]] std::vector<std::uint8_t> pack_pairs(std::span<const std::uint8_t> values);
-[[nodiscard]] inline unsigned pair_at(std::span<const std::uint8_t> packed, std::size_t i) { return packed[i / 4] >> (2 * (i % 4)) & 3u; }
-
 // width-byte words turned to planes: all lowest bytes, then all second ones, ...; and back.
 [[nodiscard]] std::vector<std::uint8_t> split_bytes(std::span<const std::uint64_t> words, unsigned width);
 [[nodiscard]] std::vector<std::uint64_t> join_bytes(std::span<const std::uint8_t> bytes, unsigned width);  // bytes.size() a multiple of width

@@ -20,6 +20,7 @@ namespace intervale {
 inline constexpr int kSlots = 56;
 extern const std::array<std::uint8_t, kSlots> kTypeOfSlot;
 extern const std::array<std::uint8_t, 64> kSlotOfType;
+[[nodiscard]] constexpr int class_of_slot(int slot) { return slot < 8 ? 0 : slot < 32 ? 1 : 2; }
 inline constexpr std::array<std::uint64_t, 3> kSlotsOfClass{0xffu, 0xffffff00u, 0xffffff00000000u};
 
 // A supercube's name. Ascending: coarse scales before fine ones, then along a Morton curve.

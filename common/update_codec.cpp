@@ -4,6 +4,7 @@
 #include <bit>
 #include <utility>
 
+#include "common/difference_coder.h"
 #include "common/planes.h"
 #include "common/update.h"
 
@@ -11,10 +12,6 @@ namespace intervale {
 namespace {
 
 constexpr int kCompression = 1;  // zstd: on such planes faster and smaller than 3
-constexpr std::size_t kFlagPlanes = 6;
-
-// The plane of a flag: by class, and by whether the diamond's vertices lie on different sides.
-constexpr std::size_t flag_plane(int cls, bool mixed) { return std::size_t(3 * mixed + cls); }
 
 // Calls visit(group number, class) in the order in which updates are applied; stops when it returns false. key(g): of group g.
 template <class Key, class Visit>
@@ -32,35 +29,19 @@ void for_each_class(std::size_t groups, const Key& key, Visit&& visit) {
 
 tl::unexpected<Error> damaged(const char* what) { return fail(std::string("a batch is damaged: ") + what); }
 
-// Bits in bytes, lowest first.
-class Flags {
- public:
-  void put(bool flag) {
-    if (count_ % 8 == 0) bytes_.push_back(0);
-    bytes_.back() = std::uint8_t(bytes_.back() | unsigned(flag) << count_ % 8);
-    ++count_;
-  }
-  [[nodiscard]] const std::vector<std::uint8_t>& bytes() const { return bytes_; }
+// Whether a diamond that can be split is split: by its class, by whether its vertices lie on different sides (then it is surely relevant, and hardly
+// ever left out), and by the last three such diamonds.
+struct FlagModel {
+  std::array<std::array<std::array<Chance, 8>, 2>, 3> chance;
+  std::array<std::array<unsigned, 2>, 3> before{};
 
- private:
-  std::vector<std::uint8_t> bytes_;
-  std::size_t count_ = 0;
-};
-class FlagReader {
- public:
-  explicit FlagReader(std::vector<std::uint8_t> bytes = {}) : bytes_(std::move(bytes)) {}
-  [[nodiscard]] bool is_at_end() const { return next_ / 8 == bytes_.size(); }
-  bool take() {  // not at the end
-    const bool flag = (bytes_[next_ / 8] >> next_ % 8 & 1) != 0;
-    ++next_;
+  template <class Coder>
+  bool code(Coder& coder, int cls, bool mixed, bool is_plain, bool value = false) {
+    unsigned& last = before[cls][mixed];
+    const bool flag = is_plain ? coder.even_bits(1, unsigned(value)) != 0 : coder.bit(chance[cls][mixed][last], value);
+    last = (2 * last + unsigned(flag)) & 7;
     return flag;
   }
-  // Whether nothing is left but what fills the last byte.
-  [[nodiscard]] bool is_used_up() const { return (next_ + 7) / 8 == bytes_.size() && (next_ % 8 == 0 || bytes_.back() >> next_ % 8 == 0); }
-
- private:
-  std::vector<std::uint8_t> bytes_;
-  std::size_t next_ = 0;
 };
 
 // Whether the vertices of an update's diamond lie on different sides. If they do not, all of them or none are across a surface from the centre.
@@ -95,9 +76,8 @@ Result<std::vector<SupercubeKey>> take_supercubes(std::span<const std::uint8_t>&
 
 std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) {
   const SupercubeSet& set = volume.set();
-  std::vector<std::uint8_t> steps, sides, first, other;
+  std::vector<std::uint8_t> steps;
   std::vector<std::uint64_t> masks;
-  std::array<Flags, kFlagPlanes> flags;
   std::uint64_t previous = 0;
   // Of each group: what can be split when its turn comes, and what of that has vertices on different sides.
   struct Candidates {
@@ -130,77 +110,80 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
       c.mixed |= std::uint64_t(is_mixed(volume.codes()[i], vertices)) << slot;
     }
   }
-  for_each_class(
-      groups.size(), [&](std::size_t g) { return groups[g].key; },
-      [&](std::size_t k, int cls) {
-        const SlotGroup& g = groups[k];
-        for (std::uint64_t left = candidates[k].ready & kSlotsOfClass[cls]; left != 0; left &= left - 1) {
-          const int slot = std::countr_zero(left);
-          const bool is_named = (g.slots >> slot & 1) != 0;
-          flags[flag_plane(cls, (candidates[k].mixed >> slot & 1) != 0)].put(is_named);
-          if (!is_named) continue;
-          const UpdateView u = volume.update(set.place_in(g.brick, g.supercube, g.key, slot));
-          sides.push_back(std::uint8_t(u.side_difference));
-          const auto firsts = std::ptrdiff_t(u.first_cuts);
-          first.insert(first.end(), u.differences.begin(), u.differences.begin() + firsts);
-          other.insert(other.end(), u.differences.begin() + firsts, u.differences.end());
-        }
-        return true;
-      });
+  const auto coded = [&](bool is_plain, std::size_t& plain_bytes) {
+    RangeEncoder coder;
+    FlagModel flags;
+    DifferenceCoder differences;
+    differences.is_plain = is_plain;
+    coder.even_bits(1, unsigned(is_plain));
+    for_each_class(
+        groups.size(), [&](std::size_t g) { return groups[g].key; },
+        [&](std::size_t k, int cls) {
+          const SlotGroup& g = groups[k];
+          for (std::uint64_t left = candidates[k].ready & kSlotsOfClass[cls]; left != 0; left &= left - 1) {
+            const int slot = std::countr_zero(left);
+            const bool is_named = (g.slots >> slot & 1) != 0;
+            flags.code(coder, cls, (candidates[k].mixed >> slot & 1) != 0, is_plain, is_named);
+            if (!is_named) continue;
+            const UpdateView u = volume.update(set.place_in(g.brick, g.supercube, g.key, slot));
+            std::array<std::uint8_t, kMaxCuts> cuts;
+            std::copy(u.differences.begin(), u.differences.end(), cuts.begin());
+            differences.code_side(coder, u.side_difference);
+            differences.code_cuts(coder, cls, u.side_difference, unsigned(u.differences.size()), u.first_cuts, cuts.data());
+            plain_bytes += 1 + u.differences.size();
+          }
+          return true;
+        });
+    return coder.finish();
+  };
+  std::size_t plain_bytes = sizeof(std::uint64_t);
+  std::vector<std::uint8_t> diamonds = coded(false, plain_bytes);
+  if (diamonds.size() > plain_bytes) diamonds = coded(true, plain_bytes);
   std::vector<std::uint8_t> out;
   append_plane(out, steps, kCompression);
   append_plane(out, split_bytes(masks, 8), kCompression);
-  for (const Flags& f : flags) append_plane(out, f.bytes(), kCompression);
-  append_plane(out, pack_pairs(sides), kCompression);
-  append_plane(out, first, kCompression);
-  append_plane(out, other, kCompression);
+  append_varint(out, diamonds.size());
+  out.insert(out.end(), diamonds.begin(), diamonds.end());
   return out;
 }
 
 Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::optional<std::uint64_t> max_tets) {
   const auto keys = take_supercubes(bytes);
   if (!keys) return tl::unexpected(keys.error());
-  std::array<FlagReader, kFlagPlanes> flags;
-  for (FlagReader& f : flags) {
-    auto plane = take_plane(bytes, kSlots * kBatchUpdatesMost / 8);
-    if (!plane) return damaged("its flags");
-    f = FlagReader(std::move(*plane));
-  }
-  const auto sides = take_plane(bytes, (kBatchUpdatesMost + 3) / 4), first = take_plane(bytes, 2 * kBatchUpdatesMost),
-             other = take_plane(bytes, std::size_t(kMaxCuts) * kBatchUpdatesMost);
-  if (!sides || !first || !other || !bytes.empty()) return damaged("its planes");
+  const auto length = take_varint(bytes);
+  if (!length || *length != bytes.size()) return damaged("its length");
 
   Applied applied;
   const char* wrong = nullptr;
-  std::span<const std::uint8_t> firsts(*first), others(*other);
+  RangeDecoder coder(bytes);
+  FlagModel flags;
+  DifferenceCoder differences;
+  differences.is_plain = coder.even_bits(1) != 0;
   Front::Cursor cursor(front);
   // Splits the diamond looked at if the batch says so. False if that is the end.
-  const auto take = [&](FlagReader& of_diamond) {
-    if (of_diamond.is_at_end()) {
+  const auto take = [&](int cls) {
+    const bool is_split = flags.code(coder, cls, cursor.context().is_mixed(), differences.is_plain);
+    if (coder.is_overdrawn()) {
       wrong = "it says too little of what it splits";
       return false;
     }
-    if (!of_diamond.take()) return true;
-    const std::size_t next = applied.updates;
-    if (next >= 4 * sides->size()) {
-      wrong = "it has fewer sides than updates";
+    if (!is_split) return true;
+    if (applied.updates == kBatchUpdatesMost) {
+      wrong = "it has too many updates";
       return false;
     }
     const DiamondContext& context = cursor.look_closer();
     Prediction prediction(context);
-    const unsigned side_difference = pair_at(*sides, next);
+    const unsigned side_difference = differences.code_side(coder);
     const Side side = Side((unsigned(prediction.side()) + side_difference) % 3);
     const auto count = context.count_cuts(side);
-    const auto first_count = std::size_t(count.first), other_count = std::size_t(count.all - count.first);
-    if (side_difference > 2 || first_count > firsts.size() || other_count > others.size()) {
-      wrong = "it has fewer coefficients than its updates call for";
+    std::array<std::uint8_t, kMaxCuts> coded{}, cuts;
+    differences.code_cuts(coder, cls, side_difference, unsigned(count.all), unsigned(count.first), coded.data());
+    if (coder.is_overdrawn()) {
+      wrong = "it has fewer bytes than its updates call for";
       return false;
     }
-    std::array<std::uint8_t, kMaxCuts> differences, cuts;
-    std::copy_n(others.begin(), other_count, std::copy_n(firsts.begin(), first_count, differences.begin()));
-    firsts = firsts.subspan(first_count);
-    others = others.subspan(other_count);
-    prediction.decode(side, std::span(differences).first(std::size_t(count.all)), cuts.data());
+    prediction.decode(side, std::span(coded).first(std::size_t(count.all)), cuts.data());
     cursor.split(side, std::span(cuts).first(std::size_t(count.all)));
     if (max_tets && front.tet_count() > *max_tets) {
       front.merge(cursor.diamond().centre);
@@ -216,16 +199,13 @@ Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, s
         cursor.move_to((*keys)[g]);
         for (std::uint64_t left = kSlotsOfClass[cls] & ~cursor.split_slots(); left != 0; left &= left - 1) {
           if (!cursor.find(std::countr_zero(left))) continue;
-          if (!take(flags[flag_plane(cls, cursor.context().is_mixed())])) return false;
+          if (!take(cls)) return false;
         }
         return true;
       });
   if (wrong != nullptr) return damaged(wrong);
   if (applied.over_budget) return applied;
-  for (const FlagReader& f : flags) {
-    if (!f.is_used_up()) return damaged("it says more of what it splits than there is");
-  }
-  if (!firsts.empty() || !others.empty() || sides->size() != (applied.updates + 3) / 4) return damaged("it has more than its updates call for");
+  if (!coder.is_spent()) return damaged("it has more than its updates call for");
   return applied;
 }
 

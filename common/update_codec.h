@@ -1,8 +1,7 @@
 // Updates on the wire: a batch as bytes, and back into a front.
 //
-// A batch names supercubes, and says of each diamond in them that can be split whether it is: one bit, in one of six planes, for both sides know
-// which those are, whether their vertices lie on different sides (then the diamond is surely relevant, and hardly ever left out) and their class.
-// Then come differences of sides, of each surface's first cuts, and of all other cuts; each plane is compressed by itself. Updates stand in the order
+// A batch names supercubes, and says of each diamond in them that can be split whether it is; for both sides know which those are. If it is, the
+// differences of its side and its cuts follow. All that is range coded, by chances that go by what both sides know. Updates stand in the order
 // in which they are applied: scale by scale from coarse to fine; within one scale all of class 0, then class 1, then class 2; then by supercube and
 // slot. PROTOCOL.md has the layout.
 #pragma once

@@ -1,0 +1,158 @@
+// Bits in as little room as their chances call for: a binary range coder whose chances are learned from the bits themselves.
+//
+// G. N. N. Martin, "Range encoding: an algorithm for removing redundancy from a digitised message", 1979; learned chances as in Igor Pavlov's LZMA.
+// Reader and writer share one text: a model's function takes either, hands in the value it wants to write, and gets back the value that is there.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace intervale {
+
+// The chance that a bit is 0, in 1/65536: the mean of the bits so far, of the last few dozen at most.
+class Chance {
+ public:
+  [[nodiscard]] std::uint32_t of_zero() const { return zero_; }
+  void learn(bool bit) {
+    if (bit) {
+      zero_ = std::uint16_t(zero_ - (zero_ * kRates[seen_] >> 16));
+    } else {
+      zero_ = std::uint16_t(zero_ + ((65536 - zero_) * kRates[seen_] >> 16));
+    }
+    if (seen_ + 1u < kRates.size()) ++seen_;
+  }
+
+ private:
+  static constexpr std::array<std::uint32_t, 63> kRates = [] {  // 65536 / (n + 1.5)
+    std::array<std::uint32_t, 63> rates{};
+    for (std::uint32_t n = 0; n < rates.size(); ++n) rates[n] = 2 * 65536 / (2 * n + 3);
+    return rates;
+  }();
+  std::uint16_t zero_ = 1 << 15;
+  std::uint8_t seen_ = 0;
+};
+
+class RangeEncoder {
+ public:
+  bool bit(Chance& chance, bool value) {
+    const std::uint64_t split = (range_ >> 16) * chance.of_zero();
+    chance.learn(value);
+    narrow(value ? split : 0, value ? range_ - split : split);
+    return value;
+  }
+  unsigned even_bits(int count, unsigned value) {  // all equally likely, highest first
+    for (int i = count; i-- > 0;) narrow((value >> i & 1) != 0 ? range_ >> 1 : 0, (value >> i & 1) != 0 ? range_ - (range_ >> 1) : range_ >> 1);
+    return value;
+  }
+  // The bytes: a multiple of four. Once only.
+  [[nodiscard]] std::vector<std::uint8_t> finish();
+
+ private:
+  void narrow(std::uint64_t from, std::uint64_t range) {
+    low_ += from;
+    if (low_ < from) carry();
+    range_ = range;
+    if (range_ >> 32 == 0) shift();
+  }
+  void carry();
+  void shift();
+  std::uint64_t low_ = 0, range_ = ~std::uint64_t(0);  // range_ >= 2^32 between bits
+  std::vector<std::uint8_t> out_;
+};
+
+// Reads bytes from outside: whatever they are, it gives bits. Never reads beyond them.
+class RangeDecoder {
+ public:
+  explicit RangeDecoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
+    code_ = std::uint64_t(next()) << 32;
+    code_ |= next();
+  }
+  bool bit(Chance& chance, bool = false) {
+    const std::uint64_t split = (range_ >> 16) * chance.of_zero();
+    const bool value = code_ >= split;
+    chance.learn(value);
+    narrow(value ? split : 0, value ? range_ - split : split);
+    return value;
+  }
+  unsigned even_bits(int count, unsigned = 0) {
+    unsigned value = 0;
+    for (; count > 0; --count) {
+      const std::uint64_t split = range_ >> 1;
+      const bool one = code_ >= split;
+      narrow(one ? split : 0, one ? range_ - split : split);
+      value = 2 * value + unsigned(one);
+    }
+    return value;
+  }
+  // Whether more was asked for than the bytes hold; whether they held just what was asked for.
+  [[nodiscard]] bool is_overdrawn() const { return at_ > bytes_.size() + 4; }
+  [[nodiscard]] bool is_spent() const { return at_ == bytes_.size() + 4; }
+
+ private:
+  void narrow(std::uint64_t from, std::uint64_t range) {
+    code_ -= from;
+    range_ = range;
+    if (range_ >> 32 != 0) return;
+    range_ <<= 32;
+    code_ = code_ << 32 | next();
+  }
+  std::uint32_t next();  // four bytes; zeros behind the end, of which a reader sees the first four
+  std::span<const std::uint8_t> bytes_;
+  std::size_t at_ = 0;
+  std::uint64_t code_ = 0, range_ = ~std::uint64_t(0);
+};
+
+// A number of a few bits, each bit's chance depending on those above it.
+template <int Bits>
+struct NumberModel {
+  std::array<Chance, std::size_t(1) << Bits> chance;
+
+  template <class Coder>
+  unsigned code(Coder& coder, unsigned value = 0) {
+    unsigned path = 1;
+    for (int i = Bits; i-- > 0;) path = 2 * path + unsigned(coder.bit(chance[path], (value >> i & 1) != 0));
+    return path - (1u << Bits);
+  }
+};
+
+// A number from 0 to 2^16 - 2 that is mostly small: how many bits n + 1 has, the two below the highest, and the rest as it is.
+struct SmallNumberModel {
+  std::array<Chance, 16> longer;
+  std::array<std::array<Chance, 4>, 16> below;
+
+  template <class Coder>
+  unsigned code(Coder& coder, unsigned value = 0) {
+    const int length = std::bit_width(value + 1) - 1;  // below the highest bit
+    int n = 0;
+    while (n < 15 && coder.bit(longer[n], n < length)) ++n;
+    unsigned number = 1;
+    for (int i = n; i-- > 0;) {
+      if (n - i > 2) {
+        number = number << (i + 1) | coder.even_bits(i + 1, (value + 1) & ((2u << i) - 1));
+        break;
+      }
+      number = 2 * number + unsigned(coder.bit(below[n][number & 3], ((value + 1) >> i & 1) != 0));
+    }
+    return number - 1;
+  }
+};
+
+// A difference modulo 256, mostly near 0.
+struct DifferenceModel {
+  Chance differs, negative;
+  SmallNumberModel size;  // of what is beyond 1
+
+  template <class Coder>
+  std::uint8_t code(Coder& coder, std::uint8_t value = 0) {
+    if (!coder.bit(differs, value != 0)) return 0;
+    const bool down = coder.bit(negative, value >= 128);
+    const unsigned by = 1 + size.code(coder, (down ? 256u - value : value) - 1u);
+    return std::uint8_t(down ? 256 - by : by);
+  }
+};
+
+}  // namespace intervale
