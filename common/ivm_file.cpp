@@ -239,19 +239,21 @@ Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> s
 
 }  // namespace
 
-std::vector<std::byte> encode_ivm(const IntervalVolume& volume) {
+std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel) {
   std::vector<std::byte> file(kTableBytes);
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   header.version = kIvmVersion;
   header.sections = kSections;
-  // One section at a time: together they would be as large as the volume that they come from.
-  for (int s = 0; s < int(kSections); ++s) {
-    const Stored section = stored(volume, Section(s));
-    const auto bytes = std::as_bytes(std::span(section.bytes));
-    const Entry e{std::uint32_t(s), 0, file.size(), bytes.size(), section.raw_bytes, XXH3_64bits(bytes.data(), bytes.size())};
+  // Only what is to be stored is kept: all sections as they are would be as large as the volume that they come from.
+  std::array<Stored, kSections> sections;
+  parallel(kSections, [&](std::size_t s) { sections[s] = stored(volume, Section(s)); });
+  for (std::size_t s = 0; s < kSections; ++s) {
+    const auto bytes = std::as_bytes(std::span(sections[s].bytes));
+    const Entry e{std::uint32_t(s), 0, file.size(), bytes.size(), sections[s].raw_bytes, XXH3_64bits(bytes.data(), bytes.size())};
     std::memcpy(file.data() + sizeof(Header) + s * sizeof(Entry), &e, sizeof e);
     file.insert(file.end(), bytes.begin(), bytes.end());
+    sections[s] = Stored();
   }
   header.file_bytes = file.size();
   std::memcpy(file.data(), &header, sizeof header);
@@ -376,10 +378,10 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   return volume;
 }
 
-Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume) {
+Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel) {
   auto file = AtomicFile::create(path);
   if (!file) return tl::unexpected(file.error());
-  if (auto ok = file->write(encode_ivm(volume)); !ok) return ok;
+  if (auto ok = file->write(encode_ivm(volume, parallel)); !ok) return ok;
   return file->commit();
 }
 

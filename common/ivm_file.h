@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/interval_volume.h"
+#include "common/parallel.h"
 #include "common/result.h"
 
 namespace intervale {
@@ -15,13 +16,13 @@ namespace intervale {
 inline constexpr std::uint32_t kIvmVersion = 2;
 
 // The file's bytes. Equal volumes give equal bytes; the name is not stored.
-[[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume);
+[[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = in_turn);
 
 // The inverse, for bytes from outside: every checksum is compared, every count bounded by the bytes there are before anything is allocated.
 [[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name);
 
 // Writes aside and renames.
-[[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume);
+[[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = in_turn);
 
 // Reads a file; the name is the file's, without folders and extension. Errors begin with the path.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path);

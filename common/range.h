@@ -37,12 +37,10 @@ struct Cuts {
 // Cuts of the edge whose ends hold the finite values `from` and `to`; seen from the other end they are the same. Where alpha < beta and both surfaces
 // cut, the cut nearer to `from` stays strictly nearer.
 [[nodiscard]] inline Cuts cuts_between(double from, double to, const Range& range) {
-  if (from > to) return reversed(cuts_between(to, from, range));
-  const Side a = side_of(from, range), b = side_of(to, range);
-  const auto quantised = [from, to](double kappa) {
-    const double whole = to / 2 - from / 2;  // halved: the difference of two doubles can overflow
-    return std::uint8_t(std::clamp(std::floor((kappa / 2 - from / 2) / whole * 256), 0.0, 255.0));
-  };
+  const double low = std::min(from, to), high = std::max(from, to);
+  const Side a = side_of(low, range), b = side_of(high, range);
+  const double whole = high / 2 - low / 2;  // halved: the difference of two doubles can overflow
+  const auto quantised = [low, whole](double kappa) { return std::uint8_t(std::clamp((kappa / 2 - low / 2) / whole * 256, 0.0, 255.0)); };
   Cuts cuts;
   if (alpha_cuts(a, b)) cuts.q[cuts.count++] = quantised(range.alpha);
   if (beta_cuts(a, b)) cuts.q[cuts.count++] = quantised(range.beta);
@@ -50,7 +48,7 @@ struct Cuts {
     if (cuts.q[0] == 255) cuts.q[0] = 254;
     cuts.q[1] = std::uint8_t(cuts.q[0] + 1);
   }
-  return cuts;
+  return from > to ? reversed(cuts) : cuts;
 }
 
 }  // namespace intervale

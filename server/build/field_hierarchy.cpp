@@ -4,110 +4,230 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_reduce.h>
 
-#include <atomic>
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
-#include <mutex>
+#include <tuple>
 
 #include "common/tet_cases.h"
 #include "server/build/error_levels.h"
 #include "server/build/interpolation_error.h"
+#include "server/build/relevance.h"
 
 namespace intervale {
 namespace {
 
-// All diamonds of one scale with a place in or across the box, one bit each, by supercubes in a dense grid.
-struct Level {
-  int scale = 0;
-  std::array<std::int32_t, 3> dims{};  // in supercubes
-  std::vector<std::uint64_t> words;
+constexpr int kShared = 5;  // diamonds of this scale and up are few and large: threads share their tetrahedra out
 
-  Level(int s, Vertex last) : scale(s) {
-    const auto supercubes = [s](std::int32_t n) { return std::int32_t((((std::int64_t(n) + (1 << s) - 1) >> s) >> 2) + 1); };
-    dims = {supercubes(last.x), supercubes(last.y), supercubes(last.z)};
-    words.resize(std::size_t(dims[0]) * std::size_t(dims[1]) * std::size_t(dims[2]));
-  }
-  [[nodiscard]] Vertex position(std::size_t i) const {
-    return {std::int32_t(i % dims[0]), std::int32_t(i / dims[0] % dims[1]), std::int32_t(i / (std::size_t(dims[0]) * dims[1]))};
-  }
-  // Bits of a pass are read while others of the same word are written: atomic, and nothing more.
-  [[nodiscard]] bool contains(const Diamond& d) const {
-    const int up = scale + 2;
-    if ((d.centre.x | d.centre.y | d.centre.z) < 0) return false;
-    const std::int32_t x = d.centre.x >> up, y = d.centre.y >> up, z = d.centre.z >> up;
-    if (x >= dims[0] || y >= dims[1] || z >= dims[2]) return false;
-    const std::size_t i = (std::size_t(z) * dims[1] + y) * dims[0] + x;
-    return std::atomic_ref(const_cast<std::uint64_t&>(words[i])).load(std::memory_order_relaxed) >> kSlotOfType[d.type] & 1;
-  }
-  void insert(std::size_t i, std::uint64_t slots) {
-    std::atomic_ref word(words[i]);
-    word.store(word.load(std::memory_order_relaxed) | slots, std::memory_order_relaxed);
-  }
+// Where a child is, from the supercube of its parent.
+struct ChildPlace {
+  std::uint8_t supercube = 0;  // class 0 and 1: 0 the same, 1 + axis the next one along that axis. Class 2, a scale finer: see Family
+  std::uint8_t slot = 0;
 };
 
-// Whether sides, as a set of bits 1 << side, call for an update.
-bool counts(unsigned sides, Refine refine) {
-  if (refine == Refine::uniform) return (sides & 2) != 0 || sides == 5;
-  return (sides & (sides - 1)) != 0;
-}
-
-template <class T>
-unsigned sides_around(const Field<T>& field, const Domain& domain, const Range& range, const Diamond& d, unsigned tets, bool interior) {
-  const auto bit = [&range](double value) { return 1u << unsigned(side_of(value, range)); };
-  if (interior) {
-    const T* const centre = &field.samples[field.index(d.centre)];
-    const std::ptrdiff_t y = (field.last.x + 1) * std::ptrdiff_t(d.h), z = y * (field.last.y + 1);
-    unsigned sides = bit(double(*centre));
-    for (int v = 0; v < d.row->vertices; ++v) {
-      const Offset f = d.row->vertex[v];
-      sides |= bit(double(centre[f.x * std::ptrdiff_t(d.h) + f.y * y + f.z * z]));
+const std::array<std::array<ChildPlace, kMaxChildren>, 64>& child_places() {
+  static const auto places = [] {
+    std::array<std::array<ChildPlace, kMaxChildren>, 64> all{};
+    for (unsigned type = 0; type < 64; ++type) {
+      const DiamondType& row = diamond_type(type);
+      const std::array<int, 3> at{int(type & 3), int(type >> 2 & 3), int(type >> 4)};
+      for (int k = 0; k < row.children; ++k) {
+        const std::array<int, 3> step{row.child[k].child.x, row.child[k].child.y, row.child[k].child.z};
+        ChildPlace& child = all[type][k];
+        unsigned child_type = 0;
+        for (int axis = 0, power = 1; axis < 3; ++axis, power *= 3) {
+          const int c = row.cls == 2 ? 2 * at[axis] + step[axis] : at[axis] + step[axis];  // in [-1, 7] or [0, 4]
+          child_type |= unsigned(c & 3) << (2 * axis);
+          if (row.cls == 2) child.supercube = std::uint8_t(child.supercube + power * ((c + 4) / 4));
+          if (row.cls != 2 && c == 4) child.supercube = std::uint8_t(1 + axis);
+        }
+        child.slot = kSlotOfType[child_type];
+      }
     }
-    return sides;
-  }
-  const unsigned vertices = Domain::vertices(*d.row, tets);
-  unsigned sides = bit(field.at(domain.clamp(d.centre)));
-  for (int v = 0; v < d.row->vertices; ++v) {
-    if (vertices >> v & 1) sides |= bit(field.at(domain.clamp(d.vertex(v))));
-  }
-  return sides;
+    return all;
+  }();
+  return places;
 }
 
-template <class T>
-DiamondContext context_of(const Field<T>& field, const Domain& domain, const Range& range, const Diamond& d) {
-  DiamondContext c;
-  c.row = d.row;
-  const bool interior = domain.is_interior(d);
-  const unsigned tets = interior ? (1u << d.row->tets) - 1 : domain.tets(d);
-  c.vertices = interior ? (1u << d.row->vertices) - 1 : Domain::vertices(*d.row, tets);
-  const unsigned edges = interior ? (1u << d.row->edges) - 1 : Domain::edges(*d.row, tets);
-  std::array<double, kMaxVertices> f{};
-  for (int v = 0; v < d.row->vertices; ++v) {
-    if (!c.has(v)) continue;
-    f[v] = field.at(domain.clamp(d.vertex(v)));
-    c.sides |= std::uint32_t(side_of(f[v], range)) << (2 * v);
+// The diamonds of one supercube.
+class Block {
+ public:
+  Block(const std::vector<Outlines>& outlines, SupercubeKey key) : scale_(scale_of_key(key)), outlines_(outlines[std::size_t(scale_)]) {
+    const Vertex p = position_of_key(key);
+    corner_ = {4 * p.x, 4 * p.y, 4 * p.z};
+    for (int i = 0; i < 4; ++i) place_[i] = {outlines_.place(0, corner_.x + i), outlines_.place(1, corner_.y + i), outlines_.place(2, corner_.z + i)};
   }
-  for (int e = 0; e < d.row->edges; ++e) {
-    const auto [a, b] = edge_ends(e, d.row->belt);
-    if (c.side(a) == c.side(b) || !(edges >> e & 1)) continue;
-    const Cuts cuts = cuts_between(f[a], f[b], range);
+
+  [[nodiscard]] Diamond diamond(int slot) const {
+    const unsigned type = kTypeOfSlot[slot];
+    return Diamond({(corner_.x + std::int32_t(type & 3)) << scale_, (corner_.y + std::int32_t(type >> 2 & 3)) << scale_,
+                    (corner_.z + std::int32_t(type >> 4)) << scale_});
+  }
+  [[nodiscard]] const Outline& outline(int slot) const {
+    const unsigned type = kTypeOfSlot[slot];
+    return outlines_.of(place_[type & 3][0], place_[type >> 2 & 3][1], place_[type >> 4][2]);
+  }
+
+ private:
+  int scale_;
+  const Outlines& outlines_;
+  Vertex corner_;                            // in units of h
+  std::array<std::array<int, 3>, 4> place_;  // of its coordinates: [i][axis]
+};
+
+// The children of one supercube's diamonds, as far as they are in a set.
+class Family {
+ public:
+  Family(const SupercubeSet& set, SupercubeKey key) {
+    const int scale = scale_of_key(key);
+    const Vertex p = position_of_key(key);
+    const auto members = [&set](int of_scale, Vertex position) {
+      const auto found = set.find_supercube(of_scale, position);
+      return found ? Members{set.occupancy()[found->supercube], set.first(found->brick, found->supercube)} : Members{};
+    };
+    near_ = {members(scale, p), members(scale, {p.x + 1, p.y, p.z}), members(scale, {p.x, p.y + 1, p.z}), members(scale, {p.x, p.y, p.z + 1})};
+    if (scale == 0 || (near_[0].occupancy & kSlotsOfClass[2]) == 0) return;
+    for (int i = 0; i < 27; ++i) {
+      const Vertex q{2 * p.x + i % 3 - 1, 2 * p.y + i / 3 % 3 - 1, 2 * p.z + i / 9 - 1};
+      if (q.x >= 0 && q.y >= 0 && q.z >= 0) finer_[i] = members(scale - 1, q);
+    }
+  }
+
+  // A bit for each child that is in the set.
+  [[nodiscard]] unsigned children(int slot) const {
+    const unsigned type = kTypeOfSlot[slot];
+    unsigned some = 0;
+    for (int k = 0; k < diamond_type(type).children; ++k) {
+      const ChildPlace c = child_places_[type][k];
+      some |= unsigned(of(slot, c).occupancy >> c.slot & 1) << k;
+    }
+    return some;
+  }
+  // The number of such a one.
+  [[nodiscard]] UpdateIndex child(int slot, int k) const {
+    const ChildPlace c = child_places_[kTypeOfSlot[slot]][k];
+    const Members& m = of(slot, c);
+    return m.first + UpdateIndex(std::popcount(m.occupancy & ((std::uint64_t(1) << c.slot) - 1)));
+  }
+
+ private:
+  // The diamonds of one supercube: slots, and the number of the first.
+  struct Members {
+    std::uint64_t occupancy = 0;
+    UpdateIndex first = 0;
+  };
+  [[nodiscard]] const Members& of(int slot, ChildPlace c) const { return kSlotsOfClass[2] >> slot & 1 ? finer_[c.supercube] : near_[c.supercube]; }
+  const std::array<std::array<ChildPlace, kMaxChildren>, 64>& child_places_ = child_places();
+  std::array<Members, 4> near_;      // itself, and the next ones along the axes
+  std::array<Members, 27> finer_{};  // of the next finer scale: from one before its first octant on each axis, x fastest
+};
+
+// The samples around a diamond, by local vertex.
+using Around = std::array<double, kMaxVertices + 1>;
+
+template <class T>
+Around around(const Field<T>& field, const Domain& domain, const Diamond& d, const Outline& outline) {
+  Around f{};
+  if (outline.interior) {
+    const T* const centre = &field.samples[field.index(d.centre)];
+    const std::ptrdiff_t x = d.h, y = x * (field.last.x + 1), z = y * (field.last.y + 1);
+    for (int v = 0; v < d.row->vertices; ++v) {
+      const Offset at = d.row->vertex[v];
+      f[v] = double(centre[at.x * x + at.y * y + at.z * z]);
+    }
+    f[kCentre] = double(*centre);
+    return f;
+  }
+  for (int v = 0; v < d.row->vertices; ++v) {
+    if (outline.vertices >> v & 1) f[v] = field.at(domain.clamp(d.vertex(v)));
+  }
+  f[kCentre] = field.at(domain.clamp(d.centre));
+  return f;
+}
+
+// Of each class: the ends of each edge, and the edges at each vertex, a bit each.
+struct EdgeTable {
+  std::array<std::array<std::uint8_t, 2>, kMaxEdges> ends{};
+  std::array<std::uint32_t, kMaxVertices> at{};
+};
+constexpr std::array<EdgeTable, 3> kEdgeTables = [] {
+  std::array<EdgeTable, 3> tables{};
+  constexpr int belts[3] = {6, 4, 8};
+  for (int cls = 0; cls < 3; ++cls) {
+    for (int e = 0; e < 1 + 3 * belts[cls]; ++e) {
+      const auto [a, b] = edge_ends(e, belts[cls]);
+      tables[cls].ends[e] = {std::uint8_t(a), std::uint8_t(b)};
+      tables[cls].at[a] |= 1u << e;
+      tables[cls].at[b] |= 1u << e;
+    }
+  }
+  return tables;
+}();
+
+DiamondContext context_of(const Around& f, const Outline& outline, const Range& range) {
+  DiamondContext c;
+  c.row = outline.row;
+  c.vertices = outline.vertices;
+  const EdgeTable& edges = kEdgeTables[c.row->cls];
+  std::uint32_t alpha = 0, beta = 0;  // the edges that they cut: one end is below, or above, and the other is not
+  for (int v = 0; v < c.row->vertices; ++v) {
+    if (!c.has(v)) continue;
+    const Side side = side_of(f[v], range);
+    c.sides |= std::uint32_t(side) << (2 * v);
+    alpha ^= side == Side::below ? edges.at[v] : 0;
+    beta ^= side == Side::above ? edges.at[v] : 0;
+  }
+  for (std::uint32_t left = (alpha | beta) & outline.edges; left != 0; left &= left - 1) {
+    const int e = std::countr_zero(left);
+    const Cuts cuts = cuts_between(f[edges.ends[e][0]], f[edges.ends[e][1]], range);
     int n = 0;
-    if (alpha_cuts(c.side(a), c.side(b))) c.cut[e][0] = std::uint16_t(2 * cuts.q[n++] + 1);
-    if (beta_cuts(c.side(a), c.side(b))) c.cut[e][1] = std::uint16_t(2 * cuts.q[n] + 1);
+    if (alpha >> e & 1) c.cut[e][0] = std::uint16_t(2 * cuts.q[n++] + 1);
+    if (beta >> e & 1) c.cut[e][1] = std::uint16_t(2 * cuts.q[n] + 1);
   }
   return c;
 }
 
 // The cuts on the subdivision edges; comes back with how many.
-template <class T>
-std::size_t cuts_of(const Field<T>& field, const Domain& domain, const Range& range, const Diamond& d, const DiamondContext& c, std::uint8_t* cuts) {
-  const double centre = field.at(domain.clamp(d.centre));
+std::size_t cuts_of(const Around& f, const DiamondContext& c, const Range& range, std::uint8_t* cuts) {
+  const Side centre = side_of(f[kCentre], range);
   std::size_t n = 0;
-  for (int v = 0; v < d.row->vertices; ++v) {
-    if (!c.has(v)) continue;
-    const double value = field.at(domain.clamp(d.vertex(v)));
-    if (side_of(value, range) == side_of(centre, range)) continue;
-    const Cuts q = cuts_between(centre, value, range);
+  for (int v = 0; v < c.row->vertices; ++v) {
+    if (!c.has(v) || c.side(v) == centre) continue;
+    const Cuts q = cuts_between(f[kCentre], f[v], range);
     for (int i = 0; i < q.count; ++i) cuts[n++] = q.q[i];
+  }
+  return n;
+}
+
+// Tetrahedra of the patch in one tetrahedron of a diamond, or one of its halves. local: its vertices.
+unsigned patch_tets(const TetCases& cases, const Domain& domain, const Diamond& d, const Outline& outline, std::uint32_t sides,
+                    const std::array<std::uint8_t, 4>& local, const TetShape& known) {
+  if (outline.interior) return cases.count(known.order, shape_sides(known, sides));
+  const auto positions = domain.positions(d, local);
+  if (!Domain::exists(positions)) return 0;
+  const TetShape shape = shape_of(positions, local, d.row->belt);
+  return cases.count(shape.order, shape_sides(shape, sides));
+}
+
+// Leaves of the full mesh that a split diamond leaves: the halves that go to children that are never split. split: a bit for each child that is.
+std::uint64_t leaves(const TetCases& cases, const Domain& domain, const Diamond& d, const Outline& outline, std::uint32_t sides, unsigned split) {
+  const std::uint32_t belt = sides >> 4 & ((1u << 2 * d.row->belt) - 1), ring = belt | belt << 2 * d.row->belt, centre = sides >> (2 * kCentre);
+  std::uint64_t n = 0;
+  for (int k = 0; k < d.row->children; ++k) {
+    if (split >> k & 1) continue;
+    for (const Duet::Half& half : d.row->child[k].half) {
+      if (!(outline.tets >> half.tet & 1)) continue;
+      // The end that stays, both belt vertices, the centre: that is mostly enough.
+      const unsigned count = cases.count((sides >> (2 * half.end) & 3) | (ring >> (2 * half.tet) & 15) << 2 | centre << 6);
+      if (count == 0 || (outline.interior && count != TetCases::kDepends)) {
+        n += count;
+        continue;
+      }
+      auto local = d.row->tet(half.tet);
+      local[1 - half.end] = kCentre;
+      n += patch_tets(cases, domain, d, outline, sides, local, d.row->half_shape[half.tet][half.end]);
+    }
   }
   return n;
 }
@@ -122,106 +242,74 @@ float round_up(double error) {
 
 FieldHierarchy::FieldHierarchy(const Volume& volume, const BuildOptions& options)
     : volume_(volume), range_(options.range), refine_(options.refine), domain_(volume.grid.dims) {
-  find_relevant();
+  for (int scale = 0; scale < domain_.levels(); ++scale) outlines_.emplace_back(domain_, scale);
+  Relevance found = find_relevant(volume_, range_, refine_, outlines_);
+  set_ = std::move(found.set);
+  unit_cuts_ = found.unit_cuts;
   measure_errors(options.progress);
-}
-
-void FieldHierarchy::find_relevant() {
-  std::vector<Level> levels;
-  for (int scale = 0; scale < domain_.levels(); ++scale) levels.emplace_back(scale, domain_.last());
-  visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    const Field<T> field{samples, domain_.last()};
-    // From fine to coarse: children are known before their parents.
-    for (Level& level : levels) {
-      for (int cls = 2; cls >= 0; --cls) {
-        const bool has_children = cls != 2 || level.scale > 0;
-        const Level* const below = cls == 2 ? (has_children ? &levels[level.scale - 1] : nullptr) : &level;
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, level.words.size(), 64), [&](const auto& some) {
-          for (std::size_t i = some.begin(); i != some.end(); ++i) {
-            const SupercubeKey key = supercube_key(level.scale, level.position(i));
-            std::uint64_t slots = 0;
-            for (std::uint64_t left = kSlotsOfClass[cls]; left != 0; left &= left - 1) {
-              const int slot = std::countr_zero(left);
-              const Diamond d(centre_of(key, slot));
-              const bool interior = domain_.is_interior(d);
-              const unsigned tets = interior ? 1 : domain_.tets(d);
-              if (tets == 0 || (!interior && domain_.is_idle(d))) continue;
-              bool relevant = counts(sides_around(field, domain_, range_, d, tets, interior), refine_);
-              for (int k = 0; k < d.row->children && has_children && !relevant; ++k) relevant = below->contains(Diamond(d.child(k)));
-              if (relevant) slots |= std::uint64_t(1) << slot;
-            }
-            if (slots != 0) level.insert(i, slots);
-          }
-        });
-      }
-    }
-  });
-  std::vector<SupercubeKey> keys;
-  std::vector<std::uint64_t> occupancy;
-  for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
-    std::vector<std::pair<SupercubeKey, std::uint64_t>> full;
-    for (std::size_t i = 0; i < level->words.size(); ++i) {
-      if (level->words[i] != 0) full.emplace_back(supercube_key(level->scale, level->position(i)), level->words[i]);
-    }
-    std::sort(full.begin(), full.end());
-    for (const auto& [key, word] : full) {
-      keys.push_back(key);
-      occupancy.push_back(word);
-    }
-    level->words = {};
-  }
-  set_ = SupercubeSet(keys, std::move(occupancy));
+  saturate_errors();
 }
 
 void FieldHierarchy::measure_errors(const std::function<void(double)>& progress) {
   errors_.assign(set_.size(), 0);
-  std::mutex telling;
-  double told = 0;
-  std::atomic<std::uint64_t> done = 0;
-  // Every class of every scale goes over the whole box once, at most: that share of the work is done.
-  const double steps = 3.0 * domain_.levels();
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain_.last()};
+    const Extremes<T> extremes(field);
     for (int scale = 0; scale < domain_.levels(); ++scale) {
+      const DiamondErrors<T> error_of(field, extremes, domain_, scale);
       const auto [begin, end] = set_.of_scale(scale);
-      for (int cls = 2; cls >= 0; --cls) {
-        tbb::parallel_for(tbb::blocked_range<std::uint32_t>(begin, end, 1), [&](const auto& some) {
-          for (std::uint32_t brick = some.begin(); brick != some.end(); ++brick) {
-            set_.for_each_in_brick(brick, kSlotsOfClass[cls], [&](const Place& p) {
-              const Diamond d(set_.centre(p));
-              const unsigned tets = domain_.tets(d);
+      tbb::parallel_for(tbb::blocked_range<std::uint32_t>(begin, end, 1), [&](const auto& some) {
+        for (std::uint32_t brick = some.begin(); brick != some.end(); ++brick) {
+          set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+            const Block block(outlines_, key);
+            UpdateIndex next = set_.first(brick, s);
+            for (std::uint64_t left = set_.occupancy()[s]; left != 0; left &= left - 1) {
+              const int slot = std::countr_zero(left);
+              const Diamond d = block.diamond(slot);
+              const Outline& outline = block.outline(slot);
               double error = 0;
-              if (scale < 5) {
-                error = diamond_error(field, domain_, d, tets);
-              } else {  // few and large: share out the tetrahedra
+              if (scale < kShared) {
+                error = error_of(d, outline);
+              } else {
                 error = tbb::parallel_reduce(
                     tbb::blocked_range<int>(0, d.row->tets, 1), 0.0,
-                    [&](const auto& range, double worst) {
-                      for (int i = range.begin(); i != range.end(); ++i)
-                        worst = std::max(worst, tets >> i & 1 ? diamond_error(field, domain_, d, 1u << i) : 0.0);
+                    [&](const auto& tets, double worst) {
+                      for (int i = tets.begin(); i != tets.end(); ++i) worst = std::max(worst, error_of(d, outline, 1u << i));
                       return worst;
                     },
                     [](double a, double b) { return std::max(a, b); });
               }
-              float saturated = round_up(error);
-              for (int k = 0; k < d.row->children && d.has_children(); ++k) {
-                const Vertex c = d.child(k);
-                if ((c.x | c.y | c.z) < 0) continue;
-                if (const auto child = set_.find(c)) saturated = std::max(saturated, errors_[child->index]);
-              }
-              errors_[p.index] = saturated;
-            });
-          }
-        });
-        ++done;
-        if (progress) {
-          const std::scoped_lock lock(telling);
-          told = std::max(told, double(done) / steps);
-          progress(told);
+              errors_[next++] = round_up(error);
+            }
+          });
         }
-      }
+      });
+      // Every scale goes over the whole box, at most: that share of the work is done.
+      if (progress) progress(double(scale + 1) / domain_.levels());
     }
   });
+}
+
+void FieldHierarchy::saturate_errors() {
+  for (int scale = 0; scale < domain_.levels(); ++scale) {
+    const auto [begin, end] = set_.of_scale(scale);
+    for (int cls = scale > 0 ? 2 : 1; cls >= 0; --cls) {
+      tbb::parallel_for(begin, end, [&](std::uint32_t brick) {
+        set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+          const std::uint64_t slots = set_.occupancy()[s] & kSlotsOfClass[cls];
+          if (slots == 0) return;
+          const Family family(set_, key);
+          UpdateIndex next = set_.first(brick, s) + UpdateIndex(std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots));
+          for (std::uint64_t left = slots; left != 0; left &= left - 1) {
+            const int slot = std::countr_zero(left);
+            float& error = errors_[next++];
+            for (unsigned some = family.children(slot); some != 0; some &= some - 1)
+              error = std::max(error, errors_[family.child(slot, std::countr_zero(some))]);
+          }
+        });
+      });
+    }
+  }
 }
 
 double FieldHierarchy::value(Vertex v) const {
@@ -243,112 +331,20 @@ Base FieldHierarchy::base() const {
 }
 
 DiamondContext FieldHierarchy::context(const Diamond& d) const {
+  const Outline outline = Outlines::outline_of(domain_, d);
   return visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    return context_of(Field<T>{samples, domain_.last()}, domain_, range_, d);
+    return context_of(around(Field<T>{samples, domain_.last()}, domain_, d, outline), outline, range_);
   });
 }
 
 std::vector<std::uint8_t> FieldHierarchy::cuts(const Diamond& d) const {
+  const Outline outline = Outlines::outline_of(domain_, d);
   std::vector<std::uint8_t> cuts(kMaxCuts);
-  const DiamondContext c = context(d);
   cuts.resize(visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    return cuts_of(Field<T>{samples, domain_.last()}, domain_, range_, d, c, cuts.data());
+    const Around f = around(Field<T>{samples, domain_.last()}, domain_, d, outline);
+    return cuts_of(f, context_of(f, outline, range_), range_, cuts.data());
   }));
   return cuts;
-}
-
-// Leaves of the full mesh: the halves that split diamonds leave to children that are never split. Its vertices are cuts of unit edges, for every
-// longer edge with different sides is the spine of a relevant diamond, and samples inside the range that are centres.
-FullMesh FieldHierarchy::full_mesh() const {
-  const TetCases& cases = tet_cases();
-  const auto leaves = [&](const Diamond& d, bool is_split) {
-    std::uint64_t n = 0;
-    std::uint32_t sides = 0;
-    for (int v = 0; v < d.row->vertices; ++v) sides |= std::uint32_t(side(d.vertex(v))) << (2 * v);
-    sides |= std::uint32_t(side(d.centre)) << (2 * kCentre);
-    const bool interior = domain_.is_interior(d);
-    const auto add = [&](std::array<std::uint8_t, 4> local, const TetShape& known) {
-      if (interior) {
-        n += cases.count(known.order, shape_sides(known, sides));
-        return;
-      }
-      const auto positions = domain_.positions(d, local);
-      if (!Domain::exists(positions)) return;
-      const TetShape s = shape_of(positions, local, d.row->belt);
-      n += cases.count(s.order, shape_sides(s, sides));
-    };
-    const unsigned tets = domain_.tets(d);
-    if (!is_split) {
-      for (int i = 0; i < d.row->tets; ++i) {
-        if (tets >> i & 1) add(d.row->tet(i), d.row->shape[i]);
-      }
-      return n;
-    }
-    for (int k = 0; k < d.row->children; ++k) {
-      if (d.has_children()) {
-        const Vertex c = d.child(k);
-        if ((c.x | c.y | c.z) >= 0 && set_.find(c)) continue;
-      }
-      for (const Duet::Half& half : d.row->child[k].half) {
-        if (!(tets >> half.tet & 1)) continue;
-        auto local = d.row->tet(half.tet);
-        local[1 - half.end] = kCentre;
-        add(local, d.row->half_shape[half.tet][half.end]);
-      }
-    }
-    return n;
-  };
-
-  FullMesh full;
-  if (set_.size() == 0) full.tets = leaves(Diamond(domain_.root()), false);
-  full.tets += tbb::parallel_reduce(
-      tbb::blocked_range<std::uint32_t>(0, std::uint32_t(set_.bricks().size()), 1), std::uint64_t(0),
-      [&](const auto& some, std::uint64_t n) {
-        for (std::uint32_t b = some.begin(); b != some.end(); ++b) {
-          set_.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) { n += leaves(Diamond(set_.centre(p)), true); });
-        }
-        return n;
-      },
-      std::plus<>());
-
-  const Vertex last = domain_.last();
-  full.vertices = visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    const Field<T> field{samples, last};
-    const auto even = [](std::int32_t i) { return i + (i & 1); };
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::int32_t>(0, last.z + 1), std::uint64_t(0),
-        [&](const auto& slices, std::uint64_t n) {
-          for (std::int32_t z = slices.begin(); z != slices.end(); ++z) {
-            for (std::int32_t y = 0; y <= last.y; ++y) {
-              for (std::int32_t x = 0; x <= last.x; ++x) {
-                const auto at = [&](std::int32_t i, std::int32_t j, std::int32_t k) { return side_of(field.at({i, j, k}), range_); };
-                const bool in_x = x < last.x, in_y = y < last.y, in_z = z < last.z;
-                const Side here = at(x, y, z);
-                const std::int32_t ex = even(x), ey = even(y), ez = even(z), ox = 2 * x + 1 - ex, oy = 2 * y + 1 - ey, oz = 2 * z + 1 - ez;
-                if (in_x) n += cut_count(here, at(x + 1, y, z));
-                if (in_y) n += cut_count(here, at(x, y + 1, z));
-                if (in_z) n += cut_count(here, at(x, y, z + 1));
-                if (in_x && in_y) n += cut_count(at(ex, ey, z), at(ox, oy, z));
-                if (in_x && in_z) n += cut_count(at(ex, y, ez), at(ox, y, oz));
-                if (in_y && in_z) n += cut_count(at(x, ey, ez), at(x, oy, oz));
-                if (in_x && in_y && in_z) n += cut_count(at(ex, ey, ez), at(ox, oy, oz));
-              }
-            }
-          }
-          return n;
-        },
-        std::plus<>());
-  });
-  std::vector<bool> inside(volume_.grid.sample_count());
-  const auto mark = [&](Vertex v) {
-    const Vertex c = domain_.clamp(v);
-    if (side(c) == Side::inside) inside[Field<char>{{}, last}.index(c)] = true;
-  };
-  const Diamond root(domain_.root());
-  for (int v = 0; v < kRootVertices; ++v) mark(root.vertex(v));
-  set_.for_each_down([&](const Place& p) { mark(set_.centre(p)); });
-  full.vertices += std::uint64_t(std::count(inside.begin(), inside.end(), true));
-  return full;
 }
 
 Result<IntervalVolume> FieldHierarchy::compact() const {
@@ -358,37 +354,81 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
   d.grid = volume_.grid;
   d.range = range_;
   d.refine = refine_;
-  d.full = full_mesh();
   d.base = encode_base(base());
   parts.set = set_;
   parts.error_levels = choose_error_levels(errors_, kErrorLevels);
   d.max_error = parts.error_levels.empty() ? 0.0 : double(parts.error_levels.back());
   parts.codes.resize(set_.size());
-  // Each brick's differences by themselves; then all in one.
-  std::vector<std::vector<std::uint8_t>> differences(set_.bricks().size());
+  const TetCases& cases = tet_cases();
+  const LevelFinder level_of(parts.error_levels);
+  // Each brick's by themselves; then all in one.
+  struct Part {
+    std::vector<std::uint8_t> differences;
+    FullMesh full;
+    std::vector<Vertex> moved;  // inside, where clamping takes centres that lie outside the box
+  };
+  std::vector<Part> by_brick(set_.bricks().size());
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain_.last()};
-    tbb::parallel_for(std::uint32_t(0), std::uint32_t(differences.size()), [&](std::uint32_t b) {
-      set_.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
-        const Diamond diamond(set_.centre(p));
-        const Side centre = side_of(field.at(domain_.clamp(diamond.centre)), range_);
-        const DiamondContext c = context_of(field, domain_, range_, diamond);
-        std::array<std::uint8_t, kMaxCuts> cuts, coded;
-        const std::size_t n = cuts_of(field, domain_, range_, diamond, c, cuts.data());
-        Prediction prediction(c);
-        prediction.encode(centre, std::span(cuts).first(n), coded.data());
-        differences[b].insert(differences[b].end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
-        const auto level = std::lower_bound(parts.error_levels.begin(), parts.error_levels.end(), errors_[p.index]) - parts.error_levels.begin();
-        parts.codes[p.index] =
-            UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first), unsigned(level));
+    tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()), [&](std::uint32_t b) {
+      Part& part = by_brick[b];
+      set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+        const Block block(outlines_, key);
+        const Family family(set_, key);
+        UpdateIndex next = set_.first(b, s);
+        for (std::uint64_t left = set_.occupancy()[s]; left != 0; left &= left - 1, ++next) {
+          const int slot = std::countr_zero(left);
+          const Diamond diamond = block.diamond(slot);
+          const Outline& outline = block.outline(slot);
+          const Around f = around(field, domain_, diamond, outline);
+          const Side centre = side_of(f[kCentre], range_);
+          const DiamondContext c = context_of(f, outline, range_);
+          std::array<std::uint8_t, kMaxCuts> cuts, coded;
+          const std::size_t n = cuts_of(f, c, range_, cuts.data());
+          Prediction prediction(c);
+          prediction.encode(centre, std::span(cuts).first(n), coded.data());
+          part.differences.insert(part.differences.end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
+          parts.codes[next] = UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first),
+                                         unsigned(level_of(errors_[next])));
+          part.full.tets += leaves(cases, domain_, diamond, outline, c.sides | std::uint32_t(centre) << (2 * kCentre), family.children(slot));
+          if (centre != Side::inside) continue;
+          if (domain_.contains(diamond.centre))
+            ++part.full.vertices;
+          else
+            part.moved.push_back(domain_.clamp(diamond.centre));
+        }
       });
     });
   });
+  // Vertices of the full mesh are cuts of unit edges, for every longer edge with different sides is the spine of a relevant diamond, and samples
+  // inside the range that are centres of relevant diamonds or the root's corners.
+  d.full.vertices = unit_cuts_;
+  std::vector<Vertex> moved;
+  const Diamond root(domain_.root());
+  for (int v = 0; v < kRootVertices; ++v) {
+    if (side(root.vertex(v)) == Side::inside) moved.push_back(domain_.clamp(root.vertex(v)));
+  }
   std::size_t total = 0;
-  for (const auto& part : differences) total += part.size();
+  for (const Part& part : by_brick) {
+    total += part.differences.size();
+    d.full.vertices += part.full.vertices;
+    d.full.tets += part.full.tets;
+    moved.insert(moved.end(), part.moved.begin(), part.moved.end());
+  }
+  std::sort(moved.begin(), moved.end(), [](Vertex a, Vertex b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); });
+  moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
+  for (Vertex v : moved) d.full.vertices += v == Vertex{} || !set_.find(v);
+  if (set_.size() == 0) {
+    std::uint32_t sides = 0;
+    for (int v = 0; v < kRootVertices; ++v) sides |= std::uint32_t(side(root.vertex(v))) << (2 * v);
+    const Outline outline = Outlines::outline_of(domain_, root);
+    for (int i = 0; i < root.row->tets; ++i) {
+      if (outline.tets >> i & 1) d.full.tets += patch_tets(cases, domain_, root, outline, sides, root.row->tet(i), root.row->shape[i]);
+    }
+  }
   parts.differences.reserve(total);
-  for (auto& part : differences) {
-    parts.differences.insert(parts.differences.end(), part.begin(), part.end());
+  for (Part& part : by_brick) {
+    parts.differences.insert(parts.differences.end(), part.differences.begin(), part.differences.end());
     part = {};
   }
   return IntervalVolume::assemble(std::move(parts));

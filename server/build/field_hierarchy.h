@@ -14,6 +14,7 @@
 #include "common/domain.h"
 #include "common/interval_volume.h"
 #include "common/supercube.h"
+#include "server/build/outline.h"
 #include "server/volume/volume.h"
 
 namespace intervale {
@@ -26,8 +27,8 @@ struct BuildOptions {
 
 class FieldHierarchy {
  public:
-  // Samples finite; the volume must outlive the hierarchy. Uses all cores that oneTBB may. Beside the volume it takes about a fifth of a byte a
-  // sample, and 4 bytes for each relevant diamond.
+  // Samples finite; the volume must outlive the hierarchy. Uses all cores that oneTBB may. Beside the volume it takes half a byte a sample to
+  // find the relevant diamonds, and then 4 bytes for each of them.
   FieldHierarchy(const Volume& volume, const BuildOptions& options);
 
   [[nodiscard]] const Domain& domain() const { return domain_; }
@@ -45,15 +46,16 @@ class FieldHierarchy {
 
  private:
   [[nodiscard]] double value(Vertex v) const;  // of any vertex: the sample it clamps to
-  void find_relevant();
   void measure_errors(const std::function<void(double)>& progress);
-  [[nodiscard]] FullMesh full_mesh() const;
+  void saturate_errors();
 
   const Volume& volume_;
   Range range_;
   Refine refine_;
   Domain domain_;
+  std::vector<Outlines> outlines_;  // by scale
   SupercubeSet set_;
+  std::uint64_t unit_cuts_ = 0;  // vertices of the full mesh that are cuts
   std::vector<float> errors_;
 };
 

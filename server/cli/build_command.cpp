@@ -10,6 +10,7 @@
 
 #include "common/ivm_file.h"
 #include "common/program/progress.h"
+#include "server/build/all_cores.h"
 #include "server/build/field_hierarchy.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
@@ -93,7 +94,8 @@ Result<void> run(const BuildCommand& options) {
     made = hierarchy.compact();
   }
   if (!made) return tl::unexpected(made.error());
-  if (auto saved = save_ivm(options.output, *made); !saved) return saved;
+  volume->bytes = std::vector<std::byte>();  // compression needs the room, with several threads at it
+  if (auto saved = save_ivm(options.output, *made, on_all_cores); !saved) return saved;
   std::error_code code;
   const auto size = std::filesystem::file_size(options.output, code);
   const std::uint64_t file_bytes = code ? 0 : size;

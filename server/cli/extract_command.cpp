@@ -1,4 +1,6 @@
 #include <fmt/core.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/info.h>
 
 #include <chrono>
 #include <filesystem>
@@ -10,6 +12,7 @@
 #include "common/mesh_writer.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
+#include "server/build/all_cores.h"
 #include "server/cli/commands.h"
 
 namespace intervale {
@@ -19,12 +22,14 @@ struct ExtractCommand {
   std::string file;
   std::optional<std::filesystem::path> output;
   Lod lod;
+  unsigned threads = 0;
   bool json = false;
 };
 
 Result<Extraction> extract_with_progress(const IntervalVolume& volume, const Lod& lod) {
   Progress progress("extracting " + volume.description().name);
-  return extract(volume, lod, [&progress](double done) { progress.fraction(done); });
+  return extract(
+      volume, lod, [&progress](double done) { progress.fraction(done); }, on_all_cores);
 }
 
 Result<void> run(const ExtractCommand& options) {
@@ -33,10 +38,12 @@ Result<void> run(const ExtractCommand& options) {
   }
   const auto volume = load_ivm(options.file);
   if (!volume) return tl::unexpected(volume.error());
+  const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   const auto start = std::chrono::steady_clock::now();
   const auto extracted = extract_with_progress(**volume, options.lod);
   if (!extracted) return tl::unexpected(extracted.error());
-  const Mesh mesh = extracted->front.mesh();
+  const Mesh mesh = extracted->front.mesh(on_all_cores);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (options.output) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
@@ -63,6 +70,7 @@ void add_extract_command(Program& program) {
           "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
       ->type_name("MESH");
   add_lod_options(command, options->lod);
+  command.add_option("--threads", options->threads, "0: one for each core")->capture_default_str();
   add_json_flag(command, options->json);
 }
 

@@ -15,6 +15,7 @@
 #include "common/base.h"
 #include "common/supercube.h"
 #include "server/build/interpolation_error.h"
+#include "server/build/outline.h"
 
 namespace intervale::bench {
 namespace {
@@ -48,8 +49,10 @@ class TypedDelta final : public Delta {
     }
     nodes_.resize(samples.size());
     find_outside();
+    const Extremes<T> extremes(field_);
     for (int scale = 0; scale < domain_.levels(); ++scale) {
-      for (int cls = 2; cls >= 0; --cls) measure(scale, cls);
+      const DiamondErrors<T> error_of(field_, extremes, domain_, scale);
+      for (int cls = 2; cls >= 0; --cls) measure(scale, cls, error_of);
     }
   }
 
@@ -103,7 +106,7 @@ class TypedDelta final : public Delta {
   }
 
   // Diamonds of one scale and class are children of none of their own: slices in any order.
-  void measure(int scale, int cls) {
+  void measure(int scale, int cls, const DiamondErrors<T>& error_of) {
     tbb::parallel_for(std::int32_t(0), places(scale).z, [&](std::int32_t z) {
       for_each_in_slice(scale, z, [&](const Diamond& d) {
         if (d.row->cls != cls) return;
@@ -112,7 +115,7 @@ class TypedDelta final : public Delta {
         const unsigned tets = domain_.tets(d);
         if (tets == 0 || domain_.is_idle(d)) return;
         Node& node = nodes_[index];
-        node.error = round_up(diamond_error(field_, domain_, d, tets));
+        node.error = round_up(error_of(d, Outlines::outline_of(domain_, d)));
         node.min = node.max = sample(d.centre);
         const auto take = [&node](T low, T high) {
           node.min = std::min(node.min, low);

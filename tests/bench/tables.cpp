@@ -5,7 +5,6 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 #include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -25,6 +24,7 @@
 #include "common/ivm_file.h"
 #include "common/parallel.h"
 #include "protocol/limits.h"
+#include "server/build/all_cores.h"
 #include "server/build/field_hierarchy.h"
 #include "server/serve/stream_plan.h"
 #include "server/volume/samples.h"
@@ -125,8 +125,6 @@ auto on_cores(std::size_t cores, Work work) {
     return work();
   };
 }
-
-void on_all_cores(std::size_t count, const std::function<void(std::size_t)>& piece) { tbb::parallel_for(std::size_t(0), count, piece); }
 
 Speeds measure_speeds(const Case& c, const Sigma& sigma, int runs) {
   Speeds speeds;
