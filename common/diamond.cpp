@@ -119,6 +119,17 @@ constexpr DiamondType around(unsigned type) {
   t.vertices = std::uint8_t(n);
   t.belt = t.tets = std::uint8_t(n - 2);
   t.edges = std::uint8_t(1 + 3 * t.belt);
+  for (int i = 0; i < t.tets; ++i) {
+    const auto local = t.tet(i);
+    for (int a = 0; a < 4; ++a) {
+      t.tet_vertices[i] |= 1u << local[a];
+      for (int b = a + 1; b < 4; ++b) t.tet_edges[i] |= 1u << edge_between(local[a], local[b], t.belt);
+      const Int3 v = int3(t.vertex[local[a]]);
+      for (int k = 0; k < 3; ++k) {
+        if (v[k] != 0) t.beyond[k][v[k] > 0] |= 1u << i;
+      }
+    }
+  }
   return t;
 }
 

@@ -72,6 +72,8 @@ struct DiamondType {
   std::array<Duet, kMaxChildren> child{};
   std::array<TetShape, kMaxTets> shape{};                                 // of each tetrahedron
   std::array<std::array<TetShape, 2>, kMaxTets> half_shape{};             // of its two halves: [tet][end that stays]
+  std::array<std::uint32_t, kMaxTets> tet_vertices{}, tet_edges{};        // of each tetrahedron, a bit each
+  std::array<std::array<std::uint32_t, 2>, 3> beyond{};                   // by axis: tetrahedra with a vertex below the centre, and above it
   [[nodiscard]] constexpr std::array<std::uint8_t, 4> tet(int i) const {  // local vertices
     return {0, 1, std::uint8_t(2 + i), std::uint8_t(2 + (i + 1) % belt)};
   }

@@ -35,9 +35,23 @@ class Domain {
     return contains({d.centre.x - d.h, d.centre.y - d.h, d.centre.z - d.h}) && contains({d.centre.x + d.h, d.centre.y + d.h, d.centre.z + d.h});
   }
 
+  // Whether no vertex is moved by clamping but those of tetrahedra that lie outside the virtual grid: the others are as they are in the interior.
+  [[nodiscard]] bool is_unmoved(const Diamond& d) const {
+    const auto unmoved = [&d, n = std::int32_t(1) << levels_](std::int32_t c, std::int32_t last) { return c + d.h <= last || (last == n && c == n); };
+    return unmoved(d.centre.x, last_.x) && unmoved(d.centre.y, last_.y) && unmoved(d.centre.z, last_.z);
+  }
+
   // One bit for each tetrahedron of the diamond that exists: that is not flat once clamped. 0: the diamond is as good as absent.
   [[nodiscard]] unsigned tets(const Diamond& d) const {
-    if (is_interior(d)) return (1u << d.row->tets) - 1;
+    const unsigned all = (1u << d.row->tets) - 1;
+    if (is_interior(d)) return all;
+    if ((d.centre.x | d.centre.y | d.centre.z) >= 0 && is_unmoved(d)) {
+      // Only a diamond in a face of the virtual grid reaches beyond it, with half of what it has.
+      const auto outside = [&d](int axis, std::int32_t c, std::int32_t last) {
+        return (c == 0 ? d.row->beyond[axis][0] : 0) | (c == last ? d.row->beyond[axis][1] : 0);
+      };
+      return all & ~(outside(0, d.centre.x, last_.x) | outside(1, d.centre.y, last_.y) | outside(2, d.centre.z, last_.z));
+    }
     unsigned mask = 0;
     for (int i = 0; i < d.row->tets; ++i) mask |= unsigned(exists(positions(d, d.row->tet(i)))) << i;
     return mask;
@@ -46,25 +60,14 @@ class Domain {
   // One bit for each local vertex (kCentre not among them) of a tetrahedron in the mask.
   [[nodiscard]] static unsigned vertices(const DiamondType& row, unsigned tets) {
     unsigned mask = 0;
-    for (int i = 0; i < row.tets; ++i) {
-      if (tets >> i & 1) {
-        for (int v : row.tet(i)) mask |= 1u << v;
-      }
-    }
+    for (; tets != 0; tets &= tets - 1) mask |= row.tet_vertices[std::countr_zero(tets)];
     return mask;
   }
 
   // One bit for each edge of a tetrahedron in the mask, in local numbers.
   [[nodiscard]] static unsigned edges(const DiamondType& row, unsigned tets) {
     unsigned mask = 0;
-    for (int i = 0; i < row.tets; ++i) {
-      if (tets >> i & 1) {
-        const auto v = row.tet(i);
-        for (int a = 0; a < 4; ++a) {
-          for (int b = a + 1; b < 4; ++b) mask |= 1u << edge_between(v[a], v[b], row.belt);
-        }
-      }
-    }
+    for (; tets != 0; tets &= tets - 1) mask |= row.tet_edges[std::countr_zero(tets)];
     return mask;
   }
 

@@ -70,29 +70,6 @@ Front::Front(const Grid& grid, const Base& base) : grid_(grid), domain_(grid.dim
   tet_count_ = count_tets(root, e, sides);
 }
 
-Front::Front(const Front& other)
-    : grid_(other.grid_),
-      domain_(other.domain_),
-      blocks_(other.blocks_),
-      corner_(other.corner_),
-      q_(other.q_),
-      tet_count_(other.tet_count_),
-      split_count_(other.split_count_) {
-  for (Block& block : blocks_) index_.emplace(index_key(block.scale, block.position), &block);
-}
-
-Front& Front::operator=(Front other) noexcept {
-  grid_ = other.grid_;
-  domain_ = other.domain_;
-  blocks_.swap(other.blocks_);
-  index_.swap(other.index_);
-  corner_ = other.corner_;
-  q_.swap(other.q_);
-  tet_count_ = other.tet_count_;
-  split_count_ = other.split_count_;
-  return *this;
-}
-
 std::optional<Front::Handle> Front::find(Vertex centre) const {
   if ((centre.x | centre.y | centre.z) <= 0 || scale_of(centre) >= domain_.levels()) return {};
   const std::int32_t most = 1 << domain_.levels();
@@ -149,27 +126,26 @@ bool Front::merge(Vertex centre) {
 
 std::size_t Front::memory_bytes() const { return blocks_.size() * sizeof(Block) + index_.bucket_count() * 17 + q_.capacity(); }
 
-const Front::Block* Front::find_block(int scale, Vertex position) const {
+std::uint32_t Front::find_number(int scale, Vertex position) const {
   const auto found = index_.find(index_key(scale, position));
-  return found == index_.end() ? nullptr : found->second;
+  return found == index_.end() ? kNone : found->second;
 }
 
 Front::Block& Front::obtain_block(int scale, Vertex position) {
-  const auto [place, is_new] = index_.try_emplace(index_key(scale, position), nullptr);
+  const auto [place, is_new] = index_.try_emplace(index_key(scale, position), std::uint32_t(blocks_.size()));
   if (is_new) {
     blocks_.emplace_back();
     blocks_.back().position = position;
     blocks_.back().scale = scale;
-    place->second = &blocks_.back();
   }
-  return *place->second;
+  return blocks_[place->second];
 }
 
 Front::Existing Front::existing(const Diamond& d) const {
   const DiamondType& row = *d.row;
   if (domain_.is_interior(d)) return {(1u << row.tets) - 1, (1u << row.vertices) - 1, (1u << row.edges) - 1, false};
   const unsigned tets = domain_.tets(d);
-  return {tets, Domain::vertices(row, tets), Domain::edges(row, tets), true};
+  return {tets, Domain::vertices(row, tets), Domain::edges(row, tets), !domain_.is_unmoved(d)};
 }
 
 // On an axis that clamps, at or beyond the last sample. Only edges with such an end can share their place with another edge.
@@ -245,8 +221,19 @@ const Front::Block* Front::Cursor::resolve(std::uint8_t where) {
   const Vertex p = position_;
   const Block* found = nullptr;
   if (where < kCorner) {
+    const Block* const here = where == kHere || near_[kHere] == &nothing ? nullptr : near_[kHere] != nullptr ? near_[kHere] : resolve(kHere);
+    if (here != nullptr && here != &nothing) {
+      if (const std::uint32_t number = std::atomic_ref(here->near[where]).load(std::memory_order_relaxed); number != 0)
+        return near_[where] = &front_.blocks_[number - 1];
+    }
     const SupercubePlace there = supercube_at(where, scale_, p);
-    if ((there.position.x | there.position.y | there.position.z) >= 0) found = front_.find_block(there.scale, there.position);
+    if ((there.position.x | there.position.y | there.position.z) >= 0) {
+      const std::uint32_t number = front_.find_number(there.scale, there.position);
+      if (number != kNone) {
+        found = &front_.blocks_[number];
+        if (here != nullptr && here != &nothing) std::atomic_ref(here->near[where]).store(number + 1, std::memory_order_relaxed);
+      }
+    }
   } else {
     const int w = where - kCorner;
     const Vertex v{(p.x + (w & 1)) << (scale_ + 2), (p.y + (w >> 1 & 1)) << (scale_ + 2), (p.z + (w >> 2)) << (scale_ + 2)};

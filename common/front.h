@@ -37,10 +37,6 @@ class Front {
  public:
   // The mesh of the root's patch. grid.dims in [kMinSide, kMaxSide].
   Front(const Grid& grid, const Base& base);
-  Front(const Front& other);
-  Front(Front&&) = default;
-  Front& operator=(Front other) noexcept;
-  ~Front() = default;
 
   // A diamond of the front that can be split now; valid until the next split or merge.
   struct Handle {
@@ -102,14 +98,21 @@ class Front {
     std::int32_t scale = 0;
     std::uint64_t split = 0;  // slots
     std::array<Split, kSlots> of{};
+    // Numbers of the supercubes around it that were looked for and found, and 1; by where (links.h). Kept by whoever looks, on any thread.
+    mutable std::array<std::uint32_t, kCorner> near{};
   };
   // What of a diamond exists: bits by local number.
   struct Existing {
     std::uint32_t tets = 0, vertices = 0, edges = 0;
-    bool straddles = false;  // is not all inside the box
+    bool straddles = false;  // clamping moves some of it
   };
 
-  [[nodiscard]] const Block* find_block(int scale, Vertex position) const;
+  static constexpr std::uint32_t kNone = std::uint32_t(-1);
+  [[nodiscard]] std::uint32_t find_number(int scale, Vertex position) const;  // of a supercube; kNone if it is not there
+  [[nodiscard]] const Block* find_block(int scale, Vertex position) const {
+    const std::uint32_t number = find_number(scale, position);
+    return number == kNone ? nullptr : &blocks_[number];
+  }
   Block& obtain_block(int scale, Vertex position);
   [[nodiscard]] Existing existing(const Diamond& d) const;
   [[nodiscard]] bool is_border(Vertex v) const;
@@ -121,10 +124,10 @@ class Front {
 
   Grid grid_;
   Domain domain_;
-  std::deque<Block> blocks_;                                // stay where they are
-  boost::unordered_flat_map<std::uint64_t, Block*> index_;  // by scale and position
-  Block corner_;                                            // vertex (0, 0, 0): slot 0
-  std::vector<std::uint8_t> q_;                             // of every cut; one more for a centre inside
+  std::deque<Block> blocks_;                                       // stay where they are
+  boost::unordered_flat_map<std::uint64_t, std::uint32_t> index_;  // of blocks, by scale and position
+  Block corner_;                                                   // vertex (0, 0, 0): slot 0
+  std::vector<std::uint8_t> q_;                                    // of every cut; one more for a centre inside
   std::uint64_t tet_count_ = 0, split_count_ = 0;
 };
 

@@ -4,6 +4,7 @@
 // and a centre inside the range stays one. Only on the far faces of a box that clamps (domain.h), where edges can be one edge or none, do the
 // tetrahedra themselves have to say.
 #include <algorithm>
+#include <cassert>
 #include <memory>
 
 #include "common/front.h"
@@ -63,7 +64,7 @@ class FrontMesh {
     Mesh mesh;
     mesh.points.resize(points);
     mesh.surface.resize(points);
-    mesh.tets.reserve(front_.tet_count());
+    mesh.tets.resize(front_.tet_count());
     parallel_(pieces_, [&](std::size_t piece) {
       for_each_point(piece, [&](std::uint32_t point, const Position& p, Surface surface, bool) {
         if (!used_[point]) return;
@@ -74,13 +75,17 @@ class FrontMesh {
     });
     // A few pieces at a time: what they make goes to its place while it is still in a cache.
     std::array<std::vector<Tet>, kPiecesAtOnce> tets;
+    std::array<std::size_t, kPiecesAtOnce + 1> place{};
     for (std::size_t first = 0; first < pieces_; first += kPiecesAtOnce) {
       const std::size_t some = std::min(pieces_ - first, kPiecesAtOnce);
       parallel_(some, [&](std::size_t i) {
         tets[i].clear();
         emit_piece(first + i, number_, tets[i]);
       });
-      for (std::size_t i = 0; i < some; ++i) mesh.tets.insert(mesh.tets.end(), tets[i].begin(), tets[i].end());
+      for (std::size_t i = 0; i < some; ++i) place[i + 1] = place[i] + tets[i].size();
+      assert(place[some] <= mesh.tets.size() && "splits and merges kept count");
+      parallel_(some, [&](std::size_t i) { std::copy(tets[i].begin(), tets[i].end(), mesh.tets.begin() + std::ptrdiff_t(place[i])); });
+      place[0] = place[some];
     }
     return mesh;
   }
@@ -89,8 +94,8 @@ class FrontMesh {
   using Tet = std::array<std::uint32_t, 4>;
   using Position = std::array<std::int32_t, 3>;  // in 1 / kSteps of a sample: every cut of every edge is whole there
   static constexpr std::int32_t kSteps = 512;
-  static constexpr std::size_t kPiece = 64;  // supercubes
-  static constexpr std::size_t kPiecesAtOnce = 16;
+  static constexpr std::size_t kPiece = 32;  // supercubes
+  static constexpr std::size_t kPiecesAtOnce = 64;
 
   // Calls visit(block) for the supercubes of a piece.
   template <class Visit>
@@ -301,9 +306,10 @@ class FrontMesh {
     const auto& corners = half_corners_[cursor.slot_];
     for (; children != 0; children &= children - 1) {
       for (const Duet::Half& half : row.child[std::countr_zero(children)].half) {
+        if (!(cursor.existing_.tets >> half.tet & 1)) continue;
         if (!cursor.existing_.straddles) {
           emit(row.half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points, out);
-        } else if ((cursor.existing_.tets >> half.tet & 1) && front_.half_exists(*cursor.diamond_, half.tet, half.end)) {
+        } else if (front_.half_exists(*cursor.diamond_, half.tet, half.end)) {
           const TetShape shape = front_.half_shape(*cursor.diamond_, cursor.existing_, half.tet, half.end);
           emit(shape, corners_of(shape), sides, points, out);
         }

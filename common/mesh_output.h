@@ -37,8 +37,8 @@ class MeshOutput {
     append(std::as_bytes(std::span(&value, 1)));
   }
 
-  template <class T>
-  void numbers(const std::vector<T>& values) {
+  template <class T, class Allocator>
+  void numbers(const std::vector<T, Allocator>& values) {
     append(std::as_bytes(std::span(values)));
   }
 

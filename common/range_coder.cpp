@@ -22,11 +22,4 @@ void RangeEncoder::shift() {
   range_ <<= 32;
 }
 
-std::uint32_t RangeDecoder::next() {
-  std::uint32_t word = 0;
-  for (std::size_t i = at_; i < at_ + 4; ++i) word = word << 8 | (i < bytes_.size() ? bytes_[i] : 0u);
-  at_ += 4;
-  return word;
-}
-
 }  // namespace intervale

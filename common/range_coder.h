@@ -100,7 +100,12 @@ class RangeDecoder {
     range_ <<= 32;
     code_ = code_ << 32 | next();
   }
-  std::uint32_t next();  // four bytes; zeros behind the end, of which a reader sees the first four
+  std::uint32_t next() {  // four bytes; zeros behind the end, of which a reader sees the first four
+    std::uint32_t word = 0;
+    for (std::size_t i = at_; i < at_ + 4; ++i) word = word << 8 | (i < bytes_.size() ? bytes_[i] : 0u);
+    at_ += 4;
+    return word;
+  }
   std::span<const std::uint8_t> bytes_;
   std::size_t at_ = 0;
   std::uint64_t code_ = 0, range_ = ~std::uint64_t(0);

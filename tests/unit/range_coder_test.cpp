@@ -49,9 +49,8 @@ std::vector<unsigned> some_values(unsigned seed, std::size_t count) {
 
 // In a buffer of exactly its size, so that the address sanitizer sees every step beyond.
 std::vector<unsigned> decode_exact(std::span<const std::uint8_t> bytes, std::size_t count, bool& spent) {
-  const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
-  std::copy(bytes.begin(), bytes.end(), exact.get());
-  RangeDecoder decoder({exact.get(), bytes.size()});
+  const std::vector<std::uint8_t> exact(bytes.begin(), bytes.end());
+  RangeDecoder decoder(exact);
   const auto got = code_all(decoder, std::vector<unsigned>(count));
   spent = decoder.is_spent();
   EXPECT_FALSE(spent && decoder.is_overdrawn());
@@ -120,7 +119,7 @@ TEST(RangeCoder, BytesBehindTheEndAreNoticed) {
   auto bytes = encoder.finish();
   bool spent = false;
   for (std::size_t n = 0; n < bytes.size(); ++n) decode_exact(std::span(bytes).first(n), values.size(), spent);
-  bytes.insert(bytes.end(), 4, 0);
+  bytes.resize(bytes.size() + 4);
   decode_exact(bytes, values.size(), spent);
   EXPECT_FALSE(spent);
 }
