@@ -13,21 +13,6 @@ std::uint64_t index_key(int scale, Vertex p) {
   return std::uint64_t(scale) << 57 | std::uint64_t(std::uint32_t(p.z)) << 38 | std::uint64_t(std::uint32_t(p.y)) << 19 | std::uint32_t(p.x);
 }
 
-// Sides of the tetrahedra around a diamond, as of tet_sides.
-class Ring {
- public:
-  Ring(std::uint32_t sides, int belt) : ends_{sides & 3, sides >> 2 & 3}, centre_(sides >> (2 * kCentre) & 3) {
-    belt_ = sides >> 4 & ((1u << (2 * belt)) - 1);
-    belt_ |= (belt_ & 3) << (2 * belt);  // the ring closes
-  }
-  [[nodiscard]] unsigned tet(int i) const { return ends_[0] | ends_[1] << 2 | (belt_ >> (2 * i) & 15) << 4; }
-  [[nodiscard]] unsigned half(int i, int end) const { return ends_[end] | centre_ << 2 | (belt_ >> (2 * i) & 15) << 4; }
-
- private:
-  std::array<std::uint32_t, 2> ends_;
-  std::uint32_t belt_, centre_;
-};
-
 }  // namespace
 
 // The corners of the domain are no diamonds, but seven of them have the offsets of diamonds of scale N whose centres lie there, and the root's edges

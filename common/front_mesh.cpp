@@ -69,7 +69,7 @@ class FrontMesh {
       for_each_point(piece, [&](std::uint32_t point, const Position& p, Surface surface, bool) {
         if (!used_[point]) return;
         const std::uint32_t n = number_[point];
-        for (int i = 0; i < 3; ++i) mesh.points[n][i] = front_.grid_.origin[i] + front_.grid_.spacing[i] * p[i] / kSteps;
+        for (int i = 0; i < 3; ++i) mesh.points[n][i] = front_.grid_.origin[i] + front_.grid_.spacing[i] * p[i] * (1.0 / kSteps);
         mesh.surface[n] = surface;
       });
     });
@@ -122,23 +122,23 @@ class FrontMesh {
   }
   template <class Visit>
   void for_each_point(const Front::Block& block, const Visit& visit) const {
+    const bool at_border = is_at_border(block);
     for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
       const int slot = std::countr_zero(left);
-      for_each_point(centre_of(block.scale, block.position, slot), block.of[slot], visit);
+      for_each_point(Diamond(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]), block.of[slot], at_border, visit);
     }
   }
   template <class Visit>
-  void for_each_point(Vertex centre, const Front::Split& split, const Visit& visit) const {
-    const Diamond d(centre);
-    const Vertex c = front_.domain_.clamp(centre);
-    const bool border = front_.is_border(centre);
+  void for_each_point(const Diamond& d, const Front::Split& split, bool at_border, const Visit& visit) const {
+    const Vertex c = at_border ? front_.domain_.clamp(d.centre) : d.centre;
+    const bool border = at_border && front_.is_border(d.centre);
     std::uint32_t point = split.first;
     for (std::uint32_t left = split.bits & Front::kCutBits; left != 0; left &= left - 1, ++point) {
       const int bit = std::countr_zero(left);
-      const Vertex end = d.vertex(bit / 2), v = front_.domain_.clamp(end);
+      const Vertex end = d.vertex(bit / 2), v = at_border ? front_.domain_.clamp(end) : end;
       const std::int32_t t = 2 * front_.q_[point] + 1;
       visit(point, Position{c.x * kSteps + (v.x - c.x) * t, c.y * kSteps + (v.y - c.y) * t, c.z * kSteps + (v.z - c.z) * t},
-            (bit & 1) == 0 ? Surface::alpha : Surface::beta, border || front_.is_border(end));
+            (bit & 1) == 0 ? Surface::alpha : Surface::beta, border || (at_border && front_.is_border(end)));
     }
     if (split.side() == Side::inside) visit(point, Position{c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, border);
   }
@@ -304,9 +304,10 @@ class FrontMesh {
     }
     if (split.side() == Side::inside) points[kCentre] = names[point];
     const auto& corners = half_corners_[cursor.slot_];
+    const Ring ring(sides, row.belt);
     for (; children != 0; children &= children - 1) {
       for (const Duet::Half& half : row.child[std::countr_zero(children)].half) {
-        if (!(cursor.existing_.tets >> half.tet & 1)) continue;
+        if (!(cursor.existing_.tets >> half.tet & 1) || cases_.count(ring.half(half.tet, half.end)) == 0) continue;
         if (!cursor.existing_.straddles) {
           emit(row.half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points, out);
         } else if (front_.half_exists(*cursor.diamond_, half.tet, half.end)) {
@@ -320,7 +321,6 @@ class FrontMesh {
   // The patch of one tetrahedron.
   void emit(const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points, std::vector<Tet>& out) const {
     const auto tets = cases_.tets(shape.order, shape_sides(shape, sides));
-    if (tets.empty()) return;
     const int second = shape.flip ? 3 : 2, third = shape.flip ? 2 : 3;
     const std::size_t from = out.size();
     out.resize(from + tets.size());

@@ -37,6 +37,22 @@ inline constexpr int kTetOrders = 32;
          (sides >> (2 * s.vertex[3]) & 3) << 6;
 }
 
+// Sides of the tetrahedra around a diamond and of their halves, as of tet_sides: both ends of the spine (of a half: the end that stays, then the
+// centre), belt i and belt i + 1. sides: two bits each, by local vertex.
+class Ring {
+ public:
+  Ring(std::uint32_t sides, int belt) : ends_{sides & 3, sides >> 2 & 3}, centre_(sides >> (2 * kCentre) & 3) {
+    belt_ = sides >> 4 & ((1u << (2 * belt)) - 1);
+    belt_ |= (belt_ & 3) << (2 * belt);  // the ring closes
+  }
+  [[nodiscard]] unsigned tet(int i) const { return ends_[0] | ends_[1] << 2 | (belt_ >> (2 * i) & 15) << 4; }
+  [[nodiscard]] unsigned half(int i, int end) const { return ends_[end] | centre_ << 2 | (belt_ >> (2 * i) & 15) << 4; }
+
+ private:
+  std::array<std::uint32_t, 2> ends_;
+  std::uint32_t belt_, centre_;
+};
+
 class TetCases {
  public:
   TetCases();
