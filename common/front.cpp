@@ -275,6 +275,10 @@ bool Front::Cursor::parents_are_split(int slot) {
 }
 
 const DiamondContext& Front::Cursor::look_closer() {
+  if (!context_.is_mixed()) {  // no edge is cut
+    context_.cut = {};
+    return context_;
+  }
   const DiamondType& row = *context_.row;
   const Links& links = (*links_)[slot_];
   for (int e = 0; e < row.edges; ++e) {
@@ -301,6 +305,9 @@ std::int64_t Front::Cursor::write(Block& block, Side side, std::span<const std::
   s.first = first;
   s.bits = context_.cut_bits(side) | std::uint32_t(side) << kSideBit;
   std::copy(cuts.begin(), cuts.end(), front_.q_.begin() + first);
+  if (!existing_.straddles && (s.bits & kCutBits) == 0) {  // all on one side: every tetrahedron inside becomes two
+    return side == Side::inside ? std::popcount(existing_.tets) : 0;
+  }
   const std::uint32_t sides = context_.sides | std::uint32_t(side) << (2 * kCentre);
   return std::int64_t(front_.count_halves(*diamond_, existing_, sides) - front_.count_tets(*diamond_, existing_, sides));
 }

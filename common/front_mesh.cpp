@@ -280,6 +280,7 @@ class FrontMesh {
     for (int v = 0; v < row.vertices; ++v) {
       if (cursor.context_.has(v) && cursor.context_.side(v) == Side::inside) points[v] = names[cursor.split_[v].centre()];
     }
+    if (!cursor.context_.is_mixed()) return;
     for (int e = 0; e < row.edges; ++e) {
       if (!(cursor.existing_.edges >> e & 1)) continue;
       const Links::Edge edge = links.edge[e];
@@ -296,6 +297,7 @@ class FrontMesh {
                    std::vector<Tet>& out) const {
     const DiamondType& row = *cursor.context_.row;
     const std::uint32_t sides = cursor.context_.sides | std::uint32_t(split.side()) << (2 * kCentre);
+    if ((split.bits & Front::kCutBits) == 0 && split.side() != Side::inside) return;  // all on one side, and not inside
     PointsAround points;
     gather_points(cursor, names, points);
     std::uint32_t point = split.first;
