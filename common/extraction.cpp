@@ -46,7 +46,8 @@ Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const O
   if (!lod.max_tets && !lod.max_updates) {
     const auto wrong = front.split_all(
         volume.set(), chosen.groups(volume.set()), [&volume](UpdateIndex i) { return volume.codes()[i].coefficients(); },
-        [&volume](const Place& p, const DiamondContext& context, std::uint8_t* q) { return decode_update(context, volume.update(p), q); }, parallel);
+        [&volume](const Place& p, const DiamondContext& context, std::uint8_t* q) { return decode_update(context, volume.update(p), q); }, parallel,
+        progress);
     if (wrong) return misfit(*wrong);
     result.updates = front.split_count();
     return result;

@@ -17,9 +17,6 @@ struct Extraction {
   std::uint64_t updates = 0;
 };
 
-// Called with the share done, 0 to 1, now and then.
-using OnProgress = std::function<void(double)>;
-
 // The mesh of a level of detail, budgets included: best first, and never more than max_tets tetrahedra or max_updates updates. Fails on a lod that
 // check_lod refuses, and on a volume whose updates do not fit together (validate() says which).
 [[nodiscard]] Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const OnProgress& progress = {},

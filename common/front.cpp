@@ -205,7 +205,10 @@ const Front::Block* Front::Cursor::resolve(std::uint8_t where) {
   static const Block nothing{};
   const Vertex p = position_;
   const Block* found = nullptr;
-  if (where < kCorner) {
+  if (where >= kFiner) {
+    const SupercubePlace there = supercube_at(where, scale_, p);
+    if ((there.scale | there.position.x | there.position.y | there.position.z) >= 0) found = front_.find_block(there.scale, there.position);
+  } else if (where < kCorner) {
     const Block* const here = where == kHere || near_[kHere] == &nothing ? nullptr : near_[kHere] != nullptr ? near_[kHere] : resolve(kHere);
     if (here != nullptr && here != &nothing) {
       if (const std::uint32_t number = std::atomic_ref(here->near[where]).load(std::memory_order_relaxed); number != 0)

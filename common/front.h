@@ -77,7 +77,7 @@ class Front {
   // no more use.
   template <class CutCount, class Decode>
   std::optional<Vertex> split_all(const SupercubeSet& set, std::span<const SlotGroup> groups, const CutCount& cut_count, const Decode& decode,
-                                  const ParallelFor& parallel = in_turn);
+                                  const ParallelFor& parallel = in_turn, const OnProgress& progress = {});
 
  private:
   friend class FrontMesh;
@@ -188,7 +188,7 @@ class Front::Cursor {
 
 template <class CutCount, class Decode>
 std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const SlotGroup> groups, const CutCount& cut_count, const Decode& decode,
-                                       const ParallelFor& parallel) {
+                                       const ParallelFor& parallel, const OnProgress& progress) {
   // First room for all, then pass by pass, parents before children: within a pass no diamond is another's ancestor.
   std::vector<Block*> blocks;
   blocks.reserve(groups.size());
@@ -208,17 +208,21 @@ std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const 
     split_count_ += std::uint64_t(std::popcount(g.slots));
   }
   q_.resize(size);
-  constexpr std::size_t kPiece = 32;  // supercubes
+  constexpr std::size_t kPiece = 32, kPiecesBetweenProgress = 512;  // in supercubes; in pieces
   std::atomic<std::int64_t> added = 0;
+  std::atomic<std::uint64_t> done = 0;
+  std::uint64_t all = 0;
+  for (const SlotGroup& g : groups) all += std::uint64_t(std::popcount(g.slots));
   std::atomic<bool> failed = false;
   Vertex wrong;
   for (std::size_t first = 0, last = 0; first < groups.size(); first = last) {
     const int scale = scale_of_key(groups[first].key);
     while (last < groups.size() && scale_of_key(groups[last].key) == scale) ++last;
     for (const std::uint64_t cls : kSlotsOfClass) {
-      parallel((last - first + kPiece - 1) / kPiece, [&](std::size_t piece) {
+      const auto split_piece = [&](std::size_t piece) {
         Cursor cursor(*this);
         std::int64_t sum = 0;
+        std::uint64_t splits = 0;
         std::array<std::uint8_t, kMaxCuts> q;
         const std::size_t end = std::min(last, first + (piece + 1) * kPiece);
         for (std::size_t k = first + piece * kPiece; k < end; ++k) {
@@ -226,6 +230,7 @@ std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const 
           const std::uint64_t chosen = g.slots & cls;
           if (chosen == 0) continue;
           cursor.move_to(scale, blocks[k]->position);
+          splits += std::uint64_t(std::popcount(chosen));
           for (std::uint64_t left = chosen; left != 0; left &= left - 1) {
             const int slot = std::countr_zero(left);
             const Place place = set.place_in(g.brick, g.supercube, g.key, slot);
@@ -240,7 +245,13 @@ std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const 
           }
         }
         added += sum;
-      });
+        done += splits;
+      };
+      const std::size_t pieces = (last - first + kPiece - 1) / kPiece;
+      for (std::size_t piece = 0; piece < pieces && !failed; piece += kPiecesBetweenProgress) {
+        parallel(std::min(kPiecesBetweenProgress, pieces - piece), [&](std::size_t i) { split_piece(piece + i); });
+        if (progress) progress(double(done.load()) / double(all));
+      }
       if (failed) return wrong;
     }
   }

@@ -253,23 +253,11 @@ class FrontMesh {
   // A bit for each child that is not split.
   [[nodiscard]] unsigned unsplit_children(Front::Cursor& cursor, int slot) const {
     const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+    const Links& links = (*cursor.links_)[slot];
     unsigned unsplit = 0;
-    if (row.cls < 2) {
-      const Links& links = (*cursor.links_)[slot];
-      for (int k = 0; k < row.children; ++k) {
-        const auto found = cursor.at(links.child[k]);
-        unsplit |= unsigned(~found.block->split >> found.slot & 1) << k;
-      }
-      return unsplit;
-    }
-    if (cursor.scale_ == 0) return (1u << row.children) - 1;
-    const Diamond d(centre_of(cursor.scale_, cursor.position_, slot));
     for (int k = 0; k < row.children; ++k) {
-      const Diamond child(d.child(k));
-      const int up = child.scale + 2;
-      const Vertex p{child.centre.x >> up, child.centre.y >> up, child.centre.z >> up};
-      const Front::Block* const block = (p.x | p.y | p.z) < 0 ? nullptr : front_.find_block(child.scale, p);
-      unsplit |= unsigned(block == nullptr || !(block->split >> kSlotOfType[child.type] & 1)) << k;
+      const auto found = cursor.at(links.child[k]);
+      unsplit |= unsigned(~found.block->split >> found.slot & 1) << k;
     }
     return unsplit;
   }

@@ -37,6 +37,13 @@ Link link_to(const Near& p, unsigned parity) {
   return {std::uint8_t(kSame + (cell[0] + 1) + 3 * (cell[1] + 1) + 9 * (cell[2] + 1)), kSlotOfType[type]};
 }
 
+// A child of class 2, a scale finer; in units of h / 2.
+Link link_to_finer(unsigned type, Offset f) {
+  const std::array<int, 3> at{2 * int(type & 3) + f.x, 2 * int(type >> 2 & 3) + f.y, 2 * int(type >> 4 & 3) + f.z};
+  const unsigned child = unsigned(at[0] & 3) | unsigned(at[1] & 3) << 2 | unsigned(at[2] & 3) << 4;
+  return {std::uint8_t(kFiner + ((at[0] >> 2) + 1) + 3 * ((at[1] >> 2) + 1) + 9 * ((at[2] >> 2) + 1)), kSlotOfType[child]};
+}
+
 Links links_of(int slot, unsigned parity) {
   const unsigned type = kTypeOfSlot[slot];
   const DiamondType& row = diamond_type(type);
@@ -64,7 +71,10 @@ Links links_of(int slot, unsigned parity) {
   for (int k = 0; k < row.parents; ++k) {
     while (row.vertex[links.parent[k]] != row.parent[k]) ++links.parent[k];
   }
-  for (int k = 0; k < row.children && row.cls < 2; ++k) links.child[k] = link_to(near_of(type, row.child[k].child), parity);
+  for (int k = 0; k < row.children; ++k) {
+    const Offset to = row.child[k].child;
+    links.child[k] = row.cls < 2 ? link_to(near_of(type, to), parity) : link_to_finer(type, to);
+  }
   return links;
 }
 

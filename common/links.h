@@ -4,6 +4,7 @@
 // the younger of its ends was inserted: it is one of that diamond's subdivision edges. So all that a diamond must know of its surroundings is found
 // in its vertices' updates, and where those are follows from the diamond's slot and the parity of its supercube's position: in one of the 27
 // supercubes around its own, in one of 8 of the next coarser scale, or, for a vertex that is 0 modulo 4h, at one of the 8 corners of the supercube.
+// Children are of the same scale, or in one of 27 of the next finer one.
 #pragma once
 
 #include <array>
@@ -19,7 +20,8 @@ namespace intervale {
 //   kSame + (x + 1) + 3 (y + 1) + 9 (z + 1): the supercube at P + (x, y, z), of the same scale; x, y, z in {-1, 0, 1}
 //   kCoarser + x + 2 y + 4 z:                the one at P / 2 + (x, y, z), of the next coarser scale; x, y, z in {0, 1}
 //   kCorner + x + 2 y + 4 z:                 the grid vertex at 4h (P + (x, y, z)), wherever that is
-inline constexpr int kSame = 0, kCoarser = 27, kCorner = 35, kWheres = 43;
+//   kFiner + (x + 1) + 3 (y + 1) + 9 (z + 1): the one at 2 P + (x, y, z), of the next finer scale; x, y, z in {-1, 0, 1}
+inline constexpr int kSame = 0, kCoarser = 27, kCorner = 35, kFiner = 43, kWheres = 70;
 inline constexpr int kHere = 13;  // the supercube itself
 
 struct Link {
@@ -37,16 +39,20 @@ struct Links {
     std::uint8_t flip = 0;   // 255 if the edge's first end is the older one, so that places of cuts want turning round; else 0
   };
   std::array<Edge, kMaxEdges> edge{};  // by local edge
-  std::array<Link, 6> child{};         // by number of the child; class 0 and 1 only: the children of class 2 are a scale finer
+  std::array<Link, kMaxChildren> child{};         // by number of the child
 };
 
-// The scale and position of the supercube at `where` (below kCorner) from another one; the position is negative outside the domain.
+// The scale and position of the supercube at `where` (no corner) from another one; outside the domain the position is negative, or the scale is.
 struct SupercubePlace {
   int scale = 0;
   Vertex position;
 };
 [[nodiscard]] inline SupercubePlace supercube_at(int where, int scale, Vertex p) {
   if (where < kCoarser) return {scale, {p.x + where % 3 - 1, p.y + where / 3 % 3 - 1, p.z + where / 9 - 1}};
+  if (where >= kFiner) {
+    const int w = where - kFiner;
+    return {scale - 1, {2 * p.x + w % 3 - 1, 2 * p.y + w / 3 % 3 - 1, 2 * p.z + w / 9 - 1}};
+  }
   const int w = where - kCoarser;
   return {scale + 1, {(p.x >> 1) + (w & 1), (p.y >> 1) + (w >> 1 & 1), (p.z >> 1) + (w >> 2)}};
 }

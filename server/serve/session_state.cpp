@@ -9,9 +9,6 @@ namespace {
 using protocol::CloseCode;
 using protocol::Fault;
 
-// The first batch is small, so that there is something to draw soon; each is twice the last, up to where a larger one gains nothing.
-constexpr std::size_t kFirstPayload = 8 << 10;
-
 Fault fault(CloseCode code, std::string text) { return {code, std::move(text)}; }
 
 }  // namespace

@@ -26,6 +26,9 @@ struct Batch {
   double remaining_error = 0;  // largest saturated error of what is wanted and not yet sent, field units; 0 when nothing is
 };
 
+// The first batch is small, so that there is something to draw soon; each is twice the last, up to where a larger one gains nothing.
+inline constexpr std::size_t kFirstPayload = 8 << 10;
+
 // The stream of one session over one data set. One thread at a time.
 class StreamPlan {
  public:

@@ -32,8 +32,7 @@
 namespace intervale::bench {
 namespace {
 
-constexpr std::size_t kFirstPayload = 8 << 10;  // a session's first batch; each is twice the last up to protocol::kMaxBatchPayload
-constexpr int kSlowRuns = 3;                    // at most, of what takes long
+constexpr int kSlowRuns = 3;  // at most, of what takes long
 
 using Sigma = std::shared_ptr<const IntervalVolume>;
 

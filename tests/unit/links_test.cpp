@@ -13,7 +13,7 @@ TEST(Links, LeadToVerticesChildrenAndEdges) {
   for (unsigned parity = 0; parity < 8; ++parity) {
     const Vertex position{4 + std::int32_t(parity & 1), 6 + std::int32_t(parity >> 1 & 1), 2 + std::int32_t(parity >> 2)};
     const auto target = [&](Link link) {
-      if (link.where >= kCorner) {
+      if (link.where >= kCorner && link.where < kFiner) {
         const int w = link.where - kCorner;
         return Vertex{(position.x + (w & 1)) << (scale + 2), (position.y + (w >> 1 & 1)) << (scale + 2), (position.z + (w >> 2)) << (scale + 2)};
       }
@@ -25,7 +25,7 @@ TEST(Links, LeadToVerticesChildrenAndEdges) {
       const Links& links = link_table()[parity][slot];
       for (int v = 0; v < d.row->vertices; ++v) EXPECT_EQ(target(links.vertex[v]), d.vertex(v));
       for (int k = 0; k < d.row->parents; ++k) EXPECT_EQ(d.vertex(links.parent[k]), d.parent(k));
-      for (int k = 0; k < d.row->children && d.row->cls < 2; ++k) EXPECT_EQ(target(links.child[k]), d.child(k));
+      for (int k = 0; k < d.row->children; ++k) EXPECT_EQ(target(links.child[k]), d.child(k));
       for (int e = 0; e < d.row->edges; ++e) {
         const auto [a, b] = edge_ends(e, d.row->belt);
         const Links::Edge edge = links.edge[e];
