@@ -52,7 +52,7 @@ Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const O
     result.updates = front.split_count();
     return result;
   }
-  const std::vector<UpdateIndex> order = in_order(volume, chosen);
+  const std::vector<UpdateIndex> order = in_order(volume, chosen, lod);
   for (UpdateIndex i : order) {
     if (lod.max_updates && result.updates == *lod.max_updates) break;
     const Place p = volume.set().place(i);

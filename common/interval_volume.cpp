@@ -35,12 +35,37 @@ std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& pa
   h = hash(parts.set.occupancy(), h);
   h = hash(std::span<const UpdateCode>(parts.codes), h);
   h = hash(std::span<const std::uint8_t>(parts.differences), h);
-  return hash(std::span<const float>(parts.error_levels), h);
+  h = hash(std::span<const float>(parts.error_levels), h);
+  return hash(std::span<const Yield>(parts.yields), h);
 }
 
 std::string where(Vertex c) { return " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")"; }
 
 }  // namespace
+
+namespace {
+
+constexpr int kYieldSteps = 6, kYieldOne = 90;  // steps an octave; the step of a ratio of 1: from 2^-15 to 2^27
+
+}  // namespace
+
+Yield Yield::at_least(double ratio, double unit) {
+  if (!(ratio > 0)) return Yield(0);
+  const double step = std::ceil(kYieldSteps * std::log2(ratio / unit) - 1e-9) + kYieldOne;
+  return Yield(step < 255 ? std::uint8_t(std::max(1.0, step)) : std::uint8_t(255));
+}
+
+float Yield::ratio(float unit) const {
+  if (step_ == 0) return 0;
+  if (step_ == 255) return std::numeric_limits<float>::max();
+  return unit * std::exp2(float(int(step_) - kYieldOne) / kYieldSteps);
+}
+
+double yield_unit(const Grid& grid, double max_error) {
+  return max_error > 0 ? std::min({grid.spacing[0], grid.spacing[1], grid.spacing[2]}) / max_error : 1.0;
+}
+
+double diamond_width(const Grid& grid) { return 2 * std::hypot(grid.spacing[0], grid.spacing[1], grid.spacing[2]); }
 
 IntervalVolume::IntervalVolume(Parts parts)
     : description_(std::move(parts.description)),
@@ -48,7 +73,12 @@ IntervalVolume::IntervalVolume(Parts parts)
       set_(std::move(parts.set)),
       codes_(std::move(parts.codes)),
       differences_(std::move(parts.differences)),
-      error_levels_(std::move(parts.error_levels)) {
+      error_levels_(std::move(parts.error_levels)),
+      yields_(std::move(parts.yields)),
+      reach_(float(diamond_width(description_.grid))) {
+  const auto unit = float(yield_unit(description_.grid, error_levels_.empty() ? 0.0 : double(error_levels_.back())));
+  for (unsigned step = 0; step < factor_.size(); ++step) factor_[step] = Yield(std::uint8_t(step)).ratio(unit);
+  brick_object_error_.resize(set_.bricks().size());
   brick_first_.reserve(set_.bricks().size());
   first_in_brick_.reserve(set_.supercubes());
   brick_level_.reserve(set_.bricks().size());
@@ -56,12 +86,13 @@ IntervalVolume::IntervalVolume(Parts parts)
   for (std::uint32_t b = 0; b < set_.bricks().size(); ++b) {
     brick_first_.push_back(n);
     brick_level_.push_back(0);
-    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey) {
+    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
       first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
       const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
       for (UpdateIndex i = first; i < end; ++i) {
         n += codes_[i].coefficients();
         brick_level_[b] = std::max(brick_level_[b], std::uint16_t(codes_[i].error_level()));
+        brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), i));
       }
     });
   }
@@ -70,7 +101,7 @@ IntervalVolume::IntervalVolume(Parts parts)
 Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
-  if (parts.codes.size() != parts.set.size()) return fail("updates and supercubes do not fit");
+  if (parts.codes.size() != parts.set.size() || parts.yields.size() != parts.set.supercubes()) return fail("updates and supercubes do not fit");
   if (parts.error_levels.size() > kErrorLevels || (parts.error_levels.empty() && !parts.codes.empty())) return fail("error levels out of range");
   for (std::size_t i = 0; i < parts.error_levels.size(); ++i) {
     if (!std::isfinite(parts.error_levels[i]) || parts.error_levels[i] < (i == 0 ? 0.0f : parts.error_levels[i - 1]))
@@ -101,7 +132,8 @@ UpdateView IntervalVolume::update(const Place& p) const {
 
 std::size_t IntervalVolume::memory_bytes() const {
   return sizeof *this + description_.base.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
-         brick_level_.size() * 2 + first_in_brick_.size() * 2 + differences_.size() + error_levels_.size() * sizeof(float);
+         brick_level_.size() * 2 + brick_object_error_.size() * 4 + yields_.size() + first_in_brick_.size() * 2 + differences_.size() +
+         error_levels_.size() * sizeof(float);
 }
 
 Result<void> IntervalVolume::validate() const {

@@ -6,6 +6,8 @@
 // in memory, and ready for file and wire.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,6 +22,21 @@
 #include "common/supercube.h"
 
 namespace intervale {
+
+// How far the surfaces can still move, in world units, for each unit of field error: one byte a supercube, in steps of a sixth of an octave, rounded
+// up. 0: nothing moves. The last step: no bound is known.
+class Yield {
+ public:
+  Yield() = default;
+  explicit Yield(std::uint8_t step) : step_(step) {}
+  // The least step for `ratio`, at least 0 or infinite, in units of `unit`.
+  static Yield at_least(double ratio, double unit);
+  [[nodiscard]] std::uint8_t step() const { return step_; }
+  [[nodiscard]] float ratio(float unit) const;  // the largest there is for the last step
+
+ private:
+  std::uint8_t step_ = 0;
+};
 
 inline constexpr int kErrorLevels = 512;  // distinct errors at most; each update's is rounded up to one of them
 
@@ -59,6 +76,7 @@ class IntervalVolume {
     std::vector<UpdateCode> codes;          // by number of the update
     std::vector<std::uint8_t> differences;  // all updates' one after the other
     std::vector<float> error_levels;        // ascending, at most kErrorLevels
+    std::vector<Yield> yields;              // by supercube
   };
   // Fails where the parts do not fit together; validate() checks the meaning.
   static Result<IntervalVolume> assemble(Parts parts);
@@ -75,6 +93,13 @@ class IntervalVolume {
   [[nodiscard]] std::span<const float> error_levels() const { return error_levels_; }
   [[nodiscard]] std::span<const UpdateCode> codes() const { return codes_; }
   [[nodiscard]] std::span<const std::uint8_t> differences() const { return differences_; }
+  // How far the surfaces can still move where an update's diamond is refined to the end, in world units: no less, as far as is known, and for all of
+  // a supercube's updates by one factor. Not saturated.
+  [[nodiscard]] float object_error(std::uint32_t supercube, int scale, UpdateIndex i) const {
+    return std::min(error(i) * factor_[yields_[supercube].step()], reach_ * float(1 << scale));
+  }
+  [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
+  [[nodiscard]] std::span<const Yield> yields() const { return yields_; }
   [[nodiscard]] UpdateView update(const Place& p) const;  // O(1): at most 55 codes are summed
 
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -94,6 +119,15 @@ class IntervalVolume {
   std::vector<std::uint16_t> brick_level_;     // the highest level of error, of each brick
   std::vector<std::uint8_t> differences_;
   std::vector<float> error_levels_;
+  std::vector<Yield> yields_;              // by supercube
+  std::vector<float> brick_object_error_;  // the largest of its updates
+  std::array<float, 256> factor_;          // of each step of a Yield
+  float reach_ = 0;                        // no surface moves further, for h = 1: what a diamond measures across
 };
+
+// What Yields are in units of.
+[[nodiscard]] double yield_unit(const Grid& grid, double max_error);
+// What a diamond with h = 1 measures across, in world units.
+[[nodiscard]] double diamond_width(const Grid& grid);
 
 }  // namespace intervale

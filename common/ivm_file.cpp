@@ -25,8 +25,9 @@ constexpr int kCompression = 9;               // zstd; 19 gains a few percent an
 constexpr unsigned kSlotBytes = 7;            // of an occupancy word: 56 slots
 constexpr std::uint64_t kMaxRatio = 1 << 15;  // zstd's own: a block of 128 KiB in 4 bytes; a range coder's is less
 
-enum Section : std::uint32_t { kMeta, kBase, kErrors, kBricks, kMasks, kOccupancy, kLevels, kShapes, kDifferences, kSections };
-constexpr const char* kSectionNames[kSections] = {"meta", "base", "errors", "bricks", "masks", "occupancy", "levels", "shapes", "differences"};
+enum Section : std::uint32_t { kMeta, kBase, kErrors, kBricks, kMasks, kOccupancy, kYields, kLevels, kShapes, kDifferences, kSections };
+constexpr const char* kSectionNames[kSections] = {"meta",      "base",   "errors", "bricks", "masks",
+                                                  "occupancy", "yields", "levels", "shapes", "differences"};
 
 struct Header {
   char magic[8];
@@ -59,17 +60,6 @@ Stored compressed(const std::vector<std::uint8_t>& raw) {
   Stored s{std::vector<std::uint8_t>(ZSTD_compressBound(raw.size())), raw.size()};
   s.bytes.resize(ZSTD_compress(s.bytes.data(), s.bytes.size(), raw.data(), raw.size(), kCompression));
   return s;
-}
-
-// Calls visit(number) for those of an update's parents that are in the set.
-template <class Visit>
-void for_each_parent(const SupercubeSet& set, const Place& p, Visit&& visit) {
-  const Diamond d(set.centre(p));
-  for (int k = 0; k < d.row->parents; ++k) {
-    const Vertex c = d.parent(k);
-    if ((c.x | c.y | c.z) < 0) continue;
-    if (const auto parent = set.find(c)) visit(parent->index);
-  }
 }
 
 // The three below write what is in their last argument, or read into it: by number of the update.
@@ -172,6 +162,8 @@ Stored stored(const IntervalVolume& volume, Section section) {
     }
     case kOccupancy:
       return compressed(split_bytes(set.occupancy(), kSlotBytes));
+    case kYields:
+      return compressed(bytes_of(volume.yields()));
     case kLevels:
     case kShapes:
     case kDifferences:
@@ -325,11 +317,9 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
       meta.coefficients > meta.updates * kMaxCuts || meta.updates > std::numeric_limits<UpdateIndex>::max()) {
     return fail("the counts do not fit");
   }
-  const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},
-                                                        {kOccupancy, meta.supercubes * kSlotBytes},
-                                                        {kLevels, 2 * meta.updates},
-                                                        {kShapes, meta.updates},
-                                                        {kDifferences, meta.coefficients}};
+  const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},  {kOccupancy, meta.supercubes * kSlotBytes},
+                                                        {kYields, meta.supercubes}, {kLevels, 2 * meta.updates},
+                                                        {kShapes, meta.updates},    {kDifferences, meta.coefficients}};
   for (const auto& [section, bytes] : expected) {
     if (auto ok = is_size(section, bytes); !ok) return tl::unexpected(ok.error());
   }
@@ -350,6 +340,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   d.base = std::move(*raw[kBase]);
   parts.error_levels.resize(raw[kErrors]->size() / sizeof(float));
   if (!parts.error_levels.empty()) std::memcpy(parts.error_levels.data(), raw[kErrors]->data(), raw[kErrors]->size());
+  for (const std::uint8_t step : *raw[kYields]) parts.yields.emplace_back(step);
   parts.set = SupercubeSet(*keys, std::move(occupancy));
   const auto coded = [&](Section section) { return all.subspan(entries[section].offset, entries[section].stored_bytes); };
   std::vector<std::uint16_t> levels(meta.updates);

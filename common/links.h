@@ -38,8 +38,8 @@ struct Links {
     std::uint8_t other = 0;  // what the older end is to the owner's diamond: its local number there
     std::uint8_t flip = 0;   // 255 if the edge's first end is the older one, so that places of cuts want turning round; else 0
   };
-  std::array<Edge, kMaxEdges> edge{};  // by local edge
-  std::array<Link, kMaxChildren> child{};         // by number of the child
+  std::array<Edge, kMaxEdges> edge{};      // by local edge
+  std::array<Link, kMaxChildren> child{};  // by number of the child
 };
 
 // The scale and position of the supercube at `where` (no corner) from another one; outside the domain the position is negative, or the scale is.

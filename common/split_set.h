@@ -16,6 +16,19 @@ class SplitSet {
  public:
   explicit SplitSet(UpdateIndex size = 0) : words_((std::size_t(size) + 63) / 64) {}
   [[nodiscard]] bool contains(UpdateIndex i) const { return words_[i / 64] >> (i % 64) & 1; }
+  // Whether all of [begin, end) are in it.
+  [[nodiscard]] bool contains_all(UpdateIndex begin, UpdateIndex end) const {
+    for (; begin < end && begin % 64 != 0; ++begin) {
+      if (!contains(begin)) return false;
+    }
+    for (; begin + 64 <= end; begin += 64) {
+      if (words_[begin / 64] != ~std::uint64_t(0)) return false;
+    }
+    for (; begin < end; ++begin) {
+      if (!contains(begin)) return false;
+    }
+    return true;
+  }
   void insert(UpdateIndex i) { words_[i / 64] |= std::uint64_t(1) << (i % 64); }
   void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }
   [[nodiscard]] std::uint64_t count() const;

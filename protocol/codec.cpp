@@ -49,7 +49,11 @@ Body encode_body(FlatBufferBuilder& out, const View& message) {
   const auto percent = lod.error_percent ? flatbuffers::Optional<double>(*lod.error_percent) : flatbuffers::nullopt;
   fbs::Box box;
   if (lod.roi) box = fbs::Box(to_vector(lod.roi->min), to_vector(lod.roi->max));
-  const auto table = fbs::CreateLod(out, lod.error, percent, lod.roi ? &box : nullptr, to_wire(lod.max_tets), to_wire(lod.max_updates));
+  fbs::Camera camera;
+  if (const auto& c = lod.camera)
+    camera = fbs::Camera(to_vector(c->eye), to_vector(c->look_at), to_vector(c->up), c->fov, c->viewport[0], c->viewport[1], c->pixel_error);
+  const auto table = fbs::CreateLod(out, lod.error, percent, lod.roi ? &box : nullptr, to_wire(lod.max_tets), to_wire(lod.max_updates),
+                                    lod.camera ? &camera : nullptr);
   return body(fbs::ClientBody::View, fbs::CreateView(out, message.epoch, table));
 }
 
@@ -70,11 +74,12 @@ Body encode_body(FlatBufferBuilder& out, const Opened& message) {
 
 Body encode_body(FlatBufferBuilder& out, const Batch& message) {
   const auto payload = out.CreateVector(message.payload);
-  return body(fbs::ServerBody::Batch, fbs::CreateBatch(out, message.epoch, message.sequence, message.updates, message.remaining_error, payload));
+  return body(fbs::ServerBody::Batch, fbs::CreateBatch(out, message.epoch, message.sequence, message.updates, message.remaining_error, payload,
+                                                       message.remaining_pixels, message.updates_to_go));
 }
 
 Body encode_body(FlatBufferBuilder& out, const Done& message) {
-  return body(fbs::ServerBody::Done, fbs::CreateDone(out, message.epoch, message.updates_sent, message.wanted));
+  return body(fbs::ServerBody::Done, fbs::CreateDone(out, message.epoch, message.updates_sent));
 }
 
 Body encode_body(FlatBufferBuilder& out, const Fault& message) {
@@ -107,19 +112,19 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
   Lod lod{.error = wire.error(),
           .error_percent = from_wire(wire.error_percent()),
           .roi = {},
+          .camera = {},
           .max_tets = from_wire(wire.max_tets()),
           .max_updates = from_wire(wire.max_updates())};
-  // Written so that NaN fails each test.
-  if (!(std::isfinite(lod.error) && lod.error >= 0)) return malformed("the error is not a finite number of at least 0");
-  if (lod.error_percent && !(*lod.error_percent >= 0 && *lod.error_percent <= 100)) return malformed("the error's percentage is not within 0 to 100");
-  if (wire.roi() != nullptr) {
-    lod.roi = Box{to_array(wire.roi()->min()), to_array(wire.roi()->max())};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double low = lod.roi->min[axis];
-      const double high = lod.roi->max[axis];
-      if (!(std::isfinite(low) && std::isfinite(high) && low <= high)) return malformed("the region's box is not finite and in order");
-    }
+  if (const auto* roi = wire.roi()) lod.roi = Box{to_array(roi->min()), to_array(roi->max())};
+  if (const auto* c = wire.camera()) {
+    lod.camera = Camera{.eye = to_array(c->eye()),
+                        .look_at = to_array(c->look_at()),
+                        .up = to_array(c->up()),
+                        .fov = c->fov(),
+                        .viewport = {c->width(), c->height()},
+                        .pixel_error = c->pixel_error()};
   }
+  if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
   return View{table.epoch(), lod};
 }
 
@@ -147,12 +152,19 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
 Result<ServerMessage> decode_body(const fbs::Batch& table) {
   if (longer_than(table.payload(), kMaxBatchPayload)) return malformed("the batch is too large");
   if (!(table.remaining_error() >= 0)) return malformed("the remaining error is not a number of at least 0");
-  Batch batch{table.epoch(), table.sequence(), table.updates(), table.remaining_error(), {}};
+  if (!(table.remaining_pixels() >= 0)) return malformed("the remaining pixels are not a number of at least 0");
+  Batch batch{.epoch = table.epoch(),
+              .sequence = table.sequence(),
+              .updates = table.updates(),
+              .remaining_error = table.remaining_error(),
+              .remaining_pixels = table.remaining_pixels(),
+              .updates_to_go = table.updates_to_go(),
+              .payload = {}};
   batch.payload.assign(table.payload()->begin(), table.payload()->end());
   return batch;
 }
 
-Result<ServerMessage> decode_body(const fbs::Done& table) { return Done{table.epoch(), table.updates_sent(), table.wanted()}; }
+Result<ServerMessage> decode_body(const fbs::Done& table) { return Done{table.epoch(), table.updates_sent()}; }
 
 Result<ServerMessage> decode_body(const fbs::Fault& table) {
   if (longer_than(table.text(), kMaxText)) return malformed("the fault's text is too long");

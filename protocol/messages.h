@@ -63,7 +63,10 @@ struct Batch {
   std::uint64_t epoch = 0;     // of the View it serves
   std::uint64_t sequence = 0;  // 0, 1, 2, … within a session
   std::uint32_t updates = 0;
-  double remaining_error = 0;         // largest saturated error of what is wanted and still unsent; field units
+  // Of what the view wants and was not yet sent when this batch was made; bounds from above, 0 with the last batch.
+  double remaining_error = 0;   // the largest saturated error; field units
+  double remaining_pixels = 0;  // the largest error on the camera's screen; 0 without a camera
+  std::uint64_t updates_to_go = 0;
   std::vector<std::uint8_t> payload;  // updates; see common/update_codec.h
   friend bool operator==(const Batch&, const Batch&) = default;
 };
@@ -73,7 +76,6 @@ struct Batch {
 struct Done {
   std::uint64_t epoch = 0;
   std::uint64_t updates_sent = 0;  // in this session
-  std::uint64_t wanted = 0;        // updates that the view needs
   friend bool operator==(const Done&, const Done&) = default;
 };
 struct Fault {

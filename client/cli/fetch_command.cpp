@@ -25,8 +25,10 @@ struct FetchCommand {
 Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& options) {
   Progress progress("receiving " + url.name);
   return fetch(url, options, [&progress](const StreamClient& client, const FetchFigures& figures) {
-    progress.text(fmt::format("{} updates, {} tetrahedra, {}, error {:.4g}", client.updates(), client.tet_count(),
-                              human_bytes(figures.bytes_received), figures.remaining_error));
+    const std::string left = figures.remaining_pixels > 0 ? fmt::format("error {:.3g} px, {:.4g}", figures.remaining_pixels, figures.remaining_error)
+                                                          : fmt::format("error {:.4g}", figures.remaining_error);
+    progress.text(fmt::format("{} updates, at most {} to go, {} tetrahedra, {}, {}", client.updates(), figures.updates_to_go, client.tet_count(),
+                              human_bytes(figures.bytes_received), left));
   });
 }
 

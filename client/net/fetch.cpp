@@ -97,8 +97,8 @@ Result<void> Fetch::run(const std::function<void(const StreamClient&, const Fetc
     figures_.bytes_received = connection_.bytes_received();
     figures_.messages = connection_.messages();
     if (const auto* done = std::get_if<protocol::Done>(&*message)) {
-      figures_.wanted = done->wanted;
-      figures_.remaining_error = 0;
+      figures_.remaining_error = figures_.remaining_pixels = 0;
+      figures_.updates_to_go = 0;
       figures_.complete = true;
       if (done->updates_sent != client_->updates()) return nonsense("the end of the stream, with updates missing");
       return {};
@@ -119,6 +119,8 @@ Result<void> Fetch::apply(const protocol::Batch& batch) {
   if (!client_->over_budget() && client_->updates() - before != batch.updates) return nonsense("a batch of another size than it says");
   note_first_mesh();
   figures_.remaining_error = batch.remaining_error;
+  figures_.remaining_pixels = batch.remaining_pixels;
+  figures_.updates_to_go = batch.updates_to_go;
   return grant();
 }
 
@@ -140,6 +142,7 @@ Fetched Fetch::finish() && {
 
 Result<Fetched> fetch(const ServerUrl& url, const FetchOptions& options,
                       const std::function<void(const StreamClient&, const FetchFigures&)>& on_batch) {
+  if (auto ok = check_lod(options.lod); !ok) return tl::unexpected(ok.error());
   const auto start = Clock::now();
   auto connection = StreamConnection::open(url);
   if (!connection) return tl::unexpected(connection.error());

@@ -21,8 +21,10 @@ struct FetchOptions {
 struct FetchFigures {
   std::uint64_t bytes_received = 0;  // of messages, without WebSocket's framing
   std::uint64_t messages = 0;
-  std::uint64_t wanted = 0;       // updates of the level of detail; 0 until the end is reached
-  double remaining_error = 0;     // the server's word, field units
+  // The server's word on what is wanted and has not come; bounds from above.
+  double remaining_error = 0;   // field units
+  double remaining_pixels = 0;  // on the camera's screen; 0 without one
+  std::uint64_t updates_to_go = 0;
   double seconds_first_mesh = 0;  // until the mesh first had a tetrahedron; 0 if it never had
   double seconds = 0;             // from the start to the end of the stream
   bool complete = false;          // all that was asked for came; false: a budget ended it

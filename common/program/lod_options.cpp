@@ -22,6 +22,37 @@ void add_count(CLI::App& app, const std::string& name, std::optional<std::uint64
       ->group("Level of detail");
 }
 
+using Vector = std::array<double, 3>;
+
+// --eye and what only means something with it.
+void add_camera_options(CLI::App& app, std::optional<Camera>& camera) {
+  const auto set = [&camera](auto member) {
+    return [&camera, member](const auto& value) {
+      if (!camera) camera.emplace();
+      (*camera).*member = value;
+    };
+  };
+  const auto group = "View";
+  CLI::Option* eye = app.add_option_function<Vector>("--eye", set(&Camera::eye), "Where the camera is, in world coordinates: refine what it sees");
+  eye->type_name("X Y Z")->group(group);
+  CLI::Option* at = app.add_option_function<Vector>("--look-at", set(&Camera::look_at), "The point in the middle of its picture");
+  at->type_name("X Y Z")->group(group)->needs(eye);
+  eye->needs(at);
+  app.add_option_function<Vector>("--up", set(&Camera::up), "What is up in it (default 0 1 0)")->type_name("X Y Z")->group(group)->needs(eye);
+  app.add_option_function<double>("--fov", set(&Camera::fov), "How high it sees, in degrees (default 45)")
+      ->type_name("DEGREES")
+      ->group(group)
+      ->needs(eye);
+  app.add_option_function<std::array<int, 2>>("--viewport", set(&Camera::viewport), "The picture's size in pixels (default 1920 1080)")
+      ->type_name("W H")
+      ->group(group)
+      ->needs(eye);
+  app.add_option_function<double>("--pixel-error", set(&Camera::pixel_error), "How far surfaces may be off in it, in pixels (default 1)")
+      ->type_name("PX")
+      ->group(group)
+      ->needs(eye);
+}
+
 Box box_of(const std::array<double, 6>& corners) {
   Box box;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -52,6 +83,7 @@ void add_lod_options(CLI::App& app, Lod& lod) {
          "World box refined to the error; elsewhere as coarse as conformity allows")
       ->type_name("X0 Y0 Z0 X1 Y1 Z1")
       ->group("Level of detail");
+  add_camera_options(app, lod.camera);
   add_count(app, "--max-tets", lod.max_tets, "Stop before the mesh has more tetrahedra, best first");
   add_count(app, "--max-updates", lod.max_updates, "Stop after this many updates, best first");
 }

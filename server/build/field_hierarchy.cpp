@@ -14,6 +14,7 @@
 #include "server/build/error_levels.h"
 #include "server/build/interpolation_error.h"
 #include "server/build/relevance.h"
+#include "server/build/surface_moves.h"
 
 namespace intervale {
 namespace {
@@ -247,7 +248,7 @@ FieldHierarchy::FieldHierarchy(const Volume& volume, const BuildOptions& options
   set_ = std::move(found.set);
   unit_cuts_ = found.unit_cuts;
   measure_errors(options.progress);
-  saturate_errors();
+  saturate(errors_);
 }
 
 void FieldHierarchy::measure_errors(const std::function<void(double)>& progress) {
@@ -290,7 +291,8 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
   });
 }
 
-void FieldHierarchy::saturate_errors() {
+// Makes each no smaller than those of the relevant children.
+void FieldHierarchy::saturate(std::vector<float>& errors) const {
   for (int scale = 0; scale < domain_.levels(); ++scale) {
     const auto [begin, end] = set_.of_scale(scale);
     for (int cls = scale > 0 ? 2 : 1; cls >= 0; --cls) {
@@ -302,14 +304,34 @@ void FieldHierarchy::saturate_errors() {
           UpdateIndex next = set_.first(brick, s) + UpdateIndex(std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots));
           for (std::uint64_t left = slots; left != 0; left &= left - 1) {
             const int slot = std::countr_zero(left);
-            float& error = errors_[next++];
+            float& error = errors[next++];
             for (unsigned some = family.children(slot); some != 0; some &= some - 1)
-              error = std::max(error, errors_[family.child(slot, std::countr_zero(some))]);
+              error = std::max(error, errors[family.child(slot, std::countr_zero(some))]);
           }
         });
       });
     }
   }
+}
+
+// What makes moves of errors, supercube by supercube.
+std::vector<Yield> FieldHierarchy::yields(double max_error, const std::vector<UpdateCode>& codes, const std::vector<float>& levels) const {
+  std::vector<float> moves = surface_moves(volume_, range_, domain_, set_);
+  saturate(moves);
+  const double unit = yield_unit(volume_.grid, max_error);
+  std::vector<Yield> yields(set_.supercubes());
+  tbb::parallel_for(std::uint32_t(0), std::uint32_t(set_.bricks().size()), [&](std::uint32_t b) {
+    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey) {
+      const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
+      double most = 0;
+      for (UpdateIndex i = first; i < end; ++i) {
+        const double error = double(levels[codes[i].error_level()]);
+        if (error > 0) most = std::max(most, double(moves[i]) / error);
+      }
+      yields[s] = Yield::at_least(most, unit);
+    });
+  });
+  return yields;
 }
 
 double FieldHierarchy::value(Vertex v) const {
@@ -400,6 +422,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
       });
     });
   });
+  parts.yields = yields(d.max_error, parts.codes, parts.error_levels);
   // Vertices of the full mesh are cuts of unit edges, for every longer edge with different sides is the spine of a relevant diamond, and samples
   // inside the range that are centres of relevant diamonds or the root's corners.
   d.full.vertices = unit_cuts_;

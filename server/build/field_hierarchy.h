@@ -47,7 +47,8 @@ class FieldHierarchy {
  private:
   [[nodiscard]] double value(Vertex v) const;  // of any vertex: the sample it clamps to
   void measure_errors(const std::function<void(double)>& progress);
-  void saturate_errors();
+  void saturate(std::vector<float>& errors) const;
+  [[nodiscard]] std::vector<Yield> yields(double max_error, const std::vector<UpdateCode>& codes, const std::vector<float>& levels) const;
 
   const Volume& volume_;
   Range range_;

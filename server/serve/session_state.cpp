@@ -57,15 +57,17 @@ std::optional<protocol::ServerMessage> SessionState::next() {
   return next_batch_or_done();
 }
 
-protocol::ServerMessage SessionState::next_batch_or_done() {
+std::optional<protocol::ServerMessage> SessionState::next_batch_or_done() {
   const std::size_t size = std::min<std::uint64_t>(target_, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
   auto batch = plan_->next(size);
   if (!batch) {
+    if (!plan_->done()) return {};
     done_ = true;
-    return protocol::Done{epoch_, plan_->sent(), plan_->wanted()};
+    return protocol::Done{epoch_, plan_->sent()};
   }
   target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
-  protocol::Batch message{epoch_, sequence_++, batch->updates, batch->remaining_error, std::move(batch->payload)};
+  const StreamPlan::ToGo to_go = plan_->to_go();
+  protocol::Batch message{epoch_, sequence_++, batch->updates, to_go.error, to_go.pixels, to_go.updates, std::move(batch->payload)};
   credit_ -= protocol::cost_of(message);  // at most what there was: next() keeps to size
   return message;
 }

@@ -20,9 +20,12 @@ class SessionState {
   // Takes a client's message. A fault ends the session: nothing else may be called after.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
-  // The next message to send, or nothing for now. Selecting takes time linear in the data set's updates after a new view, else in the batch.
+  // The next message to send, or nothing for now; searching() tells whether to ask again at once. Takes a few milliseconds at most, but for a first
+  // view with a budget of updates, whose time is linear in the data set's updates.
   [[nodiscard]] std::optional<protocol::ServerMessage> next();
 
+  // There may be something to send, which took too long to find in one turn.
+  [[nodiscard]] bool searching() const { return viewing_ && !done_ && !starved(); }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
   [[nodiscard]] bool starved() const { return viewing_ && !done_ && credit_ < protocol::kMinCredit; }  // sends only once there is more credit
   [[nodiscard]] const std::string& dataset() const { return dataset_; }
@@ -33,7 +36,7 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::View& view);
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
-  protocol::ServerMessage next_batch_or_done();
+  std::optional<protocol::ServerMessage> next_batch_or_done();
 
   const Catalogue& catalogue_;
   Catalogue::Volume volume_;

@@ -5,14 +5,16 @@
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <boost/unordered/unordered_flat_set.hpp>
 
+#include "common/refinement.h"
+
 namespace intervale {
 namespace {
 
-constexpr std::uint64_t kFirstBand = 2048;    // updates: a first mesh in a few KiB
 constexpr std::size_t kBrickBytes = 18;       // naming one takes at most: a step and a mask
 constexpr std::size_t kSupercubeBytes = 7;    // a word of slots
 constexpr std::size_t kPlaneBytes = 64;       // lengths of all planes
 constexpr std::size_t kSmallBatch = 8 << 10;  // a band's end closes a batch no smaller than this
+constexpr std::uint32_t kTurn = 1 << 16;      // updates looked at before others get their turn
 
 }  // namespace
 
@@ -22,38 +24,68 @@ struct StreamPlan::Chunk {
   boost::unordered_flat_set<std::uint32_t> bricks;
   std::size_t max_bytes = 0, bytes = kPlaneBytes;
   std::uint32_t updates = 0;
+  std::uint32_t seen = 0;  // updates looked at
 };
 
-StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()), wanted_(volume_->size()) {}
-
-void StreamPlan::set_lod(const Lod& lod) {
-  wanted_ = select(*volume_, lod);
-  if (lod.max_updates && wanted_.count() > *lod.max_updates) {
-    const auto order = in_order(*volume_, wanted_);
-    for (std::size_t i = *lod.max_updates; i < order.size(); ++i) wanted_.erase(order[i]);
+StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()) {
+  const auto bricks = volume_->set().bricks();
+  waiting_.resize(bricks.size());
+  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
+    const UpdateIndex end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
+    waiting_[b].unsent = std::uint16_t(end - bricks[b].first);
   }
-  wanted_count_ = wanted_.count();
-  waiting_.fill(0);
-  waiting_count_ = 0;
-  for (UpdateIndex i = 0; i < volume_->size(); ++i) {
-    if (!wanted_.contains(i) || sent_.contains(i)) continue;
-    ++waiting_[volume_->error_level(i)];
-    ++waiting_count_;
-  }
-  next_supercube_ = 0;
-  band_ = kErrorLevels;
 }
 
-// Lowers the band so that it takes about as many updates as were sent. False if nothing waits.
-bool StreamPlan::begin_band() {
-  if (waiting_count_ == 0) return false;
-  const std::uint64_t enough = std::max(kFirstBand, sent_count_);
-  std::uint64_t taken = 0;
-  band_ = kErrorLevels;
-  while (band_ > 0 && taken < enough) taken += waiting_[--band_];
-  next_supercube_ = std::uint32_t(volume_->set().supercubes());
-  next_brick_ = std::uint32_t(volume_->set().bricks().size()) - 1;
-  return true;
+void StreamPlan::set_lod(const Lod& lod) {
+  only_.reset();
+  if (lod.max_updates) {
+    SplitSet wanted = select(*volume_, lod);
+    if (wanted.count() > *lod.max_updates) {
+      const auto order = in_order(*volume_, wanted, lod);
+      for (std::size_t i = *lod.max_updates; i < order.size(); ++i) wanted.erase(order[i]);
+    }
+    only_ = std::move(wanted);
+  }
+  ranking_.emplace(*volume_, lod);
+  for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
+    set_waiting(b, std::max(ranking_->of_brick(b), only_ ? Rank(1) : Rank(0)), waiting_[b].unsent);
+  }
+  begin_band();
+}
+
+void StreamPlan::set_waiting(std::uint32_t brick, Rank rank, unsigned wanted) {
+  Waiting& w = waiting_[brick];
+  if (w.unsent == 0) rank = 0;
+  wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, w.unsent);
+  wanted_count_ += wanted - std::uint64_t(w.wanted);
+  waiting_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(w.rank != 0);
+  w.rank = rank;
+  w.wanted = std::uint16_t(wanted);
+}
+
+void StreamPlan::begin_band() {
+  next_brick_ = std::uint32_t(waiting_.size());
+  Rank top = 0;
+  for (const Waiting& w : waiting_) top = std::max(top, w.rank);
+  band_ = top == 0 ? Rank(0) : ranking_->band_below(top);
+}
+
+StreamPlan::ToGo StreamPlan::to_go() const {
+  Rank top = 0;
+  for (const Waiting& w : waiting_) top = std::max(top, w.rank);
+  ToGo to_go{wanted_count_, 0, 0};
+  if (top == 0) return to_go;
+  if (!ranking_->has_camera()) {
+    to_go.error = ranking_->bound(top);
+    return to_go;
+  }
+  to_go.pixels = ranking_->bound(top);
+  unsigned level = 0;
+  for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
+    if (waiting_[b].rank != 0) level = std::max(level, volume_->brick_error_level(b));
+  }
+  to_go.error = volume_->error_levels()[level];
+  return to_go;
 }
 
 // Puts an update into the batch, after the ancestors it lacks. False if the batch is full first; what went in is closed under parents all the same.
@@ -64,7 +96,7 @@ bool StreamPlan::take(const Place& place, Chunk& chunk) {
   for (int k = 0; k < d.row->parents; ++k) {
     const Vertex c = d.parent(k);
     if ((c.x | c.y | c.z) < 0) continue;
-    const auto parent = set.find(c);  // its error is no smaller: wanted, and of this band or sent
+    const auto parent = set.find(c);
     if (parent && !take(*parent, chunk)) return false;
   }
   const UpdateCode code = volume_->codes()[place.index];
@@ -82,36 +114,59 @@ bool StreamPlan::take(const Place& place, Chunk& chunk) {
   }
   sent_.insert(place.index);
   ++sent_count_;
-  --waiting_count_;
-  --waiting_[code.error_level()];
+  Waiting& w = waiting_[place.brick];
+  --w.unsent;
+  if (w.wanted > w.unsent) set_waiting(place.brick, w.rank, w.unsent);
   return true;
 }
 
-std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
+// Takes what the band wants of a brick. False if the batch is full first.
+bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
   const SupercubeSet& set = volume_->set();
-  Chunk chunk;
-  chunk.max_bytes = max_bytes;
+  Rank most = 0;  // of what is left
+  unsigned left_wanted = 0;
   bool full = false;
-  while (!full) {
-    if (next_supercube_ == 0 && (chunk.bytes >= kSmallBatch || !begin_band())) break;
-    const std::uint32_t s = --next_supercube_;
-    const SupercubeSet::Brick* brick = &set.bricks()[next_brick_];
-    if (s < brick->first_supercube) brick = &set.bricks()[--next_brick_];
-    const UpdateIndex first = set.first(next_brick_, s);
+  set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+    if (full) return;
+    const UpdateIndex first = set.first(brick, s);
     const std::uint64_t occupancy = set.occupancy()[s];
     const auto count = UpdateIndex(std::popcount(occupancy));
-    bool any = false;
-    for (UpdateIndex i = first; i < first + count; ++i) any = any || (volume_->error_level(i) >= band_ && wanted_.contains(i) && !sent_.contains(i));
-    if (!any) continue;
-    std::uint64_t mask = brick->mask;
-    for (std::uint32_t skip = s - brick->first_supercube; skip > 0; --skip) mask &= mask - 1;
-    const SupercubeKey key = brick->key + unsigned(std::countr_zero(mask));
+    chunk.seen += count;
+    if (sent_.contains_all(first, first + count)) return;
+    const Ranking::Supercube rank_of = ranking_->of_supercube(s, key);
     UpdateIndex i = first;
     for (std::uint64_t left = occupancy; left != 0 && !full; left &= left - 1, ++i) {
-      if (volume_->error_level(i) < band_ || !wanted_.contains(i)) continue;
-      full = !take({key, next_brick_, s, std::uint32_t(std::countr_zero(left)), i}, chunk);
+      if (sent_.contains(i) || (only_ && !only_->contains(i))) continue;
+      const int slot = std::countr_zero(left);
+      const Rank rank = std::max(rank_of(i, slot), only_ ? Rank(1) : Rank(0));  // only_ has ancestors too
+      if (rank == 0) continue;
+      if (rank >= band_) {
+        full = !take({key, brick, s, std::uint32_t(slot), i}, chunk);
+      } else {
+        most = std::max(most, rank);
+        ++left_wanted;
+      }
     }
-    if (full) next_supercube_ = s + 1;  // there is more of it
+  });
+  if (!full) set_waiting(brick, most, left_wanted);
+  return !full;
+}
+
+std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
+  Chunk chunk;
+  chunk.max_bytes = max_bytes;
+  while (!done()) {
+    if (next_brick_ == 0) {
+      if (chunk.bytes >= kSmallBatch) break;
+      begin_band();
+    }
+    if (waiting_[next_brick_ - 1].rank < band_) {
+      --next_brick_;
+      continue;
+    }
+    if (!look_into(next_brick_ - 1, chunk)) break;
+    --next_brick_;
+    if (chunk.seen >= kTurn) break;
   }
   if (chunk.updates == 0) return {};
   std::vector<SlotGroup> groups;
@@ -121,11 +176,6 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   Batch batch;
   batch.payload = encode_batch(*volume_, sent_, groups);
   batch.updates = chunk.updates;
-  for (unsigned level = kErrorLevels; level-- > 0;) {
-    if (waiting_[level] == 0) continue;
-    batch.remaining_error = volume_->error_levels()[level];
-    break;
-  }
   return batch;
 }
 

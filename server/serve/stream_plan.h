@@ -1,11 +1,10 @@
 // What a session sends next: a pure function of the data set, what was asked for and what was sent. No I/O.
 //
-// Updates go out in bands of falling error, each band about as large as all before it, so that the picture's error halves again and again. Within a
-// band they go region by region, each with the ancestors it still lacks: neighbours share names and code tables, and a batch is small for what it
-// holds.
+// Updates go out in bands of falling rank (ranking.h), half an octave of error each. Within a band they go region by region, each with the ancestors
+// it still lacks: neighbours share names and code tables, and a batch is small for what it holds. A brick is looked into only when its turn comes, so
+// a new view costs a glance at each brick, and then what it sends.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -14,7 +13,8 @@
 
 #include "common/interval_volume.h"
 #include "common/lod.h"
-#include "common/refinement.h"
+#include "common/ranking.h"
+#include "common/split_set.h"
 #include "common/update_codec.h"
 
 namespace intervale {
@@ -23,39 +23,58 @@ namespace intervale {
 struct Batch {
   std::vector<std::uint8_t> payload;  // update_codec.h
   std::uint32_t updates = 0;
-  double remaining_error = 0;  // largest saturated error of what is wanted and not yet sent, field units; 0 when nothing is
 };
 
 // The first batch is small, so that there is something to draw soon; each is twice the last, up to where a larger one gains nothing.
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
-// The stream of one session over one data set. One thread at a time.
+// The stream of one session over one data set. One thread at a time. Beside the data set it takes one bit for each update and six bytes for each
+// brick; another bit for each update while there is a budget of updates.
 class StreamPlan {
  public:
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
-  // Replaces what is wanted. What was sent stays sent: nothing is ever sent twice. Linear in the number of updates.
+  // Replaces what is wanted. lod: one that check_lod lets pass. What was sent stays sent: nothing is ever sent twice. O(bricks); with max_updates
+  // O(updates).
   void set_lod(const Lod& lod);
 
-  // The next batch, or nothing when all that is wanted has been sent. max_bytes, at least 256, bounds the payload as it would be if nothing could be
-  // compressed; it is about half of that.
+  // The next batch. Nothing when all that is wanted has been sent, and when the search for more has taken long enough for one turn: done() tells.
+  // max_bytes, at least 256, bounds the payload as it would be if nothing could be compressed; it is about half of that.
   std::optional<Batch> next(std::size_t max_bytes);
+  [[nodiscard]] bool done() const { return waiting_bricks_ == 0; }
 
-  [[nodiscard]] std::uint64_t wanted() const { return wanted_count_; }  // updates that the current level of detail needs, in all
-  [[nodiscard]] std::uint64_t sent() const { return sent_count_; }      // updates sent so far, in all
+  [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates sent so far, in all
+  // Of what is wanted for its own sake and not yet sent. All are bounds from above, and 0 when all has been sent.
+  struct ToGo {
+    std::uint64_t updates = 0;
+    double error = 0;   // field units
+    double pixels = 0;  // on the camera's screen; 0 without one
+  };
+  [[nodiscard]] ToGo to_go() const;
 
  private:
+  using Rank = Ranking::Rank;
   struct Chunk;
-  bool begin_band();
+  // Of a brick. No brick has more updates than 64 * kSlots.
+  struct Waiting {
+    Rank rank = 0;             // no lower than that of any update wanted and not sent; 0: there is none
+    std::uint16_t unsent = 0;  // updates
+    std::uint16_t wanted = 0;  // of those, at most
+  };
+  void set_waiting(std::uint32_t brick, Rank rank, unsigned wanted);
+  void begin_band();
+  bool look_into(std::uint32_t brick, Chunk& chunk);
   bool take(const Place& place, Chunk& chunk);
 
   std::shared_ptr<const IntervalVolume> volume_;
-  SplitSet sent_, wanted_;
-  std::array<std::uint32_t, kErrorLevels> waiting_{};  // wanted and not sent, by level of error
-  std::uint64_t waiting_count_ = 0, wanted_count_ = 0, sent_count_ = 0;
-  unsigned band_ = kErrorLevels;      // the lowest level of error that the current band takes
-  std::uint32_t next_supercube_ = 0;  // the band goes from the last supercube to the first; those below this one are still to come
-  std::uint32_t next_brick_ = 0;      // the one that supercube next_supercube_ - 1 is in
+  SplitSet sent_;
+  std::vector<Waiting> waiting_;  // by brick
+  std::optional<Ranking> ranking_;
+  std::optional<SplitSet> only_;  // with a budget of updates: those within it
+  std::uint64_t sent_count_ = 0, wanted_count_ = 0;
+  std::uint32_t waiting_bricks_ = 0;  // whose rank is not 0
+  Rank band_ = 0;                     // the lowest rank of the current band
+  std::uint32_t next_brick_ = 0;      // the band goes from the last brick to the first; those below this one are still to come
 };
 
 }  // namespace intervale

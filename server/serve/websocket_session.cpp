@@ -167,6 +167,10 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         if (const auto* batch = std::get_if<protocol::Batch>(&*message)) context_.metrics.updates_sent_total += batch->updates;
         continue;
       }
+      if (state_.searching()) {
+        co_await asio::post(ws_.get_executor(), asio::use_awaitable);  // others' turn
+        continue;
+      }
       co_await wait();
     }
   }

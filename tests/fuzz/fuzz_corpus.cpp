@@ -36,7 +36,7 @@ class Corpus {
 void add_batches(const Corpus& corpus) {
   for (std::size_t i = 0; i < testing::small_volumes().size(); ++i) {
     const IntervalVolume& v = testing::small_volumes()[i];
-    const auto queue = in_order(v, select(v, {}));
+    const auto queue = in_order(v, select(v, {}), {});
     for (const std::size_t stage : {0u, 5u, 7u}) {
       const auto before = std::span(queue).first(queue.size() * stage / 8), left = std::span(queue).subspan(before.size());
       const auto bytes = testing::batch_of(v, left.first(std::min<std::size_t>(left.size(), 60)), before);
@@ -75,15 +75,15 @@ void add_nrrds(const Corpus& corpus) {
 void add_messages(const Corpus& corpus) {
   using namespace protocol;
   corpus.add("protocol", "open", {0}, encode(ClientMessage(Open{"buckyball", "fuzz 1", 262144})));
-  corpus.add("protocol", "view", {0}, encode(ClientMessage(View{7, {0.5, 10.0, Box{{-1, 0, 1}, {2, 0, 3}}, 5, 6}})));
+  corpus.add("protocol", "view", {0}, encode(ClientMessage(View{7, {0.5, 10.0, Box{{-1, 0, 1}, {2, 0, 3}}, Camera{.eye = {9, 9, 9}}, 5, 6}})));
   corpus.add("protocol", "view-all", {0}, encode(ClientMessage(View{1, {}})));
   corpus.add("protocol", "credit", {0}, encode(ClientMessage(Credit{65536})));
   corpus.add("protocol", "opened", {1}, encode(ServerMessage(Opened{testing::small_volumes()[1].description(), {}})));
   const IntervalVolume& v = testing::small_volumes()[0];
-  const auto queue = in_order(v, select(v, {}));
+  const auto queue = in_order(v, select(v, {}), {});
   const auto payload = testing::batch_of(v, std::span(queue).first(30));
-  corpus.add("protocol", "batch", {1}, encode(ServerMessage(protocol::Batch{1, 2, 30, 0.5, payload})));
-  corpus.add("protocol", "done", {1}, encode(ServerMessage(Done{1, 22, 333})));
+  corpus.add("protocol", "batch", {1}, encode(ServerMessage(protocol::Batch{1, 2, 30, 0.5, 2.5, 400, payload})));
+  corpus.add("protocol", "done", {1}, encode(ServerMessage(Done{1, 22})));
   corpus.add("protocol", "fault", {1}, encode(ServerMessage(Fault{CloseCode::too_large, "too large"})));
 }
 

@@ -19,7 +19,7 @@ const std::vector<std::vector<Front>>& clients() {
   static const std::vector<std::vector<Front>> all = [] {
     std::vector<std::vector<Front>> made;
     for (const IntervalVolume& v : testing::small_volumes()) {
-      const auto queue = in_order(v, select(v, {}));
+      const auto queue = in_order(v, select(v, {}), {});
       auto& stages = made.emplace_back();
       for (std::size_t stage = 0; stage < kStages; ++stage) {
         Front& front = stages.emplace_back(v.description().grid, *decode_base(v.description().base, v.domain()));

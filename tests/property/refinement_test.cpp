@@ -129,9 +129,8 @@ TEST_P(Property, EveryLevelOfDetailIsRight) {
     EXPECT_NEAR(volume_of(mesh) / unit, naive.volume, 0.01 * naive.cut_volume + 1e-9);
     // The same mesh from the field's hierarchy.
     if (level < 3) {
-      const Lod same{error_of(lod, sigma->description()), {}, {}, {}, {}};
-      const SplitSet from_delta = select(
-          delta.set(), [&](UpdateIndex i) { return double(sigma->error(i)); }, criterion_of(same, sigma->description()));
+      const double threshold = error_of(lod, sigma->description());
+      const SplitSet from_delta = select(delta.set(), [&](const Place& p) { return threshold == 0 || double(sigma->error(p.index)) > threshold; });
       EXPECT_EQ(from_delta, split);
       const auto again = extract(g, delta.base(), delta.set(), from_delta, [&](Front& front, Front::Handle handle, const Place& p) {
         const Diamond d(delta.set().centre(p));

@@ -10,7 +10,8 @@ inline IntervalVolume::Parts parts_of(const IntervalVolume& v) {
           v.set(),
           {v.codes().begin(), v.codes().end()},
           {v.differences().begin(), v.differences().end()},
-          {v.error_levels().begin(), v.error_levels().end()}};
+          {v.error_levels().begin(), v.error_levels().end()},
+          {v.yields().begin(), v.yields().end()}};
 }
 
 }  // namespace intervale::testing

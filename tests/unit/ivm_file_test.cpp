@@ -181,6 +181,7 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
     void (*spoil)(Parts&);
   } cases[] = {
       {"too few codes", [](Parts& p) { p.codes.pop_back(); }},
+      {"too few yields", [](Parts& p) { p.yields.pop_back(); }},
       {"too many codes", [](Parts& p) { p.codes.emplace_back(); }},
       {"no codes", [](Parts& p) { p.codes.clear(); }},
       {"no set", [](Parts& p) { p.set = SupercubeSet(); }},

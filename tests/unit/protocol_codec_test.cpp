@@ -35,11 +35,11 @@ std::vector<ClientMessage> client_messages() {
   return {Open{"buckyball", "test 1", 262144}, View{1, {}},
           View{std::numeric_limits<std::uint64_t>::max(),
                {.error = 0.5, .error_percent = 10, .roi = Box{{-1, 0, 1}, {2, 0, 3}}, .max_tets = 0, .max_updates = 1ull << 60}},
-          Credit{65536}};
+          View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}}, Credit{65536}};
 }
 
 std::vector<ServerMessage> server_messages() {
-  return {Opened{some_description(), {}}, Batch{1, 2, 3, 4.5, {7, 8, 9}}, Batch{}, Done{1, 22, 333}, Fault{CloseCode::too_large, "too large"}};
+  return {Opened{some_description(), {}}, Batch{1, 2, 3, 4.5, 5.5, 6, {7, 8, 9}}, Batch{}, Done{1, 22}, Fault{CloseCode::too_large, "too large"}};
 }
 
 Result<ClientMessage> decode(const ClientMessage&, std::span<const std::uint8_t> bytes) { return decode_client_message(bytes); }
@@ -131,9 +131,10 @@ TEST(Codec, LimitsHold) {
   Opened opened{some_description(), {}};
   opened.description.base.resize(kMaxBase + 1);
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(opened))));
-  EXPECT_TRUE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, Bytes(kMaxBatchPayload)}))));
-  EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, Bytes(kMaxBatchPayload + 1)}))));
-  EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, kNan, {}}))));
+  EXPECT_TRUE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, 0, 0, Bytes(kMaxBatchPayload)}))));
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, 0, 0, Bytes(kMaxBatchPayload + 1)}))));
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, kNan, 0, 0, {}}))));
+  EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, kNan, 0, {}}))));
 }
 
 TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
@@ -157,7 +158,7 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
 TEST(Codec, ABatchesEnvelopeIsWithinItsLimit) {
   constexpr auto kMost = std::numeric_limits<std::uint64_t>::max();
   for (const std::size_t size : {0, 1, 2, 3, 5, 1000, 65536}) {
-    const Batch batch{kMost, kMost, 0xffffffff, 1e300, Bytes(size)};
+    const Batch batch{kMost, kMost, 0xffffffff, 1e300, 1e300, kMost, Bytes(size)};
     EXPECT_LE(encode(ServerMessage(batch)).size(), size + kBatchEnvelope);
     EXPECT_LE(encode(ServerMessage(batch)).size(), cost_of(batch));
   }

@@ -38,7 +38,7 @@ std::vector<IntervalVolume> volumes() {
 
 Front root_of(const IntervalVolume& v) { return Front(v.description().grid, *decode_base(v.description().base, v.domain())); }
 
-std::vector<UpdateIndex> queue_of(const IntervalVolume& v) { return in_order(v, select(v, Lod{})); }
+std::vector<UpdateIndex> queue_of(const IntervalVolume& v) { return in_order(v, select(v, Lod{}), {}); }
 
 // The front after the first n updates of the queue.
 Front after(const IntervalVolume& v, std::size_t n) {

@@ -1,0 +1,66 @@
+#include "common/view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace intervale {
+namespace {
+
+using Vector = std::array<double, 3>;
+
+// Errors shrink to 1 / (1 + kFade) at a right angle to the edge of the picture, and beyond.
+constexpr double kFade = 15;
+
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double reach_along(const Vector& reach, const Vector& n) { return reach[0] * std::abs(n[0]) + reach[1] * std::abs(n[1]) + reach[2] * std::abs(n[2]); }
+Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+Vector unit(const Vector& v) {
+  const double n = std::hypot(v[0], v[1], v[2]);
+  return {v[0] / n, v[1] / n, v[2] / n};
+}
+
+}  // namespace
+
+View::View(const Camera& camera, const Grid& grid) : origin_(grid.origin), spacing_(grid.spacing), eye_(camera.eye) {
+  ahead_ = unit({camera.look_at[0] - eye_[0], camera.look_at[1] - eye_[1], camera.look_at[2] - eye_[2]});
+  right_ = unit(cross(ahead_, unit(camera.up)));
+  up_ = cross(right_, ahead_);
+  tan_y_ = std::tan(camera.fov * (std::numbers::pi / 360));
+  tan_x_ = tan_y_ * camera.viewport[0] / camera.viewport[1];
+  scale_ = camera.viewport[1] / (2 * tan_y_);
+  cos_corner_ = 1 / std::hypot(1.0, tan_x_, tan_y_);
+  least_depth_ = 1e-3 * std::min({spacing_[0], spacing_[1], spacing_[2]});
+  const auto inward = [this](const Vector& across, double sign, double tangent) {
+    Vector n;
+    for (int i = 0; i < 3; ++i) n[i] = tangent * ahead_[i] + sign * across[i];
+    return unit(n);
+  };
+  inward_ = {inward(right_, 1, tan_x_), inward(right_, -1, tan_x_), inward(up_, 1, tan_y_), inward(up_, -1, tan_y_)};
+}
+
+double View::pixels_per_unit(const Region& region) const {
+  Vector at, reach;
+  double gap2 = 0;  // to the nearest point of the region
+  for (int i = 0; i < 3; ++i) {
+    at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
+    reach[i] = spacing_[i] * region.reach[i];
+    const double gap = std::max(0.0, std::abs(at[i]) - reach[i]);
+    gap2 += gap * gap;
+  }
+  // What the picture shows of the region is no nearer than that.
+  const double depth = std::max({dot(at, ahead_) - reach_along(reach, ahead_), std::sqrt(gap2) * cos_corner_, least_depth_});
+  double outside = 0;  // how far the whole region is beyond a side of what is seen
+  for (const Vector& n : inward_) outside = std::max(outside, -dot(at, n) - reach_along(reach, n));
+  if (outside == 0) return scale_ / depth;
+  return scale_ / (depth * (1 + kFade * outside / std::hypot(at[0], at[1], at[2])));
+}
+
+bool View::is_central(const Region& region) const {
+  Vector at;
+  for (int i = 0; i < 3; ++i) at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
+  const double depth = dot(at, ahead_);
+  return std::abs(dot(at, right_)) <= tan_x_ / 2 * depth && std::abs(dot(at, up_)) <= tan_y_ / 2 * depth;
+}
+
+}  // namespace intervale

@@ -1,0 +1,245 @@
+#include "server/build/surface_moves.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "common/interval_volume.h"
+#include "server/build/interpolation_error.h"
+
+namespace intervale {
+namespace {
+
+constexpr int kTopScale = 4;  // cubes of this scale are gone through one by one; coarser diamonds keep their width
+
+// A point where the field crosses a surface.
+struct Crossing {
+  std::array<float, 4> at;  // barycentric coordinates
+  float value;              // alpha or beta
+};
+
+struct Corner {
+  Vertex at;
+  float value;
+};
+
+// One tetrahedron of the bisection. Its spine goes from corner 0 to corner 3 - cls.
+struct Tet {
+  std::array<Corner, 4> corner;
+  int scale, cls;
+};
+
+float round_up(double value) {
+  const float f = float(std::min(value, double(std::numeric_limits<float>::max())));
+  return double(f) < value ? std::nextafter(f, std::numeric_limits<float>::max()) : f;
+}
+
+// Not negative floats ascend like their bits.
+void raise(float& to, float value) {
+  std::atomic_ref<float> shared(to);
+  float seen = shared.load(std::memory_order_relaxed);
+  while (seen < value && !shared.compare_exchange_weak(seen, value, std::memory_order_relaxed)) {
+  }
+}
+
+template <class T>
+class Cubes {
+ public:
+  Cubes(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& moves)
+      : field_(field), grid_(grid), domain_(domain), set_(set), moves_(moves), width_(diamond_width(grid)) {
+    for (const double surface : {range.alpha, range.beta}) {
+      if (std::isfinite(surface) && (surfaces_ == 0 || surface != surface_[0])) surface_[surfaces_++] = surface;
+    }
+  }
+
+  // All that is inside one diamond of class 0. crossings: room to work in.
+  void measure(const Diamond& cube, std::vector<Crossing>& crossings) const {
+    std::array<std::vector<Crossing>, 6> of_tet;
+    NearByScale near;
+    const Vertex from{cube.centre.x - cube.h, cube.centre.y - cube.h, cube.centre.z - cube.h};
+    const Vertex last = field_.last;
+    const std::int32_t side = 2 * cube.h;
+    const std::array<std::ptrdiff_t, 3> step{1, last.x + 1, std::ptrdiff_t(last.x + 1) * (last.y + 1)};
+    const Vertex begin{std::max(0, from.x), std::max(0, from.y), std::max(0, from.z)};
+    const Vertex end{std::min(last.x, from.x + side), std::min(last.y, from.y + side), std::min(last.z, from.z + side)};
+    const Vertex start = cube.vertex(0);  // of the spine
+    const std::array<bool, 3> flip{start.x != from.x, start.y != from.y, start.z != from.z};
+    for (std::int32_t z = begin.z; z <= end.z; ++z) {
+      for (std::int32_t y = begin.y; y <= end.y; ++y) {
+        const T* const row = &field_.samples[field_.index({0, y, z})];
+        for (std::int32_t x = begin.x; x <= end.x; ++x) {
+          for (int axis = 0; axis < 3; ++axis) {
+            if (axis == 0 ? x == end.x : axis == 1 ? y == end.y : z == end.z) continue;
+            const double a = double(row[x]), b = double(row[x + step[axis]]);
+            for (int k = 0; k < surfaces_; ++k) {
+              const double surface = surface_[k];
+              if ((a < surface) == (b < surface)) continue;
+              std::array<double, 3> p{double(x - from.x), double(y - from.y), double(z - from.z)};
+              p[axis] += (surface - a) / (b - a);
+              for (int i = 0; i < 3; ++i) p[i] = (flip[i] ? side - p[i] : p[i]) / side;
+              add(p, surface, of_tet);
+            }
+          }
+        }
+      }
+    }
+    for (int t = 0; t < 6; ++t) {
+      if (of_tet[t].empty()) continue;
+      Tet tet{{}, cube.scale, 0};
+      Vertex v = start;
+      for (int i = 0; i < 4; ++i) {
+        tet.corner[i] = {v, float(value(v))};
+        if (i == 3) break;
+        const int axis = kPaths[t][i];
+        std::int32_t& c = axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+        c += flip[axis] ? -side : side;
+      }
+      crossings = std::move(of_tet[t]);
+      descend(tet, crossings, near);
+    }
+  }
+
+ private:
+  static constexpr std::array<std::array<int, 3>, 6> kPaths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
+
+  // The tetrahedra of a cube are those of the paths along its edges from one end of the spine to the other.
+  static void add(const std::array<double, 3>& p, double surface, std::array<std::vector<Crossing>, 6>& of_tet) {
+    for (int t = 0; t < 6; ++t) {
+      const double x = p[kPaths[t][0]], y = p[kPaths[t][1]], z = p[kPaths[t][2]];
+      if (x < y || y < z) continue;
+      of_tet[t].push_back({{float(1 - x), float(x - y), float(y - z), float(z)}, float(surface)});
+      return;
+    }
+  }
+
+  [[nodiscard]] double value(Vertex v) const { return field_.at(domain_.clamp(v)); }
+
+  // The square of the length of the interpolant's gradient.
+  [[nodiscard]] double steepness(const Tet& tet) const {
+    std::array<std::array<double, 3>, 3> e;
+    std::array<double, 3> f;
+    for (int i = 0; i < 3; ++i) {
+      const Vertex a = tet.corner[i].at, b = tet.corner[i + 1].at;
+      e[i] = {grid_.spacing[0] * (b.x - a.x), grid_.spacing[1] * (b.y - a.y), grid_.spacing[2] * (b.z - a.z)};
+      f[i] = double(tet.corner[i + 1].value) - double(tet.corner[i].value);
+    }
+    const auto cross = [](const std::array<double, 3>& a, const std::array<double, 3>& b) {
+      return std::array<double, 3>{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    };
+    const auto c0 = cross(e[1], e[2]), c1 = cross(e[2], e[0]), c2 = cross(e[0], e[1]);
+    const double det = e[0][0] * c0[0] + e[0][1] * c0[1] + e[0][2] * c0[2];
+    double square = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double g = f[0] * c0[k] + f[1] * c1[k] + f[2] * c2[k];
+      square += g * g;
+    }
+    return square / (det * det);
+  }
+
+  // The supercube of each scale that was looked into last: the next diamond is mostly in it too.
+  struct Near {
+    Vertex position{-1, -1, -1};
+    std::uint64_t occupancy = 0;
+    UpdateIndex first = 0;
+  };
+  using NearByScale = std::array<Near, kTopScale + 1>;
+
+  [[nodiscard]] std::optional<UpdateIndex> find(Vertex centre, int scale, NearByScale& near) const {
+    Near& here = near[std::size_t(scale)];
+    const Vertex position{centre.x >> (scale + 2), centre.y >> (scale + 2), centre.z >> (scale + 2)};
+    if (here.position != position) {
+      const auto found = set_.find_supercube(scale, position);
+      here = found ? Near{position, set_.occupancy()[found->supercube], set_.first(found->brick, found->supercube)} : Near{position, 0, 0};
+    }
+    const int slot = kSlotOfType[type_of(centre, scale)];
+    if (!(here.occupancy >> slot & 1)) return {};
+    return here.first + UpdateIndex(std::popcount(here.occupancy & ((std::uint64_t(1) << slot) - 1)));
+  }
+
+  void descend(const Tet& tet, std::span<Crossing> crossings, NearByScale& near) const {
+    const int tail = 3 - tet.cls;
+    const Vertex a = tet.corner[0].at, b = tet.corner[tail].at;
+    const Vertex centre{(a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2};
+    const auto update = find(centre, tet.scale, near);
+    if (!update) return;
+    double off = 0;
+    for (const Crossing& c : crossings) {
+      double at = 0;
+      for (int i = 0; i < 4; ++i) at += double(c.at[i]) * double(tet.corner[i].value);
+      off = std::max(off, std::abs(at - double(c.value)));
+    }
+    const double most = width_ * double(1 << tet.scale);
+    const bool moved = !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Corner& c) { return domain_.contains(c.at); });
+    const double slope = std::sqrt(steepness(tet));
+    const double move = moved || !(off < most * slope) ? most : off / slope;
+    if (move > 1e-4 * width_) raise(moves_[*update], round_up(move));
+    if (tet.scale == 0 && tet.cls == 2) return;
+    const auto nearer_tail = std::partition(crossings.begin(), crossings.end(), [tail](const Crossing& c) { return c.at[0] >= c.at[tail]; });
+    const auto split = std::size_t(nearer_tail - crossings.begin());
+    const Corner middle{centre, float(value(centre))};
+    const int scale = tet.cls == 2 ? tet.scale - 1 : tet.scale, cls = tet.cls == 2 ? 0 : tet.cls + 1;
+    if (split > 0) {
+      Tet child{tet.corner, scale, cls};
+      child.corner[tail] = middle;
+      for (Crossing& c : crossings.first(split)) {
+        c.at[0] -= c.at[tail];
+        c.at[tail] *= 2;
+      }
+      descend(child, crossings.first(split), near);
+    }
+    if (split < crossings.size()) {
+      Tet child{tet.corner, scale, cls};
+      for (int i = 0; i < tail; ++i) child.corner[i] = tet.corner[i + 1];
+      child.corner[tail] = middle;
+      for (Crossing& c : crossings.subspan(split)) {
+        const float head = c.at[0];
+        const float rest = c.at[tail] - head;
+        for (int i = 0; i + 1 < tail; ++i) c.at[i] = c.at[i + 1];
+        c.at[tail - 1] = rest;
+        c.at[tail] = 2 * head;
+      }
+      descend(child, crossings.subspan(split), near);
+    }
+  }
+
+  const Field<T>& field_;
+  const Grid& grid_;
+  const Domain& domain_;
+  const SupercubeSet& set_;
+  std::vector<float>& moves_;
+  double width_;
+  std::array<double, 2> surface_{};
+  int surfaces_ = 0;
+};
+
+}  // namespace
+
+std::vector<float> surface_moves(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set) {
+  std::vector<float> moves(set.size(), 0);
+  const int top = std::min(kTopScale, domain.levels() - 1);
+  const double width = diamond_width(volume.grid);
+  visit_samples(volume, [&]<class T>(std::span<const T> samples) {
+    const Field<T> field{samples, domain.last()};
+    const Cubes<T> cubes(field, range, volume.grid, domain, set, moves);
+    const auto [begin, end] = set.of_scale(top);
+    tbb::parallel_for(begin, end, [&](std::uint32_t brick) {
+      std::vector<Crossing> crossings;
+      set.for_each_in_brick(brick, kSlotsOfClass[0], [&](const Place& p) { cubes.measure(Diamond(set.centre(p)), crossings); });
+    });
+  });
+  for (int scale = top + 1; scale < domain.levels(); ++scale) {
+    const auto [begin, end] = set.of_scale(scale);
+    for (std::uint32_t b = begin; b < end; ++b)
+      set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) { moves[p.index] = round_up(width * double(1 << scale)); });
+  }
+  return moves;
+}
+
+}  // namespace intervale

@@ -1,0 +1,21 @@
+// How far the surfaces of a diamond's tetrahedra are from those of the full mesh: what its refinement can still move, in world units.
+//
+// The field crosses alpha and beta at points on the edges between neighbouring samples. In a coarser tetrahedron's interpolant such a point has
+// another value; that difference over the interpolant's gradient is the point's distance from the coarse surface, to first order. Points go down the
+// bisection with their barycentric coordinates, of which each step changes two (Maubach 1995, for the order of vertices).
+#pragma once
+
+#include <vector>
+
+#include "common/description.h"
+#include "common/domain.h"
+#include "common/supercube.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+// For each diamond of `set` (the relevant ones), by number: the largest move of any surface point in it, not saturated. Diamonds of coarse scales,
+// and those with tetrahedra that the border moves, have their width for it. On all cores that oneTBB may use. Samples finite.
+[[nodiscard]] std::vector<float> surface_moves(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set);
+
+}  // namespace intervale
