@@ -109,6 +109,15 @@ bool Front::merge(Vertex centre) {
   return true;
 }
 
+std::vector<SlotGroup> Front::splits() const {
+  std::vector<SlotGroup> splits;
+  for (const Block& b : blocks_) {
+    if (b.scale < domain_.levels() && b.split != 0) splits.push_back({0, 0, supercube_key(b.scale, b.position), b.split});
+  }
+  std::sort(splits.begin(), splits.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.key < b.key; });
+  return splits;
+}
+
 std::size_t Front::memory_bytes() const { return blocks_.size() * sizeof(Block) + index_.bucket_count() * 17 + q_.capacity(); }
 
 std::uint32_t Front::find_number(int scale, Vertex position) const {

@@ -62,6 +62,9 @@ class Front {
   [[nodiscard]] std::uint64_t split_count() const { return split_count_; }  // diamonds that are split
   [[nodiscard]] std::size_t memory_bytes() const;
 
+  // The diamonds that are split, by supercube, keys ascending; only keys and slots mean something.
+  [[nodiscard]] std::vector<SlotGroup> splits() const;
+
   // The mesh, in world coordinates.
   [[nodiscard]] Mesh mesh(const ParallelFor& parallel = in_turn) const;
 

@@ -50,6 +50,7 @@ struct SlotGroup {
   std::uint32_t brick = 0, supercube = 0;  // numbers in the set
   SupercubeKey key = 0;
   std::uint64_t slots = 0;
+  friend bool operator==(const SlotGroup&, const SlotGroup&) = default;
 };
 
 // An immutable set of diamonds. Supercubes in turn stand in bricks: the 4 x 4 x 4 of one scale whose keys differ in the lowest six bits only.

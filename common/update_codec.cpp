@@ -6,12 +6,11 @@
 
 #include "common/difference_coder.h"
 #include "common/planes.h"
+#include "common/split_names.h"
 #include "common/update.h"
 
 namespace intervale {
 namespace {
-
-constexpr int kCompression = 1;  // zstd: on such planes faster and smaller than 3
 
 // Calls visit(group number, class) in the order in which updates are applied; stops when it returns false. key(g): of group g.
 template <class Key, class Visit>
@@ -50,35 +49,10 @@ bool is_mixed(UpdateCode code, int vertices) {
   return cuts != 0 && cuts != 2 * vertices && !(cuts == vertices && code.first_cuts() == 1);
 }
 
-// The supercubes of a batch: bricks as steps from one to the next, each with a word for which supercubes.
-Result<std::vector<SupercubeKey>> take_supercubes(std::span<const std::uint8_t>& in) {
-  const auto steps = take_plane(in, 10 * kBatchUpdatesMost), masks = take_plane(in, 8 * kBatchUpdatesMost);
-  if (!steps || !masks || masks->size() % 8 != 0) return damaged("its names");
-  std::vector<SupercubeKey> keys;
-  std::span<const std::uint8_t> left(*steps);
-  std::uint64_t brick = 0;
-  bool is_first = true;
-  for (std::uint64_t mask : join_bytes(*masks, 8)) {
-    const auto step = take_varint(left);
-    if (!step || (!is_first && *step == 0) || *step >= (std::uint64_t(1) << 56) - brick || mask == 0) return damaged("its bricks do not ascend");
-    is_first = false;
-    brick += *step;
-    const SupercubeKey key = brick << 6;
-    if (scale_of_key(key) < 0 || scale_of_key(key) >= kMaxLevels) return damaged("a brick of no scale");
-    if (keys.size() + std::popcount(mask) > kBatchUpdatesMost) return damaged("too many supercubes");
-    for (; mask != 0; mask &= mask - 1) keys.push_back(key + unsigned(std::countr_zero(mask)));
-  }
-  if (!left.empty()) return damaged("its names do not add up");
-  return keys;
-}
-
 }  // namespace
 
 std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) {
   const SupercubeSet& set = volume.set();
-  std::vector<std::uint8_t> steps;
-  std::vector<std::uint64_t> masks;
-  std::uint64_t previous = 0;
   // Of each group: what can be split when its turn comes, and what of that has vertices on different sides.
   struct Candidates {
     std::uint64_t ready = 0, mixed = 0;
@@ -87,13 +61,6 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
   candidates.reserve(groups.size());
   Readiness readiness(set, volume.domain(), split);
   for (const SlotGroup& g : groups) {
-    const std::uint64_t brick = g.key >> 6;
-    if (masks.empty() || brick != previous) {
-      append_varint(steps, brick - previous);
-      masks.push_back(0);
-      previous = brick;
-    }
-    masks.back() |= std::uint64_t(1) << (g.key & 63);
     readiness.move_to(g.key);
     Candidates& c = candidates.emplace_back();
     c.ready = readiness.ready() & (~split.slots(set, g.brick, g.supercube) | g.slots);
@@ -140,16 +107,15 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
   std::vector<std::uint8_t> diamonds = coded(false, plain_bytes);
   if (diamonds.size() > plain_bytes) diamonds = coded(true, plain_bytes);
   std::vector<std::uint8_t> out;
-  append_plane(out, steps, kCompression);
-  append_plane(out, split_bytes(masks, 8), kCompression);
+  append_supercubes(out, groups);
   append_varint(out, diamonds.size());
   out.insert(out.end(), diamonds.begin(), diamonds.end());
   return out;
 }
 
 Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::optional<std::uint64_t> max_tets) {
-  const auto keys = take_supercubes(bytes);
-  if (!keys) return tl::unexpected(keys.error());
+  const auto keys = take_supercubes(bytes, kBatchUpdatesMost);
+  if (!keys) return damaged(keys.error().message.c_str());
   const auto length = take_varint(bytes);
   if (!length || *length != bytes.size()) return damaged("its length");
 

@@ -1,5 +1,7 @@
 #include "protocol/codec.h"
 
+#include "common/split_names.h"
+
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -41,7 +43,7 @@ Body body(Tag tag, flatbuffers::Offset<Table> table) {
 Body encode_body(FlatBufferBuilder& out, const Open& message) {
   const auto dataset = out.CreateString(message.dataset);
   const auto client = out.CreateString(message.client);
-  return body(fbs::ClientBody::Open, fbs::CreateOpen(out, dataset, client, message.credit));
+  return body(fbs::ClientBody::Open, fbs::CreateOpen(out, dataset, client, message.credit, to_wire(message.resume)));
 }
 
 Body encode_body(FlatBufferBuilder& out, const View& message) {
@@ -59,6 +61,10 @@ Body encode_body(FlatBufferBuilder& out, const View& message) {
 
 Body encode_body(FlatBufferBuilder& out, const Credit& message) { return body(fbs::ClientBody::Credit, fbs::CreateCredit(out, message.bytes)); }
 
+Body encode_body(FlatBufferBuilder& out, const Have& message) {
+  return body(fbs::ClientBody::Have, fbs::CreateHave(out, out.CreateVector(encode_splits(message.splits))));
+}
+
 Body encode_body(FlatBufferBuilder& out, const Opened& message) {
   const Description& d = message.description;
   const auto name = out.CreateString(d.name);
@@ -69,7 +75,8 @@ Body encode_body(FlatBufferBuilder& out, const Opened& message) {
   const auto description = fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine),
                                                   d.max_error, d.updates, d.coefficients, d.full.vertices, d.full.tets, d.content_hash, base);
   const SessionLimits& limits = message.limits;
-  return body(fbs::ServerBody::Opened, fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message));
+  return body(fbs::ServerBody::Opened,
+              fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message, message.resumed));
 }
 
 Body encode_body(FlatBufferBuilder& out, const Batch& message) {
@@ -104,7 +111,7 @@ std::string text_of(const flatbuffers::String* text) { return text == nullptr ? 
 Result<ClientMessage> decode_body(const fbs::Open& table) {
   if (longer_than(table.dataset(), kMaxName)) return malformed("the data set's name is too long");
   if (longer_than(table.client(), kMaxText)) return malformed("the client's name is too long");
-  return Open{table.dataset()->str(), text_of(table.client()), table.credit()};
+  return Open{table.dataset()->str(), text_of(table.client()), table.credit(), from_wire(table.resume())};
 }
 
 Result<ClientMessage> decode_body(const fbs::View& table) {
@@ -130,6 +137,12 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
 
 Result<ClientMessage> decode_body(const fbs::Credit& table) { return Credit{table.bytes()}; }
 
+Result<ClientMessage> decode_body(const fbs::Have& table) {
+  auto splits = decode_splits({table.splits()->data(), table.splits()->size()}, kMaxHave);
+  if (!splits) return malformed(splits.error().message);
+  return Have{std::move(*splits)};
+}
+
 Result<ServerMessage> decode_body(const fbs::Opened& table) {
   const fbs::Description& wire = *table.description();
   if (longer_than(wire.name(), kMaxName)) return malformed("the data set's name is too long");
@@ -146,7 +159,7 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
   d.full = {wire.full_vertices(), wire.full_tets()};
   d.content_hash = wire.content_hash();
   d.base.assign(wire.base()->begin(), wire.base()->end());
-  return Opened{std::move(d), {table.max_window(), table.min_credit(), table.max_message()}};
+  return Opened{std::move(d), {table.max_window(), table.min_credit(), table.max_message()}, table.resumed()};
 }
 
 Result<ServerMessage> decode_body(const fbs::Batch& table) {
@@ -221,6 +234,8 @@ Result<ClientMessage> decode_client_message(Bytes bytes) {
       return decode_body(*root->body_as_View());
     case fbs::ClientBody::Credit:
       return decode_body(*root->body_as_Credit());
+    case fbs::ClientBody::Have:
+      return decode_body(*root->body_as_Have());
     case fbs::ClientBody::NONE:
       break;
   }

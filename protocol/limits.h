@@ -7,8 +7,11 @@
 
 namespace intervale::protocol {
 
-// A client's messages are under 1 KiB today; room for the split set that a later version resumes with.
+// A client's largest message is a Have: room for kMaxHave supercubes.
 inline constexpr std::size_t kMaxClientMessage = 64 << 10;
+
+// Supercubes in one Have: 25 bytes each at most, uncompressed.
+inline constexpr std::size_t kMaxHave = 2048;
 
 // Largest payload of a Batch. A batch is cut by what it would take if nothing could be compressed; it takes about half of that, and 64 KiB keep a
 // batch's time on a slow line short (50 ms at 10 Mbit/s), so that a new view soon gets its turn.

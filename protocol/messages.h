@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/description.h"
 #include "common/lod.h"
+#include "common/supercube.h"
 #include "protocol/limits.h"
 
 namespace intervale::protocol {
@@ -32,9 +34,15 @@ enum class CloseCode : std::uint16_t {
 // Client to server.
 struct Open {
   std::string dataset;
-  std::string client;        // name and version, for the server's log
-  std::uint64_t credit = 0;  // first grant; see Credit
+  std::string client;                        // name and version, for the server's log
+  std::uint64_t credit = 0;                  // first grant; see Credit
+  std::optional<std::uint64_t> resume = {};  // the content_hash of what the client holds updates of, and will name in Have
   friend bool operator==(const Open&, const Open&) = default;
+};
+// What a client that resumes has split already: between Open and the first View, as many as it takes.
+struct Have {
+  std::vector<SlotGroup> splits;  // at most kMaxHave; keys ascending; only keys and slots are sent
+  friend bool operator==(const Have&, const Have&) = default;
 };
 struct View {
   std::uint64_t epoch = 0;  // greater than that of the View before
@@ -45,7 +53,7 @@ struct Credit {
   std::uint64_t bytes = 0;  // so much more of Batch messages may come; see cost_of
   friend bool operator==(const Credit&, const Credit&) = default;
 };
-using ClientMessage = std::variant<Open, View, Credit>;
+using ClientMessage = std::variant<Open, View, Credit, Have>;
 
 // Server to client.
 struct SessionLimits {
@@ -57,6 +65,7 @@ struct SessionLimits {
 struct Opened {
   Description description;
   SessionLimits limits;
+  bool resumed = false;  // the data is what the client holds updates of: what it has is not sent again. Else it starts afresh.
   friend bool operator==(const Opened&, const Opened&) = default;
 };
 struct Batch {

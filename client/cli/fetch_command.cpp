@@ -24,12 +24,15 @@ struct FetchCommand {
 
 Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& options) {
   Progress progress("receiving " + url.name);
-  return fetch(url, options, [&progress](const StreamClient& client, const FetchFigures& figures) {
+  FetchEvents events;
+  events.on_notice = [&progress](const std::string& notice) { progress.note(notice); };
+  events.on_batch = [&progress](const StreamClient& client, const FetchFigures& figures) {
     const std::string left = figures.remaining_pixels > 0 ? fmt::format("error {:.3g} px, {:.4g}", figures.remaining_pixels, figures.remaining_error)
                                                           : fmt::format("error {:.4g}", figures.remaining_error);
     progress.text(fmt::format("{} updates, at most {} to go, {} tetrahedra, {}, {}", client.updates(), figures.updates_to_go, client.tet_count(),
                               human_bytes(figures.bytes_received), left));
-  });
+  };
+  return fetch(url, options, events);
 }
 
 Result<void> report(const FetchCommand& options, const Fetched& fetched, const Mesh& mesh) {
@@ -42,6 +45,7 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
                        {"volume", volume},
                        {"bytes_received", figures.bytes_received},
                        {"messages", figures.messages},
+                       {"reconnects", figures.reconnects},
                        {"seconds_first_mesh", figures.seconds_first_mesh},
                        {"seconds", figures.seconds}});
   }
@@ -81,6 +85,11 @@ void add_fetch_command(Program& program) {
       ->type_name("MESH");
   add_lod_options(command, options->fetch.lod);
   add_max_bytes_option(command, options->fetch.max_bytes);
+  command
+      .add_option_function<unsigned>(
+          "--reconnect", [options](unsigned seconds) { options->fetch.reconnect = std::chrono::seconds(seconds); },
+          "How long to try to reach a lost server again, with what came so far (default 30; 0: not at all)")
+      ->type_name("SECONDS");
   add_json_flag(command, options->json);
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "common/description.h"
 #include "common/front.h"
@@ -27,6 +28,7 @@ class StreamClient {
   [[nodiscard]] std::uint64_t updates() const;    // applied so far
   [[nodiscard]] std::uint64_t tet_count() const;  // of the mesh now; O(1)
   [[nodiscard]] const Description& description() const;
+  [[nodiscard]] std::vector<SlotGroup> splits() const { return front_.splits(); }  // what to resume with; see Front::splits
   [[nodiscard]] Mesh mesh() const;  // linear in the size of the mesh
 
  private:

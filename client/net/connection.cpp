@@ -28,6 +28,7 @@ struct StreamConnection::Socket {
   beast::flat_buffer buffer;
   std::uint64_t bytes_received = 0;
   std::uint64_t messages = 0;
+  bool is_lost = false;
 
   // Runs one asynchronous operation to its end: Beast's deadlines hold for those only.
   template <class Start>
@@ -46,7 +47,7 @@ struct StreamConnection::Socket {
 
   Result<void> connect();
   Result<void> shake_hands();
-  tl::unexpected<Error> lost(beast::error_code error) const;
+  tl::unexpected<Error> lost(beast::error_code error);
   tl::unexpected<Error> faulted(const protocol::Fault& fault) const;
 };
 
@@ -93,9 +94,11 @@ Result<void> StreamConnection::Socket::shake_hands() {
   return {};
 }
 
-tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) const {
+tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) {
+  is_lost = error != websocket::error::message_too_big;
   if (error == websocket::error::closed) {
     const auto reason = ws.reason();
+    is_lost = reason.code == static_cast<unsigned>(CloseCode::going_away) || reason.code == static_cast<unsigned>(CloseCode::internal);
     return fail("the server at " + url.authority() + " closed the session with code " + std::to_string(reason.code));
   }
   if (error == websocket::error::message_too_big) return fail("the server at " + url.authority() + " sent a message larger than the protocol allows");
@@ -145,7 +148,10 @@ Result<protocol::ServerMessage> StreamConnection::receive() {
   socket.bytes_received += socket.buffer.size();
   auto message = protocol::decode_server_message({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()});
   if (!message) return fail("the server at " + socket.url.authority() + " sent a " + message.error().message);
-  if (const auto* fault = std::get_if<protocol::Fault>(&*message)) return socket.faulted(*fault);
+  if (const auto* fault = std::get_if<protocol::Fault>(&*message)) {
+    socket.is_lost = fault->code == CloseCode::going_away || fault->code == CloseCode::internal;
+    return socket.faulted(*fault);
+  }
   return message;
 }
 
@@ -153,6 +159,7 @@ void StreamConnection::close() {
   socket_->run([this](auto done) { socket_->ws.async_close(websocket::close_code::normal, done); });
 }
 
+bool StreamConnection::is_lost() const { return socket_->is_lost; }
 std::uint64_t StreamConnection::bytes_received() const { return socket_->bytes_received; }
 std::uint64_t StreamConnection::messages() const { return socket_->messages; }
 

@@ -27,6 +27,9 @@ class StreamConnection {
   // The next message. The server's going away, a fault and a message that makes no sense are errors, after which nothing else is to be called.
   Result<protocol::ServerMessage> receive();
 
+  // Whether the last error was the line's or the server's end, so that connecting again may help; false for faults and nonsense.
+  [[nodiscard]] bool is_lost() const;
+
   void close();  // in order, with code 1000; waits for the server's answer at most kConnectTime
 
   [[nodiscard]] std::uint64_t bytes_received() const;  // of messages received, without WebSocket's framing

@@ -26,6 +26,12 @@ void Progress::text(const std::string& state) {
   show_locked(state);
 }
 
+void Progress::note(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  fmt::print(stderr, "{}{}\n", shown_ ? "\r\x1b[K" : "", line);
+  shown_ = false;
+}
+
 void Progress::show_locked(const std::string& state) {
   fmt::print(stderr, "\r{}: {}\x1b[K", what_, state);
   std::fflush(stderr);

@@ -24,7 +24,17 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   dataset_ = open.dataset;
   plan_.emplace(volume_);
   target_ = kFirstPayload;
+  resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
+}
+
+std::optional<Fault> SessionState::on(const protocol::Have& have) {
+  if (!opened() || viewing_) return fault(CloseCode::out_of_order, "Have comes after Open and before the first View");
+  if (!resumed_) return {};
+  for (const SlotGroup& g : have.splits) {
+    if (!plan_->resume(g.key, g.slots)) return fault(CloseCode::malformed, "the client has what the data set has not");
+  }
+  return {};
 }
 
 std::optional<Fault> SessionState::on(const protocol::View& view) {
@@ -50,7 +60,7 @@ std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
 
 std::optional<protocol::ServerMessage> SessionState::next() {
   if (!opened()) return {};
-  if (!std::exchange(announced_, true)) return protocol::Opened{volume_->description(), {}};
+  if (!std::exchange(announced_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
   if (!viewing_ || done_) return {};
   if (asked_) plan_->set_lod(*std::exchange(asked_, std::nullopt));
   if (credit_ < protocol::kMinCredit) return {};

@@ -35,6 +35,7 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::Open& open);
   std::optional<protocol::Fault> on(const protocol::View& view);
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
+  std::optional<protocol::Fault> on(const protocol::Have& have);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
   std::optional<protocol::ServerMessage> next_batch_or_done();
 
@@ -47,6 +48,7 @@ class SessionState {
   std::uint64_t credit_ = 0;    // outstanding
   std::uint64_t sequence_ = 0;  // of the next batch
   std::size_t target_ = 0;      // payload of the next batch, if credit allows
+  bool resumed_ = false;        // the client has updates of this very data
   bool announced_ = false;      // Opened was sent
   bool viewing_ = false;        // a View came
   bool done_ = false;           // Done was sent for epoch_

@@ -36,6 +36,20 @@ StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(s
   }
 }
 
+bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
+  const SupercubeSet& set = volume_->set();
+  const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
+  if (!found || (slots & ~set.occupancy()[found->supercube]) != 0) return false;
+  for (; slots != 0; slots &= slots - 1) {
+    const UpdateIndex i = set.place_in(found->brick, found->supercube, key, std::countr_zero(slots)).index;
+    if (sent_.contains(i)) continue;
+    sent_.insert(i);
+    ++sent_count_;
+    --waiting_[found->brick].unsent;
+  }
+  return true;
+}
+
 void StreamPlan::set_lod(const Lod& lod) {
   only_.reset();
   if (lod.max_updates) {

@@ -34,6 +34,10 @@ class StreamPlan {
  public:
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
+  // Takes for sent what the client says it has: slots of a supercube. False if the data set has no such updates. Before the first set_lod. What has
+  // not all its ancestors among them is the client's own trouble.
+  bool resume(SupercubeKey key, std::uint64_t slots);
+
   // Replaces what is wanted. lod: one that check_lod lets pass. What was sent stays sent: nothing is ever sent twice. O(bricks); with max_updates
   // O(updates).
   void set_lod(const Lod& lod);
@@ -43,7 +47,7 @@ class StreamPlan {
   std::optional<Batch> next(std::size_t max_bytes);
   [[nodiscard]] bool done() const { return waiting_bricks_ == 0; }
 
-  [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates sent so far, in all
+  [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates that the client has, in all
   // Of what is wanted for its own sake and not yet sent. All are bounds from above, and 0 when all has been sent.
   struct ToGo {
     std::uint64_t updates = 0;

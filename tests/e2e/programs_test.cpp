@@ -172,8 +172,41 @@ TEST(Programs, AServerKilledInTheMiddleLeavesNoFile) {
     if (bytes > 10000) server.process().signal(SIGKILL);
     return bytes <= 10000;
   });
-  expect_complaint(run({client(), "fetch", relay.url("buckyball"), "-o", folder / "x.vtu"}), 1, "lost the server");
+  expect_complaint(run({client(), "fetch", relay.url("buckyball"), "--reconnect", "0", "-o", folder / "x.vtu"}), 1, "lost the server");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(Programs, AStreamThatIsCutGoesOnWhereItWasAndNothingComesTwice) {
+  ServerProgram server;
+  const TempDir folder;
+  const auto whole = fetch_json({"-o", folder / "whole.vtu"}, server.url("buckyball"));
+  std::atomic<int> cuts = 0;
+  const Relay relay(server.port(), [&cuts](std::uint64_t bytes) { return bytes <= 12000 || ++cuts > 3; });
+  const auto pieces = fetch_json({"-o", folder / "pieces.vtu"}, relay.url("buckyball"));
+  EXPECT_EQ(pieces.at("reconnects"), 3);
+  for (const char* key : {"updates", "vertices", "tets", "volume"}) EXPECT_EQ(pieces.at(key), whole.at(key)) << key;
+  // Descriptions come again, and batches are cut elsewhere.
+  EXPECT_LE(pieces.at("bytes_received").get<double>(), 1.1 * whole.at("bytes_received").get<double>());
+}
+
+TEST(Programs, AServerThatIsKilledAndStartedAgainIsFoundAgain) {
+  auto server = std::make_unique<ServerProgram>();
+  const TempDir folder;
+  const auto whole = fetch_json({}, server->url("buckyball"));
+  const std::string address = "127.0.0.1:" + std::to_string(server->port());
+  std::unique_ptr<Process> second;
+  std::atomic<bool> killed = false;
+  const Relay relay(server->port(), [&](std::uint64_t bytes) {
+    if (bytes > 12000 && !killed.exchange(true)) {
+      server->process().signal(SIGKILL);
+      second = std::make_unique<Process>(std::vector<std::string>{program("intervale"), "serve", buckyball().string(), "--listen", address});
+      return false;
+    }
+    return true;
+  });
+  const auto got = fetch_json({}, relay.url("buckyball"));
+  EXPECT_GE(got.at("reconnects"), 1);
+  for (const char* key : {"updates", "vertices", "tets", "volume"}) EXPECT_EQ(got.at(key), whole.at(key)) << key;
 }
 
 TEST(Programs, SigtermEndsTheServerInOrderWhileAClientStreams) {
@@ -184,7 +217,7 @@ TEST(Programs, SigtermEndsTheServerInOrderWhileAClientStreams) {
     if (bytes > 10000 && !told.exchange(true)) server.process().signal(SIGTERM);
     return true;
   });
-  const auto fetched = run({client(), "fetch", relay.url("buckyball"), "-o", folder / "x.vtu"});
+  const auto fetched = run({client(), "fetch", relay.url("buckyball"), "--reconnect", "0", "-o", folder / "x.vtu"});
   const auto served = server.process().wait();
   EXPECT_EQ(served.status, 0) << served.err;
   EXPECT_THAT(served.err, HasSubstr("stopped"));

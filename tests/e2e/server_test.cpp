@@ -123,6 +123,13 @@ std::vector<Attack> attacks() {
        }},
       {"ViewBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(kEverything); }},
       {"CreditBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(Credit{1}); }},
+      {"HaveBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(protocol::Have{}); }},
+      {"HaveAfterView", CloseCode::out_of_order,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(kEverything);
+         c.send(protocol::Have{});
+       }},
       {"OpenTwice", CloseCode::out_of_order,
        [](RawClient& c) {
          c.send(kOpen);
@@ -158,6 +165,33 @@ TEST_P(Attacks, CloseThatSessionWithTheCodeAndTouchNoOther) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Server, Attacks, testing::ValuesIn(attacks()), [](const auto& attack) { return attack.param.name; });
+
+TEST(Server, ResumesTheSameDataOnlyAndRefusesWhatItDoesNotHave) {
+  const auto server = start();
+  RawClient first(server->port());
+  first.send(kOpen);
+  const auto opened = first.expect<Opened>();
+  EXPECT_FALSE(opened.resumed);
+  const std::uint64_t hash = opened.description.content_hash;
+  const protocol::Have nowhere{{{0, 0, supercube_key(0, {1 << 17, 0, 0}), 1}}};
+
+  Open other = kOpen;
+  other.resume = hash + 1;
+  RawClient changed(server->port());
+  changed.send(other);
+  changed.send(nowhere);
+  changed.send(kEverything);
+  EXPECT_FALSE(changed.expect<Opened>().resumed);
+  EXPECT_GT(changed.stream_to_end(), 0u) << "it starts afresh, and what it had is nobody's concern";
+
+  Open same = kOpen;
+  same.resume = hash;
+  RawClient liar(server->port());
+  liar.send(same);
+  EXPECT_TRUE(liar.expect<Opened>().resumed);
+  liar.send(nowhere);
+  EXPECT_EQ(liar.end().code, static_cast<unsigned>(CloseCode::malformed));
+}
 
 TEST(Server, NeverSendsMoreThanItWasGranted) {
   const auto server = start();

@@ -6,6 +6,8 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/write.hpp>
 #include <functional>
+#include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -49,27 +51,50 @@ void pass_on(tcp::socket& from, tcp::socket& to, const std::function<bool(std::u
 struct Relay::State {
   asio::io_context io;
   tcp::acceptor acceptor{io, kAnyPort};
-  tcp::socket client{io};
-  tcp::socket server{io};
+  std::mutex mutex;
+  bool ended = false;                         // guarded
+  std::optional<tcp::socket> client, server;  // set and cleared under the mutex, used by one connection's threads
   std::thread thread;
+
+  void pass_one_on(std::uint16_t port, const std::function<bool(std::uint64_t)>& on_bytes) {
+    Error error;
+    tcp::socket accepted(io), connected(io);
+    acceptor.accept(accepted, error);
+    if (!error) connected.connect({asio::ip::address_v4::loopback(), port}, error);
+    if (error) return;
+    {
+      const std::lock_guard lock(mutex);
+      if (ended) return;
+      client.emplace(std::move(accepted));
+      server.emplace(std::move(connected));
+    }
+    std::thread upstream([this] { pass_on(*client, *server, [](std::uint64_t) { return true; }); });
+    pass_on(*server, *client, on_bytes);
+    upstream.join();
+    const std::lock_guard lock(mutex);
+    client.reset();
+    server.reset();
+  }
+  [[nodiscard]] bool has_ended() {
+    const std::lock_guard lock(mutex);
+    return ended;
+  }
 };
 
 Relay::Relay(std::uint16_t port, std::function<bool(std::uint64_t)> on_bytes) : state_(std::make_unique<State>()) {
   state_->thread = std::thread([&state = *state_, port, on_bytes = std::move(on_bytes)] {
-    Error error;
-    state.acceptor.accept(state.client, error);
-    if (!error) state.server.connect({asio::ip::address_v4::loopback(), port}, error);
-    if (error) return;
-    std::thread upstream([&state] { pass_on(state.client, state.server, [](std::uint64_t) { return true; }); });
-    pass_on(state.server, state.client, on_bytes);
-    upstream.join();
+    while (!state.has_ended()) state.pass_one_on(port, on_bytes);
   });
 }
 
 Relay::~Relay() {
-  shut(state_->acceptor);
-  shut(state_->client);
-  shut(state_->server);
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->ended = true;
+    shut(state_->acceptor);
+    if (state_->client) shut(*state_->client);
+    if (state_->server) shut(*state_->server);
+  }
   state_->thread.join();
 }
 
