@@ -68,6 +68,14 @@ class Front {
   // The mesh, in world coordinates.
   [[nodiscard]] Mesh mesh(const ParallelFor& parallel = in_turn) const;
 
+  // Whether both are of one grid and base, and every diamond split here is split in `other` with the same side and cuts. The mesh depends on nothing
+  // else. O(front).
+  [[nodiscard]] bool is_part_of(const Front& other) const;
+
+  // Merges every diamond that is not split in `coarse`, children first: of two fronts of one stream, the finer becomes equal to the coarser. False
+  // if some could not be merged, because what `coarse` has split needs them. O(front).
+  [[nodiscard]] bool coarsen_to(const Front& coarse);
+
   // Every invariant that can be checked from inside; the first one that does not hold, as a text. For tests; O(front).
   [[nodiscard]] std::optional<std::string> validate() const;
 
@@ -117,6 +125,10 @@ class Front {
     return number == kNone ? nullptr : &blocks_[number];
   }
   Block& obtain_block(int scale, Vertex position);
+  [[nodiscard]] std::span<const std::uint8_t> cuts_of(const Split& split) const {
+    return std::span(q_).subspan(split.first, split.centre() - split.first);
+  }
+  [[nodiscard]] bool has_splits_of(const Block& block, const Front& owner) const;
   [[nodiscard]] Existing existing(const Diamond& d) const;
   [[nodiscard]] bool is_border(Vertex v) const;
   [[nodiscard]] std::uint64_t count_tets(const Diamond& d, const Existing& e, std::uint32_t sides) const;

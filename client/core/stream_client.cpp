@@ -31,6 +31,7 @@ bool StreamClient::over_budget() const { return over_budget_; }
 std::uint64_t StreamClient::updates() const { return updates_; }
 std::uint64_t StreamClient::tet_count() const { return front_.tet_count(); }
 const Description& StreamClient::description() const { return description_; }
+const Front& StreamClient::front() const { return front_; }
 Mesh StreamClient::mesh() const { return front_.mesh(); }
 
 }  // namespace intervale

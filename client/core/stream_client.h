@@ -29,6 +29,7 @@ class StreamClient {
   [[nodiscard]] std::uint64_t tet_count() const;  // of the mesh now; O(1)
   [[nodiscard]] const Description& description() const;
   [[nodiscard]] std::vector<SlotGroup> splits() const { return front_.splits(); }  // what to resume with; see Front::splits
+  [[nodiscard]] const Front& front() const;
   [[nodiscard]] Mesh mesh() const;  // linear in the size of the mesh
 
  private:

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "client/net/connection.h"
+#include "client/net/grants.h"
 
 namespace intervale {
 namespace {
@@ -17,36 +18,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t kDoneBytes = 128;  // more than a Done message takes
 constexpr std::uint64_t kEpoch = 1;        // one view for the whole stream
-
-// How much the server may send: a window that is opened again as batches are applied, and closes as the budget runs out.
-class Grants {
- public:
-  explicit Grants(std::uint64_t budget) : left_(budget) {}
-
-  // What to grant now, 0 for nothing. Small grants are saved up, for each is a message.
-  std::uint64_t take() {
-    const std::uint64_t wish = std::min(protocol::kDefaultWindow - outstanding_, left_);
-    if (wish < protocol::kDefaultWindow / 4 && wish < left_) return 0;
-    left_ -= wish;
-    outstanding_ += wish;
-    return wish;
-  }
-  bool spend(std::uint64_t cost) {  // false: the server sent more than it was granted
-    if (cost > outstanding_) return false;
-    outstanding_ -= cost;
-    return true;
-  }
-  // A session is over, and what was granted in it.
-  void forget_outstanding() {
-    left_ += outstanding_;
-    outstanding_ = 0;
-  }
-  [[nodiscard]] bool exhausted() const { return left_ == 0 && outstanding_ < protocol::kMinCredit; }  // nothing more will come
-
- private:
-  std::uint64_t left_;
-  std::uint64_t outstanding_ = 0;
-};
 
 // Waits between attempts, so that many clients of one server do not come back all at once.
 class Backoff {

@@ -55,6 +55,12 @@ CLI::App& Program::add_command(const std::string& name, const std::string& descr
   return command;
 }
 
+CLI::App& Program::only_command(std::function<Result<void>()> body) {
+  app_.require_subcommand(0);
+  commands_.emplace_back(&app_, std::move(body));
+  return app_;
+}
+
 int Program::run(int argc, const char* const* argv) {
   std::signal(SIGPIPE, SIG_IGN);  // a reader that left is an error to report
   name_in_environment(app_);

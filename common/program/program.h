@@ -34,6 +34,9 @@ class Program {
   // read; what it captures must live until run() returns.
   CLI::App& add_command(const std::string& name, const std::string& description, std::function<Result<void>()> body);
 
+  // Instead, for a program that does one thing only: its options stand without a subcommand.
+  CLI::App& only_command(std::function<Result<void>()> body);
+
   // Reads the arguments, runs the command, and returns what main returns. An error, an exception too, becomes one line on stderr,
   // "<name>: <message>", and status 1, or 2 for wrong usage (what the parser refuses, and Error::usage). Call once.
   int run(int argc, const char* const* argv);

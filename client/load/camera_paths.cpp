@@ -1,0 +1,133 @@
+#include "client/load/camera_paths.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+namespace intervale {
+namespace {
+
+using Vector = std::array<double, 3>;
+
+constexpr double kTurnSeconds = 20;
+constexpr double kZoomSeconds = 10;    // there and back
+constexpr double kNearest = 0.05;      // to a point looked at; in radii of the box
+constexpr double kSteepest = 1.0;      // of an orbit above or below the box's middle, radians
+constexpr double kMargin = 1.05;       // around a box that is in sight as a whole
+constexpr std::uint64_t kPerView = 8;  // random numbers that a view may take
+
+Vector along(const Vector& from, const Vector& direction, double distance) {
+  return {from[0] + distance * direction[0], from[1] + distance * direction[1], from[2] + distance * direction[2]};
+}
+
+// Centre and radius of the sphere around the box.
+struct Ball {
+  Vector centre{};
+  double radius = 0;
+  explicit Ball(const Box& box) {
+    for (std::size_t i = 0; i < 3; ++i) centre[i] = (box.min[i] + box.max[i]) / 2;
+    radius = std::hypot(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]) / 2;
+  }
+};
+
+// How far from the middle of a ball of radius 1 a camera sees all of it, in both directions of its picture.
+double distance_to_see_all(const Camera& camera) {
+  const double up = camera.fov * std::numbers::pi / 360;  // half of what it sees
+  const double aside = std::atan(std::tan(up) * camera.viewport[0] / camera.viewport[1]);
+  return kMargin / std::sin(std::min(up, aside));
+}
+
+// Any direction but those close to the line of sight would do: the vertical one where possible.
+Vector up_for(const Vector& direction) { return std::abs(direction[1]) < 0.9 ? Vector{0, 1, 0} : Vector{0, 0, 1}; }
+
+// Evenly spread over the sphere.
+Vector direction_of(double height, double turn) {
+  const double y = 2 * height - 1;
+  const double angle = 2 * std::numbers::pi * turn;
+  const double across = std::sqrt(std::max(0.0, 1 - y * y));
+  return {across * std::cos(angle), y, across * std::sin(angle)};
+}
+
+void look(Camera& camera, const Vector& at, const Vector& from, double distance) {
+  camera.look_at = at;
+  camera.eye = along(at, from, distance);
+  camera.up = up_for(from);
+}
+
+void orbit(Camera& camera, const CameraPath& path, const Ball& ball, double seconds) {
+  const double tilt = kSteepest * (2 * random_fraction(path.seed, 0) - 1);
+  const double angle = 2 * std::numbers::pi * (random_fraction(path.seed, 1) + seconds / kTurnSeconds);
+  const Vector from{std::cos(tilt) * std::cos(angle), std::sin(tilt), std::cos(tilt) * std::sin(angle)};
+  look(camera, ball.centre, from, ball.radius * distance_to_see_all(camera));
+}
+
+void zoom(Camera& camera, const CameraPath& path, const Ball& ball, double seconds) {
+  // A point on one of the six sides; it is approached from outside, in steps of equal ratio, so that the screen changes as much with each.
+  Vector point{};
+  for (std::size_t i = 0; i < 3; ++i) point[i] = std::lerp(path.box.min[i], path.box.max[i], random_fraction(path.seed, i));
+  const auto side = std::size_t(6 * random_fraction(path.seed, 3));
+  point[side / 2] = side % 2 == 0 ? path.box.min[side / 2] : path.box.max[side / 2];
+  Vector from{};
+  for (std::size_t i = 0; i < 3; ++i) from[i] = (point[i] - ball.centre[i]) / ball.radius;
+  double length = std::hypot(from[0], from[1], from[2]);
+  if (!(length > 0)) from[side / 2] = length = 1;  // the middle of a box without thickness
+  for (double& x : from) x /= length;
+  const double closeness = (1 - std::cos(2 * std::numbers::pi * seconds / kZoomSeconds)) / 2;
+  look(camera, point, from, ball.radius * std::pow(distance_to_see_all(camera), 1 - closeness) * std::pow(kNearest, closeness));
+}
+
+void jump(Camera& camera, const CameraPath& path, const Ball& ball, std::uint64_t number) {
+  const auto random = [&](std::uint64_t i) { return random_fraction(path.seed, number * kPerView + i); };
+  Vector at{};
+  for (std::size_t i = 0; i < 3; ++i) at[i] = std::lerp(path.box.min[i], path.box.max[i], random(i));
+  const double closeness = random(3);
+  look(camera, at, direction_of(random(4), random(5)),
+       ball.radius * std::pow(distance_to_see_all(camera), 1 - closeness) * std::pow(kNearest, closeness));
+}
+
+}  // namespace
+
+// Sebastiano Vigna, splitmix64: enough for angles, and the same everywhere, which the standard's distributions are not.
+double random_fraction(std::uint64_t seed, std::uint64_t number) {
+  std::uint64_t x = seed * 0xd1342543de82ef95u + (number + 1) * 0x9e3779b97f4a7c15u;
+  x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ x >> 27) * 0x94d049bb133111ebu;
+  return double((x ^ x >> 31) >> 11) * 0x1p-53;
+}
+
+Box box_of(const Grid& grid) {
+  Box box;
+  for (std::size_t i = 0; i < 3; ++i) {
+    box.min[i] = grid.origin[i];
+    box.max[i] = grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1);
+  }
+  return box;
+}
+
+Lod view_of(const CameraPath& path, std::uint64_t number) {
+  if (path.scenario == Scenario::full) return {};
+  const Ball ball(path.box);
+  const double seconds = double(number) / path.views_per_second;
+  Camera camera;
+  camera.viewport = path.viewport;
+  camera.pixel_error = path.pixel_error;
+  switch (path.scenario) {
+    case Scenario::full:
+      break;
+    case Scenario::orbit:
+      orbit(camera, path, ball, seconds);
+      break;
+    case Scenario::zoom:
+      zoom(camera, path, ball, seconds);
+      break;
+    case Scenario::jump:
+      jump(camera, path, ball, number);
+      break;
+  }
+  Lod lod;
+  lod.camera = camera;
+  return lod;
+}
+
+}  // namespace intervale

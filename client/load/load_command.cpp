@@ -1,0 +1,121 @@
+#include "client/load/load_command.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+
+#include "client/load/load_run.h"
+#include "common/program/progress.h"
+
+namespace intervale {
+namespace {
+
+struct LoadCommand {
+  std::string url;
+  LoadOptions load;
+  bool json = false;
+};
+
+// "3 of 50 clients failed (cannot connect …)": what makes this a failure, or nothing.
+Result<void> verdict(const LoadReport& report) {
+  const LoadFigures& figures = report.figures;
+  if (figures.failed > 0) {
+    const auto most = std::ranges::max_element(figures.errors, {}, [](const auto& error) { return error.second; });
+    const std::string why = most == figures.errors.end() ? std::string() : ": " + most->first;
+    return fail(fmt::format("{} of {} clients failed{}", figures.failed, report.clients, why));
+  }
+  if (report.differing > 0) return fail(fmt::format("{} of {} meshes differ from the reference", report.differing, report.verified.value_or(0)));
+  return {};
+}
+
+Result<void> run(const LoadCommand& options) {
+  const auto url = parse_url(options.url);
+  if (!url) return tl::unexpected(url.error());
+  if (url->name.empty()) return misuse("which data set? " + url->server() + "/NAME is wanted; see intervale-client list " + url->server());
+  const auto report = run_load(*url, options.load);
+  if (!report) return tl::unexpected(report.error());
+  if (auto printed = options.json ? print_json(to_json(*report)) : print(to_text(*report)); !printed) return printed;
+  return verdict(*report);
+}
+
+// The parser reads "nan" and "inf" as numbers, and wraps -1 around for those that cannot be negative: this refuses all of them.
+CLI::Option* within(CLI::Option* option, double least, double most, const std::string& unit) {
+  return option
+      ->check([least, most](const std::string& text) {
+        double value = 0;
+        if (!CLI::detail::lexical_cast(text, value) || !(value >= least && value <= most))
+          return fmt::format("must be {:.10g} to {:.10g}", least, most);
+        return std::string();
+      })
+      ->type_name(unit);
+}
+
+void add_seconds(CLI::App& app, const std::string& name, std::chrono::duration<double>& time, double least, const std::string& description) {
+  const auto option = app.add_option_function<double>(
+      name, [&time](double seconds) { time = std::chrono::duration<double>(seconds); }, description);
+  within(option, least, 1e6, "SECONDS");
+}
+
+void add_views(CLI::App& app, LoadOptions& load) {
+  const auto group = "Views";
+  const std::map<std::string, Scenario> scenarios{
+      {"full", Scenario::full}, {"orbit", Scenario::orbit}, {"zoom", Scenario::zoom}, {"jump", Scenario::jump}};
+  app.add_option_function<std::string>(
+         "--scenario", [&load, scenarios](const std::string& name) { load.scenario = scenarios.at(name); },
+         "full: the whole stream, once; orbit (default): around the box; zoom: to a point on it and back; jump: anywhere with each view")
+      ->check([scenarios](const std::string& name) { return std::string(scenarios.contains(name) ? "" : "must be full, orbit, zoom or jump"); })
+      ->type_name("full|orbit|zoom|jump")
+      ->group(group);
+  within(app.add_option("--views-per-second", load.views_per_second, "New views of each client; not for full")->capture_default_str(), 0.001, 1000,
+         "N")
+      ->group(group);
+  within(app.add_option("--pixel-error", load.pixel_error, "How far surfaces may be off on a screen of 1920 x 1080, in pixels; less is more load")
+             ->capture_default_str(),
+         0.001, 10000, "PX")
+      ->group(group);
+  within(app.add_option("--seed", load.seed, "Decides where clients look from")->capture_default_str(), 0, 9007199254740992.0, "N")->group(group);
+}
+
+void add_line(CLI::App& app, LoadOptions& load) {
+  const auto group = "Connections";
+  add_seconds(app, "--ramp", load.ramp, 0, "Clients connect spread evenly over this time (default 1, or the duration if that is less)");
+  app.get_option("--ramp")->group(group);
+  add_seconds(app, "--patience", load.patience, 0.1, "A client that is not connected, or has no WebSocket, after so long has failed (default 10)");
+  app.get_option("--patience")->group(group);
+  within(app.add_option_function<std::uint64_t>(
+             "--rate", [&load](std::uint64_t bytes) { load.rate = bytes; }, "Bytes a second that each client reads at most; default: no limit"),
+         4096, 1e12, "BYTES_PER_S")
+      ->group(group);
+  within(app.add_option("--window", load.window, "Credit in bytes that each client has outstanding at most: so much may come of an older view")
+             ->capture_default_str(),
+         4 * double(protocol::kMinCredit), double(protocol::kMaxWindow), "BYTES")
+      ->group(group);
+  within(app.add_option("--threads", load.threads, "Threads that the clients share; by default half of the cores"), 1, 256, "N")->group(group);
+}
+
+}  // namespace
+
+void add_load_command(Program& program) {
+  const auto options = std::make_shared<LoadCommand>();
+  LoadOptions& load = options->load;
+  load.threads = std::max(1u, std::thread::hardware_concurrency() / 2);
+  CLI::App& app = program.only_command([options] { return run(*options); });
+  app.add_option("URL", options->url, "ws://host:port/NAME")->required();
+  within(app.add_option("--clients", load.clients, "Clients at once")->required(), 1, 1e6, "N");
+  add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent; answers are waited for 2 s more at most");
+  app.get_option("--duration")->required();
+  add_views(app, load);
+  add_line(app, load);
+  app.add_flag("--verify", load.verify,
+               "Apply all that comes, and compare every mesh with one of the whole stream; takes a mesh's memory for each client");
+  add_json_flag(app, options->json);
+}
+
+}  // namespace intervale

@@ -1,0 +1,10 @@
+// The one command of intervale-load.
+#pragma once
+
+#include "common/program/program.h"
+
+namespace intervale {
+
+void add_load_command(Program& program);
+
+}  // namespace intervale

@@ -1,0 +1,200 @@
+#include "client/load/load_run.h"
+
+#include <fmt/core.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <cstddef>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "client/load/load_client.h"
+#include "client/load/verify_meshes.h"
+#include "client/net/connection.h"
+#include "client/net/fetch.h"
+#include "common/program/program.h"
+#include "common/program/progress.h"
+
+namespace intervale {
+namespace {
+
+constexpr rlim_t kOtherFiles = 64;                      // besides the clients' sockets
+constexpr std::chrono::milliseconds kThreadsStart{20};  // time for threads and clients to be made before the first one is due
+
+const char* name_of(Scenario scenario) {
+  switch (scenario) {
+    case Scenario::full:
+      return "full";
+    case Scenario::orbit:
+      return "orbit";
+    case Scenario::zoom:
+      return "zoom";
+    case Scenario::jump:
+      return "jump";
+  }
+  return "";
+}
+
+// Each client has a socket.
+Result<void> allow_files(unsigned clients) {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return {};  // the sockets will tell
+  const rlim_t wanted = clients + kOtherFiles;
+  if (limit.rlim_cur == RLIM_INFINITY || limit.rlim_cur >= wanted) return {};
+  limit.rlim_cur = limit.rlim_max;
+  (void)::setrlimit(RLIMIT_NOFILE, &limit);
+  if (limit.rlim_max != RLIM_INFINITY && limit.rlim_max < wanted) {
+    return fail(fmt::format("{} clients need {} open files, and this process may have {}: raise the limit (ulimit -n) or take fewer clients", clients,
+                            wanted, limit.rlim_max));
+  }
+  return {};
+}
+
+// What the server says of the data set: cameras go around its box.
+Result<Description> describe(const ServerUrl& url) {
+  auto connection = StreamConnection::open(url);
+  if (!connection) return tl::unexpected(connection.error());
+  if (auto sent = connection->send(protocol::Open{url.name, "intervale-load " INTERVALE_VERSION, 0, {}}); !sent) return tl::unexpected(sent.error());
+  auto answer = connection->receive();
+  if (!answer) return tl::unexpected(answer.error());
+  auto* opened = std::get_if<protocol::Opened>(&*answer);
+  if (opened == nullptr) return fail("the server at " + url.authority() + " sent nonsense: something else than the data set's description");
+  if (auto ok = check_description(opened->description); !ok) {
+    return fail("the server at " + url.authority() + " describes no volume: " + ok.error().message);
+  }
+  connection->close();
+  return std::move(opened->description);
+}
+
+LoadClock::duration ticks(std::chrono::duration<double> time) { return std::chrono::duration_cast<LoadClock::duration>(time); }
+
+LoadPlan plan_of(const ServerUrl& url, const LoadOptions& options, const Description& description) {
+  LoadPlan plan;
+  plan.url = url;
+  plan.description = description;
+  plan.path.scenario = options.scenario;
+  plan.path.box = box_of(description.grid);
+  plan.path.pixel_error = options.pixel_error;
+  plan.path.views_per_second = options.views_per_second;
+  plan.path.seed = options.seed;
+  plan.clients = options.clients;
+  plan.duration = ticks(options.duration);
+  plan.ramp = ticks(std::min(options.ramp, options.duration));
+  plan.rate = options.rate;
+  plan.window = options.window;
+  plan.patience = ticks(options.patience);
+  plan.verify = options.verify;
+  plan.start = LoadClock::now() + kThreadsStart;
+  return plan;
+}
+
+double cpu_seconds(int whose) {
+  rusage usage{};
+  ::getrusage(whose, &usage);
+  const auto seconds = [](const timeval& time) { return double(time.tv_sec) + 1e-6 * double(time.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// Threads that run clients, and what they bring back.
+class Crew {
+ public:
+  Crew(const LoadPlan& plan, unsigned threads) : meshes_(plan.clients), running_(threads) {
+    for (unsigned first = 0; first < threads; ++first) {
+      threads_.emplace_back([this, &plan, first, threads] { work(plan, first, threads); });
+    }
+  }
+
+  // Once a second, says on a terminal how far it is; until all have ended.
+  void watch(const LoadPlan& plan) {
+    Progress line("loading " + plan.url.name);
+    std::uint64_t updates = 0, bytes = 0;
+    std::unique_lock lock(mutex_);
+    while (!ended_.wait_for(lock, std::chrono::seconds(1), [this] { return running_ == 0; })) {
+      const std::uint64_t updates_now = progress_.updates, bytes_now = progress_.bytes;
+      line.text(fmt::format("{} of {} clients, {} updates/s, {}/s", progress_.connected.load(), plan.clients, updates_now - updates,
+                            human_bytes(bytes_now - bytes)));
+      updates = updates_now;
+      bytes = bytes_now;
+    }
+  }
+
+  LoadFigures figures() {
+    for (std::thread& thread : threads_) thread.join();
+    if (failure_) std::rethrow_exception(failure_);
+    return std::move(figures_);
+  }
+
+  [[nodiscard]] double busiest_thread() const { return busiest_; }  // its CPU seconds
+  std::vector<std::optional<StreamClient>>& meshes() { return meshes_; }
+
+ private:
+  void work(const LoadPlan& plan, unsigned first, unsigned step) {
+    LoadFigures figures;
+    std::exception_ptr failure;
+    try {
+      figures = run_clients(plan, first, step, meshes_, progress_);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    const std::lock_guard lock(mutex_);
+    figures_.add(std::move(figures));
+    busiest_ = std::max(busiest_, cpu_seconds(RUSAGE_THREAD));
+    if (failure) failure_ = failure;
+    --running_;
+    ended_.notify_one();
+  }
+
+  std::vector<std::optional<StreamClient>> meshes_;
+  LoadProgress progress_;
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  unsigned running_;
+  LoadFigures figures_;
+  double busiest_ = 0;
+  std::exception_ptr failure_;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace
+
+Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
+  if (auto allowed = allow_files(options.clients); !allowed) return tl::unexpected(allowed.error());
+  const auto description = describe(url);
+  if (!description) return tl::unexpected(description.error());
+  std::optional<StreamClient> reference;
+  if (options.verify) {
+    FetchOptions everything;
+    everything.reconnect = std::chrono::seconds(0);
+    auto fetched = fetch(url, everything, {});
+    if (!fetched) return tl::unexpected(fetched.error());
+    reference = std::move(fetched->client);
+  }
+
+  LoadReport report;
+  report.scenario = name_of(options.scenario);
+  report.clients = options.clients;
+  report.threads = std::min(options.threads, options.clients);
+  const double cpu_before = cpu_seconds(RUSAGE_SELF);
+  const LoadPlan plan = plan_of(url, options, *description);
+  Crew crew(plan, report.threads);
+  crew.watch(plan);
+  report.figures = crew.figures();
+  const std::chrono::duration<double> wall = LoadClock::now() - plan.start;
+  report.seconds = std::min(wall, options.duration).count();
+  report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));
+  report.busiest_thread = crew.busiest_thread() / wall.count();
+  if (reference) {
+    const auto [compared, differing] = verify_meshes(reference->front(), crew.meshes(), options.seed);
+    report.verified = compared;
+    report.differing = differing;
+  }
+  return report;
+}
+
+}  // namespace intervale

@@ -1,0 +1,158 @@
+// The load harness as its users have it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/e2e/support/peers.h"
+#include "tests/e2e/support/programs.h"
+
+namespace intervale {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::vector<std::string> command(const std::string& url, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments{program("intervale-load"), url};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+nlohmann::json load(const std::string& url, std::vector<std::string> more) {
+  more.emplace_back("--json");
+  const Finished finished = run(command(url, more));
+  EXPECT_EQ(finished.status, 0) << finished.err;
+  EXPECT_EQ(finished.err, "");
+  auto json = nlohmann::json::parse(finished.out, nullptr, false);
+  EXPECT_EQ(json.at("failed"), 0) << json;
+  EXPECT_EQ(json.at("errors"), 0) << json;
+  return json;
+}
+
+void expect_complaint(const Finished& finished, int status, const std::string& about) {
+  EXPECT_EQ(finished.status, status) << finished.err;
+  EXPECT_THAT(finished.err, StartsWith("intervale-load: "));
+  EXPECT_THAT(finished.err, HasSubstr(about));
+  EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
+  EXPECT_EQ(finished.out, "");
+}
+
+TEST(Load, FullBringsEveryClientTheWholeStream) {
+  ServerProgram server;
+  const auto info = nlohmann::json::parse(run({program("intervale"), "info", buckyball(), "--json"}).out);
+  const auto figures = load(server.url("buckyball"), {"--clients", "7", "--duration", "60", "--scenario", "full", "--ramp", "0.1", "--verify"});
+  EXPECT_EQ(figures.at("clients"), 7);
+  EXPECT_EQ(figures.at("connected"), 7);
+  EXPECT_EQ(figures.at("complete"), 7);
+  EXPECT_EQ(figures.at("verified"), 7);
+  EXPECT_EQ(figures.at("views"), 7);
+  EXPECT_EQ(figures.at("updates"), 7 * info.at("updates").get<std::uint64_t>());
+  EXPECT_GT(figures.at("bytes"), 0);
+  EXPECT_LT(figures.at("seconds"), 60.0);
+  EXPECT_GT(figures.at("updates_per_s"), 0.0);
+  EXPECT_GT(figures.at("bytes_per_s"), 0.0);
+  for (const char* key : {"first_mesh_ms", "first_mesh_bytes", "view_change_ms"}) {
+    const auto& p = figures.at(key);
+    EXPECT_GT(p.at("p50"), 0.0) << key;
+    EXPECT_LE(p.at("p50"), p.at("p95")) << key;
+    EXPECT_LE(p.at("p95"), p.at("p99")) << key;
+  }
+}
+
+class LoadScenarios : public testing::TestWithParam<const char*> {};
+
+TEST_P(LoadScenarios, EveryViewIsAnswered) {
+  ServerProgram server;
+  const auto figures = load(server.url("buckyball"), {"--clients", "5", "--duration", "0.8", "--ramp", "0.2", "--scenario", GetParam(),
+                                                      "--views-per-second", "10", "--seed", "3", "--threads", "2", "--verify"});
+  EXPECT_EQ(figures.at("connected"), 5);
+  EXPECT_EQ(figures.at("verified"), 5);
+  EXPECT_GT(figures.at("views"), 5);
+  EXPECT_EQ(figures.at("unanswered_views"), 0);
+  EXPECT_GT(figures.at("view_change_ms").at("p99"), 0.0);
+  EXPECT_GT(figures.at("first_mesh_ms").at("p50"), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Load, LoadScenarios, testing::Values("orbit", "zoom", "jump"));
+
+TEST(Load, ARateIsKeptTo) {
+  ServerProgram server;
+  const auto figures = load(server.url("buckyball"), {"--clients", "2", "--duration", "0.5", "--ramp", "0", "--scenario", "full", "--rate", "40000"});
+  EXPECT_EQ(figures.at("complete"), 0);
+  EXPECT_GT(figures.at("bytes"), 0);
+  EXPECT_LE(figures.at("bytes_per_s"), 2 * 40000.0);
+  EXPECT_GE(figures.at("first_mesh_ms").at("p50").get<double>(), 1000 * figures.at("first_mesh_bytes").at("p50").get<double>() / 40000);
+}
+
+TEST(Load, FiguresForPeople) {
+  ServerProgram server;
+  const auto finished = run(command(server.url("buckyball"), {"--clients", "2", "--duration", "0.2"}));
+  EXPECT_EQ(finished.status, 0) << finished.err;
+  EXPECT_THAT(finished.out, HasSubstr("2 of 2 clients connected, 0 failed"));
+  EXPECT_THAT(finished.out, HasSubstr("view change"));
+  EXPECT_EQ(finished.err, "");
+}
+
+TEST(Load, ADatasetOfTheEnvironment) {
+  ServerProgram server;
+  ::setenv("INTERVALE_CLIENTS", "3", 1);
+  const auto figures = load(server.url("buckyball"), {"--duration", "0.1", "--scenario", "full"});
+  ::unsetenv("INTERVALE_CLIENTS");
+  EXPECT_EQ(figures.at("clients"), 3);
+}
+
+TEST(Load, AServerThatDiesIsStatus1WithFigures) {
+  for (const int signal : {SIGKILL, SIGTERM}) {
+    ServerProgram server;
+    Process load(command(server.url("buckyball"), {"--clients", "4", "--duration", "60", "--ramp", "0", "--json"}));
+    ASSERT_TRUE(server.process().wait_for("session 4 "));  // after the one that asks about the data set
+    server.process().signal(signal);
+    const Finished finished = load.wait();
+    EXPECT_EQ(finished.status, 1);
+    EXPECT_THAT(finished.err, StartsWith("intervale-load: 4 of 4 clients failed: "));
+    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
+    const auto figures = nlohmann::json::parse(finished.out, nullptr, false);
+    EXPECT_EQ(figures.at("failed"), 4) << finished.out;
+    EXPECT_EQ(figures.at("errors"), 4) << finished.out;
+    if (signal == SIGTERM) {
+      EXPECT_GT(figures.at("protocol_closes"), 0) << finished.out;
+    }
+  }
+}
+
+TEST(Load, ServersThatCannotBeLoadedAreOneLine) {
+  expect_complaint(run(command("ws://127.0.0.1:1/x", {"--clients", "1", "--duration", "1"})), 1, "cannot connect to 127.0.0.1:1");
+  ServerProgram server;
+  expect_complaint(run(command(server.url("fullerene"), {"--clients", "1", "--duration", "1"})), 1, "no data set 'fullerene'");
+  const Stranger stranger("220 mail ready\r\n");
+  expect_complaint(run(command(stranger.url("x"), {"--clients", "1", "--duration", "1"})), 1, "is not an intervale server");
+}
+
+TEST(Load, WrongUsageIsStatus2) {
+  const std::string url = "ws://127.0.0.1:1/x";
+  const std::vector<std::string> good{"--clients", "1", "--duration", "1"};
+  const auto with = [&good](std::vector<std::string> more) {
+    more.insert(more.end(), good.begin(), good.end());
+    return more;
+  };
+  expect_complaint(run({program("intervale-load")}), 2, "URL");
+  expect_complaint(run(command(url, {"--duration", "1"})), 2, "--clients");
+  expect_complaint(run(command(url, {"--clients", "1"})), 2, "--duration");
+  expect_complaint(run(command(url, {"--clients", "0", "--duration", "1"})), 2, "--clients");
+  expect_complaint(run(command(url, {"--clients", "-1", "--duration", "1"})), 2, "--clients");
+  expect_complaint(run(command(url, {"--clients", "1", "--duration", "nan"})), 2, "--duration");
+  expect_complaint(run(command(url, with({"--scenario", "dance"}))), 2, "orbit");
+  expect_complaint(run(command(url, with({"--rate", "1"}))), 2, "--rate");
+  expect_complaint(run(command(url, with({"--views-per-second", "0"}))), 2, "--views-per-second");
+  expect_complaint(run(command("ws://127.0.0.1:1", good)), 2, "NAME");
+  expect_complaint(run(command("http://127.0.0.1:1/x", good)), 2, "ws://");
+}
+
+}  // namespace
+}  // namespace intervale

@@ -1,0 +1,90 @@
+#include "client/load/verify_meshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "server/build/field_hierarchy.h"
+#include "server/serve/stream_plan.h"
+#include "support/analytic_fields.h"
+
+namespace intervale {
+namespace {
+
+std::shared_ptr<const IntervalVolume> made(const Range& range) {
+  auto sigma = FieldHierarchy(testing::gyroid({13, 9, 11}), {.range = range}).compact();
+  EXPECT_TRUE(sigma);
+  return std::make_shared<const IntervalVolume>(std::move(*sigma));
+}
+
+// A client that has so many batches of the stream.
+StreamClient streamed(const std::shared_ptr<const IntervalVolume>& volume, int batches) {
+  StreamPlan plan(volume);
+  plan.set_lod({});
+  auto client = StreamClient::start(volume->description());
+  EXPECT_TRUE(client);
+  for (; batches > 0; --batches) {
+    const auto batch = plan.next(1024);
+    if (!batch) break;
+    EXPECT_TRUE(client->apply(batch->payload));
+  }
+  return std::move(*client);
+}
+
+TEST(VerifyMeshes, PartsOfTheStreamPass) {
+  const auto volume = made({-0.3, 0.2});
+  std::vector<std::optional<StreamClient>> clients;
+  for (int batches : {0, 1, 2, 3, 5, 1000}) {
+    clients.emplace_back(streamed(volume, batches));
+    clients.emplace_back();  // one that failed
+  }
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    const auto verified = verify_meshes(streamed(volume, 1000).front(), clients, seed);
+    EXPECT_EQ(verified.compared, 6u);
+    EXPECT_EQ(verified.differing, 0u);
+  }
+}
+
+TEST(VerifyMeshes, AnotherMeshIsFound) {
+  const auto volume = made({-0.3, 0.2});
+  std::vector<std::optional<StreamClient>> clients;
+  for (int i = 0; i < 6; ++i) clients.emplace_back(streamed(volume, i));
+  clients.emplace_back(streamed(made({-0.3, 0.21}), 1000));
+  const auto verified = verify_meshes(streamed(volume, 1000).front(), clients, 1);
+  EXPECT_EQ(verified.compared, 7u);
+  EXPECT_EQ(verified.differing, 1u);
+}
+
+TEST(VerifyMeshes, NumbersOfPointsAndTetrahedraDoNotMatter) {
+  const Mesh mesh = streamed(made({-0.3, 0.2}), 1000).mesh();
+  std::mt19937 random(1);
+  std::vector<std::uint32_t> place(mesh.points.size());
+  for (std::uint32_t i = 0; i < place.size(); ++i) place[i] = i;
+  std::shuffle(place.begin(), place.end(), random);
+  Mesh shuffled = mesh;
+  for (std::uint32_t i = 0; i < place.size(); ++i) {
+    shuffled.points[place[i]] = mesh.points[i];
+    shuffled.surface[place[i]] = mesh.surface[i];
+  }
+  for (auto& tet : shuffled.tets) {
+    for (auto& point : tet) point = place[point];
+  }
+  std::shuffle(shuffled.tets.begin(), shuffled.tets.end(), random);
+  EXPECT_TRUE(are_equal(mesh, shuffled));
+
+  Mesh other = shuffled;
+  other.points[7][1] += 1e-9;
+  EXPECT_FALSE(are_equal(mesh, other));
+  other = shuffled;
+  other.tets[3] = other.tets[4];
+  EXPECT_FALSE(are_equal(mesh, other));
+  other = shuffled;
+  other.tets.pop_back();
+  EXPECT_FALSE(are_equal(mesh, other));
+}
+
+}  // namespace
+}  // namespace intervale
