@@ -79,6 +79,7 @@ IntervalVolume::IntervalVolume(Parts parts)
   const auto unit = float(yield_unit(description_.grid, error_levels_.empty() ? 0.0 : double(error_levels_.back())));
   for (unsigned step = 0; step < factor_.size(); ++step) factor_[step] = Yield(std::uint8_t(step)).ratio(unit);
   brick_object_error_.resize(set_.bricks().size());
+  supercube_level_.reserve(set_.supercubes());
   brick_first_.reserve(set_.bricks().size());
   first_in_brick_.reserve(set_.supercubes());
   brick_level_.reserve(set_.bricks().size());
@@ -89,11 +90,14 @@ IntervalVolume::IntervalVolume(Parts parts)
     set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
       first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
       const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
+      unsigned most = 0;
       for (UpdateIndex i = first; i < end; ++i) {
         n += codes_[i].coefficients();
-        brick_level_[b] = std::max(brick_level_[b], std::uint16_t(codes_[i].error_level()));
-        brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), i));
+        most = std::max(most, codes_[i].error_level());
       }
+      supercube_level_.push_back(std::uint8_t(most / 2));
+      brick_level_[b] = std::max(brick_level_[b], std::uint16_t(most));
+      brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
     });
   }
 }
@@ -132,8 +136,8 @@ UpdateView IntervalVolume::update(const Place& p) const {
 
 std::size_t IntervalVolume::memory_bytes() const {
   return sizeof *this + description_.base.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
-         brick_level_.size() * 2 + brick_object_error_.size() * 4 + yields_.size() + first_in_brick_.size() * 2 + differences_.size() +
-         error_levels_.size() * sizeof(float);
+         brick_level_.size() * 2 + brick_object_error_.size() * 4 + yields_.size() + supercube_level_.size() + first_in_brick_.size() * 2 +
+         differences_.size() + error_levels_.size() * sizeof(float);
 }
 
 Result<void> IntervalVolume::validate() const {

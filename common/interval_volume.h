@@ -93,10 +93,14 @@ class IntervalVolume {
   [[nodiscard]] std::span<const float> error_levels() const { return error_levels_; }
   [[nodiscard]] std::span<const UpdateCode> codes() const { return codes_; }
   [[nodiscard]] std::span<const std::uint8_t> differences() const { return differences_; }
-  // How far the surfaces can still move where an update's diamond is refined to the end, in world units: no less, as far as is known, and for all of
-  // a supercube's updates by one factor. Not saturated.
-  [[nodiscard]] float object_error(std::uint32_t supercube, int scale, UpdateIndex i) const {
-    return std::min(error(i) * factor_[yields_[supercube].step()], reach_ * float(1 << scale));
+  // No lower than the level of error of any of a supercube's updates, and hardly higher.
+  [[nodiscard]] unsigned supercube_error_level(std::uint32_t supercube) const {
+    return std::min(2u * supercube_level_[supercube] + 1, unsigned(error_levels_.size()) - 1);
+  }
+  // How far the surfaces can still move where an update's diamond is refined to the end, in world units: no less, as far as is known. By its
+  // supercube, that one's scale, and the update's level of error, with which it grows. Not saturated.
+  [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned level) const {
+    return std::min(error_levels_[level] * factor_[yields_[supercube].step()], reach_ * float(1 << scale));
   }
   [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
   [[nodiscard]] std::span<const Yield> yields() const { return yields_; }
@@ -119,10 +123,11 @@ class IntervalVolume {
   std::vector<std::uint16_t> brick_level_;     // the highest level of error, of each brick
   std::vector<std::uint8_t> differences_;
   std::vector<float> error_levels_;
-  std::vector<Yield> yields_;              // by supercube
-  std::vector<float> brick_object_error_;  // the largest of its updates
-  std::array<float, 256> factor_;          // of each step of a Yield
-  float reach_ = 0;                        // no surface moves further, for h = 1: what a diamond measures across
+  std::vector<Yield> yields_;                  // by supercube
+  std::vector<std::uint8_t> supercube_level_;  // by supercube: half the highest level of its updates, rounded down
+  std::vector<float> brick_object_error_;      // the largest of its updates
+  std::array<float, 256> factor_;              // of each step of a Yield
+  float reach_ = 0;                            // no surface moves further, for h = 1: what a diamond measures across
 };
 
 // What Yields are in units of.

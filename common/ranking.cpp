@@ -54,46 +54,54 @@ bool Ranking::meets_roi(const Diamond& d) const {
   return true;
 }
 
-Ranking::Rank Ranking::of_brick(std::uint32_t brick) const {
+Ranking::Brick Ranking::of_brick(std::uint32_t brick) const {
+  Brick b;
+  b.ranking_ = this;
   const unsigned level = volume_.brick_error_level(brick);
-  if (level < level_) return 0;
   const SupercubeKey key = volume_.set().bricks()[brick].key;
-  if (!roi_ && !view_) return Rank(level + 1);
+  b.scale_ = scale_of_key(key);
+  if (level < level_) return b;
+  if (!roi_ && !view_) {
+    b.bound_ = Rank(level + 1);
+    return b;
+  }
   const View::Region region = region_of(key, 4);
   for (int i = 0; i < 3 && roi_; ++i) {
-    if (region.middle[i] + region.reach[i] < roi_->min[i] || region.middle[i] - region.reach[i] > roi_->max[i]) return 0;
+    if (region.middle[i] + region.reach[i] < roi_->min[i] || region.middle[i] - region.reach[i] > roi_->max[i]) return b;
   }
-  if (!view_) return Rank(level + 1);
-  const float pixels = volume_.brick_object_error(brick) * float(view_->pixels_per_unit(region));
-  return pixels > pixel_error_ ? rank_of(pixels) : 0;
+  if (!view_) {
+    b.bound_ = Rank(level + 1);
+    return b;
+  }
+  b.pixels_ = float(view_->pixels_per_unit(region));
+  b.near_ = view_->is_near(region);
+  const float pixels = volume_.brick_object_error(brick) * b.pixels_;
+  if (pixels > pixel_error_) b.bound_ = rank_of(pixels);
+  b.aside_ = view_->is_central(region) ? 0 : kAside;  // the middle of the picture a little sooner
+  if (!b.near_ && b.bound_ != 0) b.bound_ = Rank(b.bound_ - b.aside_);
+  return b;
 }
 
-Ranking::Supercube Ranking::of_supercube(std::uint32_t supercube, SupercubeKey key) const {
-  Supercube s(*this, supercube, key);
-  s.scale_ = scale_of_key(key);
-  if (view_) {
-    const View::Region region = region_of(key, 1);
-    s.pixels_ = float(view_->pixels_per_unit(region));
-    s.central_ = view_->is_central(region);
+Ranking::Supercube Ranking::Brick::supercube(std::uint32_t supercube, SupercubeKey key) const {
+  Supercube s;
+  s.ranking_ = ranking_;
+  s.supercube_ = supercube;
+  s.key_ = key;
+  s.scale_ = scale_;
+  s.pixels_ = pixels_;
+  s.aside_ = aside_;
+  if (near_) {
+    const View::Region region = ranking_->region_of(key, 1);
+    s.pixels_ = float(ranking_->view_->pixels_per_unit(region));
+    s.aside_ = ranking_->view_->is_central(region) ? 0 : kAside;
   }
   return s;
-}
-
-Ranking::Rank Ranking::Supercube::operator()(UpdateIndex i, int slot) const {
-  const IntervalVolume& volume = ranking_.volume_;
-  const unsigned level = volume.error_level(i);
-  if (level < ranking_.level_) return 0;
-  if (ranking_.roi_ && !ranking_.meets_roi(Diamond(centre_of(key_, slot)))) return 0;
-  if (!ranking_.view_) return Rank(level + 1);
-  const float pixels = volume.object_error(supercube_, scale_, i) * pixels_;
-  if (!(pixels > ranking_.pixel_error_)) return 0;
-  return Rank(rank_of(pixels) - (central_ ? 0 : kAside));  // the middle of the picture a little sooner
 }
 
 double Ranking::bound(Rank rank) const {
   if (rank == 0) return 0;
   if (!view_) return double(volume_.error_levels()[rank - 1u]);
-  return double(std::bit_cast<float>(std::uint32_t(rank + 1 + kAside + kRankFrom) << kRankShift));
+  return double(pixels_of(rank + 1 + kAside));
 }
 
 Ranking::Rank Ranking::band_below(Rank top) const {

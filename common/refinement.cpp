@@ -30,9 +30,10 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
   SplitSet wanted(volume.size());
   const SupercubeSet& set = volume.set();
   for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
-    if (ranking.of_brick(b) == 0) continue;
+    const Ranking::Brick brick = ranking.of_brick(b);
+    if (brick.bound() == 0) continue;
     set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
-      const Ranking::Supercube rank = ranking.of_supercube(s, key);
+      const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
       for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
         if (rank(i, std::countr_zero(left)) != 0) wanted.insert(i);
@@ -48,8 +49,9 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& 
   const SupercubeSet& set = volume.set();
   std::vector<Ranking::Rank> ranks(volume.size());
   for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+    const Ranking::Brick brick = ranking.of_brick(b);
     set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
-      const Ranking::Supercube rank = ranking.of_supercube(s, key);
+      const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
       for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
         if (updates.contains(i)) ranks[i] = rank(i, std::countr_zero(left));

@@ -15,9 +15,7 @@ std::uint64_t SplitSet::slots(const SupercubeSet& set, std::uint32_t brick, std:
   // The supercube's bits stand together, in at most two words.
   const UpdateIndex first = set.first(brick, supercube);
   const std::uint64_t occupancy = set.occupancy()[supercube];
-  const unsigned shift = first % 64, count = unsigned(std::popcount(occupancy));
-  std::uint64_t bits = words_[first / 64] >> shift;
-  if (shift + count > 64) bits |= words_[first / 64 + 1] << (64 - shift);
+  std::uint64_t bits = some(first, unsigned(std::popcount(occupancy)));
   std::uint64_t slots = 0;
   for (std::uint64_t left = occupancy; left != 0; left &= left - 1, bits >>= 1) slots |= left & (~left + 1) & (~(bits & 1) + 1);
   return slots;

@@ -16,18 +16,12 @@ class SplitSet {
  public:
   explicit SplitSet(UpdateIndex size = 0) : words_((std::size_t(size) + 63) / 64) {}
   [[nodiscard]] bool contains(UpdateIndex i) const { return words_[i / 64] >> (i % 64) & 1; }
-  // Whether all of [begin, end) are in it.
-  [[nodiscard]] bool contains_all(UpdateIndex begin, UpdateIndex end) const {
-    for (; begin < end && begin % 64 != 0; ++begin) {
-      if (!contains(begin)) return false;
-    }
-    for (; begin + 64 <= end; begin += 64) {
-      if (words_[begin / 64] != ~std::uint64_t(0)) return false;
-    }
-    for (; begin < end; ++begin) {
-      if (!contains(begin)) return false;
-    }
-    return true;
+  // Which of `count` updates from `first` on are in it, a bit each; count in [1, 64].
+  [[nodiscard]] std::uint64_t some(UpdateIndex first, unsigned count) const {
+    const unsigned shift = first % 64;
+    std::uint64_t bits = words_[first / 64] >> shift;
+    if (shift + count > 64) bits |= words_[first / 64 + 1] << (64 - shift);
+    return bits & (~std::uint64_t(0) >> (64 - count));
   }
   void insert(UpdateIndex i) { words_[i / 64] |= std::uint64_t(1) << (i % 64); }
   void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }

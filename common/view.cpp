@@ -31,29 +31,48 @@ View::View(const Camera& camera, const Grid& grid) : origin_(grid.origin), spaci
   scale_ = camera.viewport[1] / (2 * tan_y_);
   cos_corner_ = 1 / std::hypot(1.0, tan_x_, tan_y_);
   least_depth_ = 1e-3 * std::min({spacing_[0], spacing_[1], spacing_[2]});
-  const auto inward = [this](const Vector& across, double sign, double tangent) {
-    Vector n;
-    for (int i = 0; i < 3; ++i) n[i] = tangent * ahead_[i] + sign * across[i];
-    return unit(n);
+  const auto side = [this](const Vector& across, double sign, double tangent) {
+    Vector n, e;
+    for (int i = 0; i < 3; ++i) {
+      n[i] = tangent * ahead_[i] + sign * across[i];
+      e[i] = ahead_[i] - sign * tangent * across[i];
+    }
+    return Side{unit(n), unit(e)};
   };
-  inward_ = {inward(right_, 1, tan_x_), inward(right_, -1, tan_x_), inward(up_, 1, tan_y_), inward(up_, -1, tan_y_)};
+  sides_ = {side(right_, 1, tan_x_), side(right_, -1, tan_x_), side(up_, 1, tan_y_), side(up_, -1, tan_y_)};
 }
 
 double View::pixels_per_unit(const Region& region) const {
   Vector at, reach;
-  double gap2 = 0;  // to the nearest point of the region
+  double gap2 = 0, far2 = 0;  // to the nearest point of the region, and to its furthest corner
   for (int i = 0; i < 3; ++i) {
     at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
     reach[i] = spacing_[i] * region.reach[i];
     const double gap = std::max(0.0, std::abs(at[i]) - reach[i]);
     gap2 += gap * gap;
+    far2 += (std::abs(at[i]) + reach[i]) * (std::abs(at[i]) + reach[i]);
   }
   // What the picture shows of the region is no nearer than that.
   const double depth = std::max({dot(at, ahead_) - reach_along(reach, ahead_), std::sqrt(gap2) * cos_corner_, least_depth_});
-  double outside = 0;  // how far the whole region is beyond a side of what is seen
-  for (const Vector& n : inward_) outside = std::max(outside, -dot(at, n) - reach_along(reach, n));
+  // How far the whole region is beyond a side of what is seen; from a right angle on, how far from the side's edge line.
+  double outside = 0;
+  for (const Side& s : sides_) {
+    const double beyond = -dot(at, s.inward) - reach_along(reach, s.inward), behind = -dot(at, s.edge) - reach_along(reach, s.edge);
+    if (beyond > 0) outside = std::max(outside, behind > 0 ? std::hypot(beyond, behind) : beyond);
+  }
   if (outside == 0) return scale_ / depth;
-  return scale_ / (depth * (1 + kFade * outside / std::hypot(at[0], at[1], at[2])));
+  return scale_ / (depth * (1 + kFade * outside / std::sqrt(far2)));
+}
+
+bool View::is_near(const Region& region) const {
+  double across2 = 0, gap2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double at = origin_[i] + spacing_[i] * region.middle[i] - eye_[i], reach = spacing_[i] * region.reach[i];
+    const double gap = std::max(0.0, std::abs(at) - reach);
+    across2 += 4 * reach * reach;
+    gap2 += gap * gap;
+  }
+  return gap2 < 9 * across2;
 }
 
 bool View::is_central(const Region& region) const {

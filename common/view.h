@@ -21,8 +21,11 @@ class View {
     std::array<double, 3> middle{}, reach{};
   };
   // Pixels that a deviation of one world unit within the region shows as, at most; less the further the region is outside the picture. Finite, above
-  // 0.
+  // 0, and no less than those of any region inside it.
   [[nodiscard]] double pixels_per_unit(const Region& region) const;
+
+  // Whether it takes up so much of the view that its parts look of different sizes: by more than a third.
+  [[nodiscard]] bool is_near(const Region& region) const;
 
   // Whether the middle of the region lies in the middle of the picture: within half its width and half its height.
   [[nodiscard]] bool is_central(const Region& region) const;
@@ -31,11 +34,14 @@ class View {
   using Vector = std::array<double, 3>;
   Vector origin_, spacing_;          // of the grid
   Vector eye_, right_, up_, ahead_;  // the camera's axes have length 1
-  std::array<Vector, 4> inward_;     // normals of the sides of what it sees
-  double scale_ = 0;                 // pixels of one unit across, one unit ahead
-  double least_depth_ = 0;           // nothing is taken to be nearer
-  double tan_x_ = 0, tan_y_ = 0;     // of half the angles of view
-  double cos_corner_ = 0;            // of the angle between the line of sight and the picture's corners
+  struct Side {
+    Vector inward, edge;  // of a side of what it sees: the normal, and the line in its middle, away from the eye
+  };
+  std::array<Side, 4> sides_;
+  double scale_ = 0;              // pixels of one unit across, one unit ahead
+  double least_depth_ = 0;        // nothing is taken to be nearer
+  double tan_x_ = 0, tan_y_ = 0;  // of half the angles of view
+  double cos_corner_ = 0;         // of the angle between the line of sight and the picture's corners
 };
 
 }  // namespace intervale

@@ -19,10 +19,12 @@ namespace {
 
 constexpr int kTopScale = 4;  // cubes of this scale are gone through one by one; coarser diamonds keep their width
 
+constexpr double kNudge = 1.0 / (1 << 16);  // of a sample: so far into the box are points on its far sides taken to be
+
 // A point where the field crosses a surface.
 struct Crossing {
   std::array<float, 4> at;  // barycentric coordinates
-  float value;              // alpha or beta
+  float value;              // alpha or beta; all values are counted from Cubes::zero_, so that floats will do
 };
 
 struct Corner {
@@ -54,9 +56,9 @@ class Cubes {
  public:
   Cubes(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& moves)
       : field_(field), grid_(grid), domain_(domain), set_(set), moves_(moves), width_(diamond_width(grid)) {
-    for (const double surface : {range.alpha, range.beta}) {
-      if (std::isfinite(surface) && (surfaces_ == 0 || surface != surface_[0])) surface_[surfaces_++] = surface;
-    }
+    if (std::isfinite(range.alpha)) surface_[surfaces_++] = {range.alpha, false};
+    if (std::isfinite(range.beta)) surface_[surfaces_++] = {range.beta, true};
+    if (surfaces_ > 0) zero_ = surface_[0].value;
   }
 
   // All that is inside one diamond of class 0. crossings: room to work in.
@@ -69,22 +71,38 @@ class Cubes {
     const std::array<std::ptrdiff_t, 3> step{1, last.x + 1, std::ptrdiff_t(last.x + 1) * (last.y + 1)};
     const Vertex begin{std::max(0, from.x), std::max(0, from.y), std::max(0, from.z)};
     const Vertex end{std::min(last.x, from.x + side), std::min(last.y, from.y + side), std::min(last.z, from.z + side)};
+    // What lies in a far side of the box belongs to the tetrahedra before it, not to those behind, which clamping makes flat.
+    const std::array<std::int32_t, 3> low{from.x, from.y, from.z};
+    const std::array<double, 3> most{last.x - from.x - kNudge, last.y - from.y - kNudge, last.z - from.z - kNudge};
     const Vertex start = cube.vertex(0);  // of the spine
     const std::array<bool, 3> flip{start.x != from.x, start.y != from.y, start.z != from.z};
     for (std::int32_t z = begin.z; z <= end.z; ++z) {
       for (std::int32_t y = begin.y; y <= end.y; ++y) {
         const T* const row = &field_.samples[field_.index({0, y, z})];
         for (std::int32_t x = begin.x; x <= end.x; ++x) {
-          for (int axis = 0; axis < 3; ++axis) {
-            if (axis == 0 ? x == end.x : axis == 1 ? y == end.y : z == end.z) continue;
-            const double a = double(row[x]), b = double(row[x + step[axis]]);
+          // The finest tetrahedra's edges: along one, two or three axes, from where those coordinates are even to where they are odd.
+          const std::array<std::int32_t, 3> v{x, y, z};
+          for (unsigned axes = 1; axes < 8; ++axes) {
+            if (((axes & 1) != 0 && x == end.x) || ((axes & 2) != 0 && y == end.y) || ((axes & 4) != 0 && z == end.z)) continue;
+            std::array<double, 3> even{}, odd{};  // from v
+            const T *first = row + x, *second = row + x;
+            for (int i = 0; i < 3; ++i) {
+              if ((axes >> i & 1) == 0) continue;
+              const bool back = (v[i] & 1) != 0;
+              (back ? even : odd)[i] = 1;
+              (back ? first : second) += step[i];
+            }
+            const double a = double(*first), b = double(*second);
             for (int k = 0; k < surfaces_; ++k) {
-              const double surface = surface_[k];
-              if ((a < surface) == (b < surface)) continue;
-              std::array<double, 3> p{double(x - from.x), double(y - from.y), double(z - from.z)};
-              p[axis] += (surface - a) / (b - a);
-              for (int i = 0; i < 3; ++i) p[i] = (flip[i] ? side - p[i] : p[i]) / side;
-              add(p, surface, of_tet);
+              const double surface = surface_[k].value;
+              if (surface_[k].is_beta ? (a > surface) == (b > surface) : (a < surface) == (b < surface)) continue;
+              const double t = (surface - a) / (b - a);
+              std::array<double, 3> p;
+              for (int i = 0; i < 3; ++i) {
+                p[i] = std::min(v[i] - low[i] + even[i] + t * (odd[i] - even[i]), most[i]);
+                p[i] = (flip[i] ? side - p[i] : p[i]) / side;
+              }
+              add(p, surface - zero_, of_tet);
             }
           }
         }
@@ -119,7 +137,7 @@ class Cubes {
     }
   }
 
-  [[nodiscard]] double value(Vertex v) const { return field_.at(domain_.clamp(v)); }
+  [[nodiscard]] double value(Vertex v) const { return field_.at(domain_.clamp(v)) - zero_; }
 
   // The square of the length of the interpolant's gradient.
   [[nodiscard]] double steepness(const Tet& tet) const {
@@ -215,8 +233,14 @@ class Cubes {
   const SupercubeSet& set_;
   std::vector<float>& moves_;
   double width_;
-  std::array<double, 2> surface_{};
+  // As the sides of samples tell (range.h): one equal to alpha or beta is inside.
+  struct CutAt {
+    double value;
+    bool is_beta;
+  };
+  std::array<CutAt, 2> surface_{};
   int surfaces_ = 0;
+  double zero_ = 0;
 };
 
 }  // namespace

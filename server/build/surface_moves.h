@@ -1,8 +1,9 @@
 // How far the surfaces of a diamond's tetrahedra are from those of the full mesh: what its refinement can still move, in world units.
 //
-// The field crosses alpha and beta at points on the edges between neighbouring samples. In a coarser tetrahedron's interpolant such a point has
-// another value; that difference over the interpolant's gradient is the point's distance from the coarse surface, to first order. Points go down the
-// bisection with their barycentric coordinates, of which each step changes two (Maubach 1995, for the order of vertices).
+// The full mesh's surfaces have their corners on the edges of the finest tetrahedra: of its cells' sides and diagonals. In a coarser tetrahedron's
+// interpolant such a point has another value; that difference over the interpolant's gradient is the point's distance from the coarse surface, to
+// first order, and nothing between the corners is further off. Points go down the bisection with their barycentric coordinates, of which each step
+// changes two (Maubach 1995, for the order of vertices).
 #pragma once
 
 #include <vector>

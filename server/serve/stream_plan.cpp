@@ -62,7 +62,8 @@ void StreamPlan::set_lod(const Lod& lod) {
   }
   ranking_.emplace(*volume_, lod);
   for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
-    set_waiting(b, std::max(ranking_->of_brick(b), only_ ? Rank(1) : Rank(0)), waiting_[b].unsent);
+    if (waiting_[b].unsent == 0) continue;
+    set_waiting(b, std::max(ranking_->of_brick(b).bound(), only_ ? Rank(1) : Rank(0)), waiting_[b].unsent);
   }
   begin_band();
 }
@@ -137,30 +138,50 @@ bool StreamPlan::take(const Place& place, Chunk& chunk) {
 // Takes what the band wants of a brick. False if the batch is full first.
 bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
   const SupercubeSet& set = volume_->set();
-  Rank most = 0;  // of what is left
+  const Ranking::Brick ranking = ranking_->of_brick(brick);
+  Rank most = 0;  // no lower than any of what is left
   unsigned left_wanted = 0;
   bool full = false;
   set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
     if (full) return;
     const UpdateIndex first = set.first(brick, s);
     const std::uint64_t occupancy = set.occupancy()[s];
-    const auto count = UpdateIndex(std::popcount(occupancy));
+    const auto count = unsigned(std::popcount(occupancy));
+    ++chunk.seen;
+    std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
+    if (only_) unsent &= only_->some(first, count);
+    if (unsent == 0) return;
+    const Ranking::Supercube here = ranking.supercube(s, key);
+    const Rank bound = only_ ? std::max(here.bound(), Rank(1)) : here.bound();  // only_ has ancestors too: they come last
+    if (bound < band_) {
+      most = std::max(most, bound);
+      left_wanted += bound == 0 ? 0 : unsigned(std::popcount(unsent));
+      return;
+    }
     chunk.seen += count;
-    if (sent_.contains_all(first, first + count)) return;
-    const Ranking::Supercube rank_of = ranking_->of_supercube(s, key);
-    UpdateIndex i = first;
-    for (std::uint64_t left = occupancy; left != 0 && !full; left &= left - 1, ++i) {
-      if (sent_.contains(i) || (only_ && !only_->contains(i))) continue;
-      const int slot = std::countr_zero(left);
-      const Rank rank = std::max(rank_of(i, slot), only_ ? Rank(1) : Rank(0));  // only_ has ancestors too
-      if (rank == 0) continue;
-      if (rank >= band_) {
-        full = !take({key, brick, s, std::uint32_t(slot), i}, chunk);
+    const float in_band = here.least(band_);
+    float most_left = only_ ? here.least(1) : 0;
+    bool some_left = false;
+    int slot = -1;  // of the update last looked at
+    std::uint64_t slots = occupancy;
+    unsigned at = 0;  // its number in the supercube, and 1
+    for (; unsent != 0 && !full; unsent &= unsent - 1) {
+      const auto k = unsigned(std::countr_zero(unsent));
+      float importance = here.importance(volume_->error_level(first + k));
+      if (importance == 0 && !only_) continue;
+      for (; at <= k; ++at, slots &= slots - 1) slot = std::countr_zero(slots);
+      if (!here.meets_roi(slot)) importance = 0;
+      if (only_) importance = std::max(importance, here.least(1));
+      if (importance == 0) continue;
+      if (importance >= in_band) {
+        full = !take({key, brick, s, std::uint32_t(slot), first + k}, chunk);
       } else {
-        most = std::max(most, rank);
+        most_left = std::max(most_left, importance);
+        some_left = true;
         ++left_wanted;
       }
     }
+    if (some_left) most = std::max(most, here.rank(most_left));
   });
   if (!full) set_waiting(brick, most, left_wanted);
   return !full;

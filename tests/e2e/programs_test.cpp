@@ -5,7 +5,9 @@
 #include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -44,6 +46,11 @@ void expect_complaint(const Finished& finished, int status, const std::string& a
   EXPECT_EQ(finished.out, "");
 }
 
+std::vector<std::string> words_of(const std::string& text) {
+  std::istringstream in(text);
+  return {std::istream_iterator<std::string>(in), {}};
+}
+
 TEST(Programs, ListNamesWhatIsServed) {
   ServerProgram server;
   const auto list = json_of(run({client(), "list", server.url(), "--json"}));
@@ -73,6 +80,30 @@ TEST(Programs, FetchGivesTheMeshThatExtractGives) {
     EXPECT_GE(got.at("messages"), 2);
     EXPECT_LE(got.at("seconds_first_mesh"), got.at("seconds"));
     EXPECT_TRUE(std::filesystem::exists(folder / "fetch.vtu"));
+  }
+}
+
+// The buckyball lies in [-1, 1]^3; from outside, from inside, and with its back to the camera.
+TEST(Programs, FetchSeesWhatExtractSees) {
+  ServerProgram server;
+  const TempDir folder;
+  const auto all = json_of(run({program("intervale"), "extract", buckyball(), "--json"}));
+  for (const char* view : {"--eye 1.2 0.1 -1.5 --look-at 0 0 0 --pixel-error 8", "--eye 0 0 0 --look-at 0.9 0 0 --viewport 320 200 --pixel-error 2",
+                           "--eye -1.5 0 0 --look-at -3 0 0 --up 0 0 1 --fov 60 --viewport 800 600",
+                           "--eye 1.2 0.1 -1.5 --look-at 0 0 0 --pixel-error 4 --error-percent 5 --roi -1 -1 -1 0.2 1 1"}) {
+    SCOPED_TRACE(view);
+    const std::vector<std::string> options = words_of(view);
+    std::vector<std::string> extract{program("intervale"), "extract", buckyball(), "--json", "-o", folder / "extract.vtu"};
+    extract.insert(extract.end(), options.begin(), options.end());
+    const auto expected = json_of(run(extract));
+    auto more = options;
+    more.insert(more.end(), {"-o", folder / "fetch.vtu"});
+    const auto got = fetch_json(more, server.url("buckyball"));
+    for (const char* key : {"updates", "vertices", "tets"}) EXPECT_EQ(got.at(key), expected.at(key)) << key;
+    EXPECT_NEAR(got.at("volume").get<double>(), expected.at("volume").get<double>(), 1e-9 * expected.at("volume").get<double>());
+    EXPECT_EQ(std::filesystem::file_size(folder / "fetch.vtu"), std::filesystem::file_size(folder / "extract.vtu"));
+    EXPECT_GT(got.at("updates"), 0);
+    EXPECT_LT(got.at("updates"), all.at("updates"));
   }
 }
 
@@ -117,6 +148,45 @@ TEST(Programs, WrongUsageIsStatus2) {
   expect_complaint(run({client(), "fetch", "ws://127.0.0.1:1/x", "--error", "-1"}), 2, "--error");
   expect_complaint(run({client(), "fetch", "ws://127.0.0.1:1/x", "--roi", "1", "0", "0", "0", "1", "1"}), 2, "--roi");
   expect_complaint(run({program("intervale"), "serve", buckyball(), "--listen", "nowhere"}), 2, "address", "intervale: ");
+}
+
+TEST(Programs, ACameraThatMakesNoSenseIsStatus2) {
+  struct Wrong {
+    std::string options, about;
+  };
+  const std::string camera = "--eye 0 0 -9 --look-at 1 2 3 ";
+  std::vector<Wrong> all{{"--eye 0 0 -9", "--look-at"},
+                         {"--look-at 1 2 3", "--eye"},
+                         {"--eye 0 0 --look-at 1 2 3", "--eye"},
+                         {"--eye 1 2 3 --look-at 1 2 3", "another point"},
+                         {"--eye nan 0 0 --look-at 1 2 3", "finite"},
+                         {"--eye 0 0 0 --look-at 1 inf 3", "finite"},
+                         {"--eye 1 -9 3 --look-at 1 2 3", "up"}};  // which is along y unless said otherwise
+  for (const Wrong& wrong : std::vector<Wrong>{{"--up 1 2 12", "up"},
+                                               {"--up 0 0 0", "up"},
+                                               {"--up nan 1 0", "finite"},
+                                               {"--fov 0", "field of view"},
+                                               {"--fov 180", "field of view"},
+                                               {"--fov nan", "field of view"},
+                                               {"--viewport 0 480", "viewport"},
+                                               {"--viewport 640 0", "viewport"},
+                                               {"--viewport 640", "--viewport"},
+                                               {"--pixel-error 0", "pixel error"},
+                                               {"--pixel-error -1", "pixel error"},
+                                               {"--pixel-error nan", "pixel error"},
+                                               {"--pixel-error much", "--pixel-error"}}) {
+    all.push_back({camera + wrong.options, wrong.about});
+    all.push_back({wrong.options, wrong.options.substr(0, wrong.options.find(' '))});  // without an eye none of them means anything
+  }
+  for (const Wrong& wrong : all) {
+    SCOPED_TRACE(wrong.options);
+    const auto options = words_of(wrong.options);
+    std::vector<std::string> extract{program("intervale"), "extract", buckyball()}, fetch{client(), "fetch", "ws://127.0.0.1:1/x"};
+    extract.insert(extract.end(), options.begin(), options.end());
+    fetch.insert(fetch.end(), options.begin(), options.end());
+    expect_complaint(run(extract), 2, wrong.about, "intervale: ");
+    expect_complaint(run(fetch), 2, wrong.about);
+  }
 }
 
 TEST(Programs, NobodyThereIsOneLine) {

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cmath>
-#include <cstring>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "server/volume/volume.h"
@@ -16,8 +16,8 @@ Volume volume_of_type(SampleType type, const std::array<std::int32_t, 3>& dims, 
   v.name = "made";
   v.grid.dims = dims;
   v.type = type;
-  v.bytes.resize(samples.size() * sizeof(T));
-  std::memcpy(v.bytes.data(), samples.data(), v.bytes.size());
+  const auto bytes = std::as_bytes(std::span(samples));
+  v.bytes.assign(bytes.begin(), bytes.end());
   return v;
 }
 

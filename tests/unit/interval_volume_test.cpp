@@ -2,7 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
 #include "server/build/field_hierarchy.h"
+#include "server/build/surface_moves.h"
 #include "support/analytic_fields.h"
 #include "support/parts.h"
 
@@ -58,6 +65,117 @@ TEST_F(IntervalVolumeValidate, FindsASideThatDoesNotFitItsCoefficients) {
     found += !IntervalVolume::assemble(std::move(parts))->validate();
   }
   EXPECT_GT(found, 15);
+}
+
+TEST(YieldSteps, RoundUpByAtMostAStep) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> octaves(-14, 26), units(-20, 20);
+  for (int trial = 0; trial < 10000; ++trial) {
+    const double unit = std::exp2(units(random)), ratio = unit * std::exp2(octaves(random));
+    const Yield yield = Yield::at_least(ratio, unit);
+    const double rounded = yield.ratio(float(unit));
+    ASSERT_GE(rounded, ratio * (1 - 1e-6)) << ratio / unit;
+    ASSERT_LE(rounded, ratio * std::exp2(1.0 / 6) * (1 + 1e-6)) << ratio / unit;
+  }
+}
+
+TEST(YieldSteps, EachStandsForItself) {
+  for (int step = 1; step < 255; ++step) {
+    const double ratio = 3 * std::exp2((step - 90) / 6.0);
+    EXPECT_EQ(Yield::at_least(ratio, 3).step(), step);
+    EXPECT_EQ(Yield::at_least(ratio * (1 + 1e-6), 3).step(), step + 1);
+    EXPECT_LT(Yield(std::uint8_t(step)).ratio(3), Yield(std::uint8_t(step + 1)).ratio(3));
+    EXPECT_LT(Yield(std::uint8_t(step - 1)).ratio(3), Yield(std::uint8_t(step)).ratio(3));
+  }
+}
+
+TEST(YieldSteps, NothingIsNothingAndTheLastHasNoBound) {
+  EXPECT_EQ(Yield::at_least(0, 1).step(), 0);
+  EXPECT_EQ(Yield::at_least(0, 1).ratio(1), 0);
+  EXPECT_EQ(Yield::at_least(1e-300, 1).step(), 1);
+  for (const double ratio : {std::exp2(27.5), 1e300, std::numeric_limits<double>::infinity()}) EXPECT_EQ(Yield::at_least(ratio, 1).step(), 255);
+  EXPECT_EQ(Yield(255).ratio(1e-30f), std::numeric_limits<float>::max());
+}
+
+// Fields of several kinds, in boxes that nest and that do not.
+class ObjectErrors : public ::testing::TestWithParam<unsigned> {
+ protected:
+  ObjectErrors() {
+    constexpr std::array<std::array<std::int32_t, 3>, 4> shapes{{{17, 17, 17}, {12, 5, 7}, {20, 11, 9}, {40, 3, 4}}};
+    const unsigned seed = GetParam();
+    switch (seed % 3) {
+      case 0:
+        volume_ = testing::gyroid(shapes[seed % 4]), range_ = {-0.3, 0.2};
+        break;
+      case 1:
+        volume_ = testing::digits(shapes[seed % 4], seed), range_ = {3, 5};
+        break;
+      default:
+        volume_ = testing::bump(shapes[seed % 4], seed), range_ = {60, 80};
+    }
+    if (seed % 2 == 1) volume_.grid.spacing = {0.5, 1, 3};
+    auto sigma = FieldHierarchy(volume_, {.range = range_}).compact();
+    EXPECT_TRUE(sigma);
+    sigma_ = std::move(*sigma);
+  }
+  Volume volume_;
+  Range range_;
+  Result<IntervalVolume> sigma_ = fail("not made");
+};
+
+TEST_P(ObjectErrors, AreNeverAboveTheDiamondsWidth) {
+  sigma_->set().for_each_down([&](const Place& p) {
+    const double width = diamond_width(volume_.grid) * Diamond(SupercubeSet::centre(p)).h;
+    const float error = sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_level(p.index));
+    ASSERT_LE(error, width * (1 + 1e-6));
+    ASSERT_GE(error, 0);
+    ASSERT_LE(error, sigma_->brick_object_error(p.brick));
+  });
+}
+
+TEST_P(ObjectErrors, AreNoLessThanWhatWasMeasuredAnywhereBelow) {
+  const SupercubeSet& set = sigma_->set();
+  std::vector<float> moves = surface_moves(volume_, range_, sigma_->domain(), set);
+  set.for_each_up(
+      [&](const Place& p) { for_each_parent(set, p, [&](UpdateIndex parent) { moves[parent] = std::max(moves[parent], moves[p.index]); }); });
+  std::size_t told = 0;
+  set.for_each_down([&](const Place& p) {
+    if (sigma_->error(p.index) == 0) return;  // no factor makes anything of that
+    ASSERT_GE(sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_level(p.index)), moves[p.index] * (1 - 1e-5));
+    told += moves[p.index] > 0;
+  });
+  EXPECT_GT(told, 10u);
+}
+
+TEST_P(ObjectErrors, OfABrickAreThoseOfOneOfItsUpdates) {
+  const SupercubeSet& set = sigma_->set();
+  std::vector<float> largest(set.bricks().size());
+  set.for_each_down([&](const Place& p) {
+    largest[p.brick] = std::max(largest[p.brick], sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_level(p.index)));
+  });
+  for (std::uint32_t b = 0; b < largest.size(); ++b) EXPECT_EQ(sigma_->brick_object_error(b), largest[b]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fields, ObjectErrors, ::testing::Range(0u, 12u));
+
+TEST(IntervalVolumeAssemble, RefusesYieldsThatAreNotOneForEachSupercube) {
+  const Volume volume = testing::gyroid({9, 9, 9});
+  const auto made = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
+  ASSERT_TRUE(made);
+  for (const std::size_t size : {std::size_t(0), made->yields().size() - 1, made->yields().size() + 1}) {
+    auto parts = testing::parts_of(*made);
+    parts.yields.resize(size);
+    EXPECT_FALSE(IntervalVolume::assemble(std::move(parts)));
+  }
+}
+
+TEST(IntervalVolumeAssemble, AnotherYieldIsAnotherContent) {
+  const Volume volume = testing::gyroid({9, 9, 9});
+  const auto made = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
+  ASSERT_TRUE(made);
+  auto parts = testing::parts_of(*made);
+  parts.yields.back() = Yield(std::uint8_t(parts.yields.back().step() ^ 1));
+  EXPECT_NE(IntervalVolume::assemble(std::move(parts))->description().content_hash, made->description().content_hash);
 }
 
 }  // namespace

@@ -12,8 +12,6 @@
 namespace intervale {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 const Box kEverywhere{{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
 
 Lod of_error(double error) {
@@ -173,32 +171,6 @@ TEST_P(Select, InOrderParentsComeFirstAndErrorsDoNotAscend) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, Select, ::testing::Range(0u, 10u));
-
-TEST(CheckLod, PassesWhatMakesSense) {
-  EXPECT_TRUE(check_lod({}));
-  EXPECT_TRUE(check_lod(of_error(1e300)));
-  EXPECT_TRUE(check_lod(of_percent(0)));
-  EXPECT_TRUE(check_lod({0, 100.0, {}, {}, 0, 0}));
-  EXPECT_TRUE(check_lod(of_region({{1, 2, 3}, {1, 2, 3}})));
-}
-
-TEST(CheckLod, RefusesWhatDoesNot) {
-  const Lod senseless[] = {of_error(-1),
-                           of_error(kNan),
-                           of_error(kInf),
-                           of_percent(-0.1),
-                           of_percent(100.1),
-                           of_percent(kNan),
-                           of_percent(kInf),
-                           of_region({{0, 0, 2}, {1, 1, 1}}),
-                           of_region({{0, kNan, 0}, {1, 1, 1}}),
-                           of_region({{0, 0, 0}, {1, 1, kNan}})};
-  for (const Lod& lod : senseless) {
-    const auto checked = check_lod(lod);
-    ASSERT_FALSE(checked) << "number " << &lod - senseless;
-    EXPECT_TRUE(checked.error().usage);
-  }
-}
 
 TEST(SplitSetLaws, HoldsWhatWasPutInAndNothingElse) {
   std::mt19937 random(3);

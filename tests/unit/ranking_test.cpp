@@ -1,0 +1,285 @@
+#include "common/ranking.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "common/refinement.h"
+#include "server/build/field_hierarchy.h"
+#include "support/analytic_fields.h"
+#include "support/cameras.h"
+
+namespace intervale {
+namespace {
+
+using testing::NaiveCamera;
+using testing::Vector;
+
+IntervalVolume made(unsigned seed) {
+  constexpr std::array<std::array<std::int32_t, 3>, 5> shapes{{{17, 17, 17}, {24, 17, 20}, {12, 5, 7}, {40, 9, 20}, {30, 2, 11}}};
+  Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 5]) : testing::digits(shapes[seed % 5], seed);
+  if (seed % 3 != 0) {
+    volume.grid.spacing = {0.5, 1, 3};
+    volume.grid.origin = {-4, 0, 7};
+  }
+  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
+  EXPECT_TRUE(sigma);
+  return std::move(*sigma);
+}
+
+Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
+  const Grid& g = v.description().grid;
+  Lod lod;
+  if (random() % 2 == 0) lod.error_percent = double(random() % 40);
+  if (random() % 3 == 0) {
+    lod.roi.emplace();
+    for (int i = 0; i < 3; ++i) {
+      lod.roi->min[i] = g.origin[i] + g.spacing[i] * testing::uniform(random, -1, g.dims[i]);
+      lod.roi->max[i] = lod.roi->min[i] + g.spacing[i] * testing::uniform(random, 0, 8);
+    }
+  }
+  if (random() % 3 != 0) {
+    lod.camera = testing::random_camera(g, random);
+    lod.camera->pixel_error = std::pow(2.0, testing::uniform(random, -1, 8));
+  }
+  return lod;
+}
+
+using Visit = std::function<void(const Place&, Ranking::Rank)>;
+void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const Visit& visit) {
+  v.set().for_each_down([&](const Place& p) { visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, int(p.slot))); });
+}
+
+// How far the surfaces can move in an update's diamond, from what is stored.
+double object_error(const IntervalVolume& v, const Place& p) {
+  const Grid& g = v.description().grid;
+  const std::uint8_t step = v.yields()[p.supercube].step();
+  const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) * h;
+  if (step == 0 || v.error(p.index) == 0) return 0;
+  if (step == 255) return widest;
+  const double unit = std::min({g.spacing[0], g.spacing[1], g.spacing[2]}) / v.description().max_error;
+  return std::min(widest, double(v.error(p.index)) * unit * std::exp2((step - 90) / 6.0));
+}
+
+// The box around all diamonds of a cube of supercubes, given by two opposite corners, as far as there are samples.
+View::Region region_of(const IntervalVolume& v, SupercubeKey first, SupercubeKey last_of_all) {
+  const Vertex last = v.domain().last();
+  Vector low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
+  for (const SupercubeKey key : {first, last_of_all}) {
+    for (int slot = 0; slot < kSlots; ++slot) {
+      const Diamond d(centre_of(key, slot));
+      const std::array<std::int32_t, 3> c{d.centre.x, d.centre.y, d.centre.z}, end{last.x, last.y, last.z};
+      for (int i = 0; i < 3; ++i) {
+        low[i] = std::min(low[i], std::clamp(double(c[i] - d.h), 0.0, double(end[i])));
+        high[i] = std::max(high[i], std::clamp(double(c[i] + d.h), 0.0, double(end[i])));
+      }
+    }
+  }
+  View::Region region;
+  for (int i = 0; i < 3; ++i) region.middle[i] = (low[i] + high[i]) / 2, region.reach[i] = (high[i] - low[i]) / 2;
+  return region;
+}
+
+// Pixels of one world unit around an update: by its supercube, or its brick where that is far away.
+double pixels_per_unit(const IntervalVolume& v, const View& view, const Place& p) {
+  const View::Region brick = region_of(v, p.key & ~SupercubeKey(63), p.key | 63);
+  return view.pixels_per_unit(view.is_near(brick) ? region_of(v, p.key, p.key) : brick);
+}
+
+bool meets(const IntervalVolume& v, const Diamond& d, const Box& roi) {
+  const Grid& g = v.description().grid;
+  const std::array<std::int32_t, 3> c{d.centre.x, d.centre.y, d.centre.z};
+  for (int i = 0; i < 3; ++i) {
+    const double low = std::max(0.0, (roi.min[i] - g.origin[i]) / g.spacing[i]),
+                 high = std::min(g.dims[i] - 1.0, (roi.max[i] - g.origin[i]) / g.spacing[i]);
+    if (low > high || c[i] - d.h > high || c[i] + d.h < low) return false;
+  }
+  return true;
+}
+
+class Ranks : public ::testing::TestWithParam<unsigned> {
+ protected:
+  IntervalVolume volume_ = made(GetParam());
+  std::mt19937 random_{GetParam()};  // the seed is the test's number
+};
+
+TEST_P(Ranks, NoUpdateRanksAboveItsBrick) {
+  for (int trial = 0; trial < 40; ++trial) {
+    const Ranking ranking(volume_, random_lod(volume_, random_));
+    for_each_rank(volume_, ranking,
+                  [&](const Place& p, Ranking::Rank rank) { ASSERT_GE(ranking.of_brick(p.brick).bound(), rank) << "trial " << trial; });
+  }
+}
+
+TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
+  for (int trial = 0; trial < 40; ++trial) {
+    const Ranking ranking(volume_, random_lod(volume_, random_));
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(), rank) << "trial " << trial;
+    });
+  }
+}
+
+TEST_P(Ranks, WantedIsWhatTheNaiveModelWants) {
+  std::size_t wanted = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    const Lod lod = random_lod(volume_, random_);
+    const double threshold = error_of(lod, volume_.description());
+    std::optional<View> view;
+    if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
+    const Ranking ranking(volume_, lod);
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+      bool expected = threshold == 0 || volume_.error(p.index) > threshold;
+      if (lod.roi) expected = expected && meets(volume_, Diamond(SupercubeSet::centre(p)), *lod.roi);
+      if (lod.camera && expected) {
+        const double pixels = object_error(volume_, p) * pixels_per_unit(volume_, *view, p);
+        if (std::abs(pixels - lod.camera->pixel_error) < 1e-5 * pixels) return;
+        expected = pixels > lod.camera->pixel_error;
+      }
+      ASSERT_EQ(rank != 0, expected) << "trial " << trial;
+      wanted += expected;
+    });
+  }
+  EXPECT_GT(wanted, 100u);
+}
+
+// What it is all for: no surface point in the picture is left further off than asked for, by any update that is not wanted.
+TEST_P(Ranks, WhatIsNotWantedDoesNotShow) {
+  const Grid& g = volume_.description().grid;
+  for (int trial = 0; trial < 20; ++trial) {
+    Lod lod;
+    lod.camera = testing::random_camera(g, random_);
+    lod.camera->pixel_error = std::pow(2.0, testing::uniform(random_, -1, 6));
+    const NaiveCamera naive(*lod.camera);
+    const Ranking ranking(volume_, lod);
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+      if (rank != 0) return;
+      const Diamond d(SupercubeSet::centre(p));
+      Vector at;
+      const std::array<std::int32_t, 3> c{d.centre.x, d.centre.y, d.centre.z};
+      for (int i = 0; i < 3; ++i) {
+        const double sample = std::clamp(c[i] + d.h * testing::uniform(random_, -1, 1), 0.0, g.dims[i] - 1.0);
+        at[i] = g.origin[i] + g.spacing[i] * sample;
+      }
+      if (!naive.shows(at) || naive.depth(at) < 1e-3 * g.spacing[0]) return;
+      ASSERT_LE(object_error(volume_, p) * naive.pixels_per_unit(at), lod.camera->pixel_error * (1 + 1e-5)) << "trial " << trial;
+    });
+  }
+}
+
+TEST_P(Ranks, BoundIsNoLessThanWhatIsLeft) {
+  for (int trial = 0; trial < 40; ++trial) {
+    const Lod lod = random_lod(volume_, random_);
+    std::optional<View> view;
+    if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
+    const Ranking ranking(volume_, lod);
+    EXPECT_EQ(ranking.bound(0), 0);
+    std::vector<std::pair<Ranking::Rank, double>> all;  // ranks, and the errors that they stand for
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+      if (rank == 0) return;
+      const double error = view ? object_error(volume_, p) * pixels_per_unit(volume_, *view, p) : double(volume_.error(p.index));
+      ASSERT_LE(error, ranking.bound(rank) * (1 + 1e-5)) << "trial " << trial;
+      ASSERT_LE(ranking.bound(rank), view ? 2 * error : error) << "trial " << trial << ": and not much more";
+      all.emplace_back(rank, error);
+    });
+    std::sort(all.begin(), all.end());
+    for (std::size_t i = 1; i < all.size(); ++i) ASSERT_LE(ranking.bound(all[i - 1].first), ranking.bound(all[i].first));
+    // A band: from its top down to what it still takes.
+    for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 20) {
+      const Ranking::Rank top = all[i].first, low = ranking.band_below(top);
+      ASSERT_GE(low, 1);
+      ASSERT_LE(low, top);
+      ASSERT_LE(ranking.bound(top), ranking.bound(low) * (view ? 2.0 : std::sqrt(2.0)) * (1 + 1e-6)) << "trial " << trial;
+    }
+  }
+}
+
+// The narrowest of views show everything larger than any number.
+TEST_P(Ranks, BoundIsANumberWhateverTheCamera) {
+  Lod lod;
+  lod.camera = testing::random_camera(volume_.description().grid, random_);
+  for (const double fov : {1e-306, 1e-100, 1e-37, 1e-30, 179.999999}) {
+    for (const double pixel_error : {1e-300, 1.0, 1e300}) {
+      lod.camera->fov = fov;
+      lod.camera->pixel_error = pixel_error;
+      ASSERT_TRUE(check_lod(lod));
+      const Ranking ranking(volume_, lod);
+      for (std::uint32_t b = 0; b < volume_.set().bricks().size(); ++b) {
+        ASSERT_TRUE(std::isfinite(ranking.bound(ranking.of_brick(b).bound()))) << "fov " << fov << ", pixel error " << pixel_error;
+      }
+      for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ASSERT_LE(rank, ranking.of_brick(p.brick).bound()); });
+    }
+  }
+}
+
+// What a camera wants, and the ancestors of that, and nothing else.
+TEST_P(Ranks, SelectIsClosedUnderParentsAndMinimal) {
+  for (int trial = 0; trial < 40; ++trial) {
+    const Lod lod = random_lod(volume_, random_);
+    const Ranking ranking(volume_, lod);
+    SplitSet expected(volume_.size());
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+      if (rank != 0) expected.insert(p.index);
+    });
+    volume_.set().for_each_up([&](const Place& p) {
+      if (!expected.contains(p.index)) return;
+      for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { expected.insert(parent); });
+    });
+    const SplitSet chosen = select(volume_, lod);
+    ASSERT_EQ(chosen, expected) << "trial " << trial << ": " << chosen.count() << " chosen, " << expected.count() << " expected";
+  }
+}
+
+TEST_P(Ranks, AFinerPictureChoosesNoLess) {
+  for (int trial = 0; trial < 5; ++trial) {
+    Lod lod;
+    lod.camera = testing::random_camera(volume_.description().grid, random_);
+    SplitSet coarser(volume_.size());
+    for (const double pixels : {1e6, 100.0, 10.0, 3.0, 1.0, 0.1, 1e-300}) {
+      lod.camera->pixel_error = pixels;
+      const SplitSet chosen = select(volume_, lod);
+      for (UpdateIndex i = 0; i < volume_.size(); ++i) ASSERT_TRUE(chosen.contains(i) || !coarser.contains(i)) << "trial " << trial << ", " << pixels;
+      coarser = chosen;
+    }
+    // In the end all that moves anything, wherever it is.
+    volume_.set().for_each_down([&](const Place& p) { ASSERT_TRUE(coarser.contains(p.index) || object_error(volume_, p) == 0); });
+  }
+}
+
+TEST_P(Ranks, InOrderParentsComeFirstAndRanksDoNotAscend) {
+  for (int trial = 0; trial < 10; ++trial) {
+    const Lod lod = random_lod(volume_, random_);
+    const Ranking ranking(volume_, lod);
+    const SplitSet chosen = select(volume_, lod);
+    const auto order = in_order(volume_, chosen, lod);
+    ASSERT_EQ(order.size(), chosen.count());
+    std::vector<Ranking::Rank> ranks(volume_.size());  // an ancestor's is that of what needs it
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ranks[p.index] = rank; });
+    volume_.set().for_each_up([&](const Place& p) {
+      if (!chosen.contains(p.index)) return;
+      for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
+    });
+    SplitSet seen(volume_.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const Place p = volume_.set().place(order[i]);
+      ASSERT_TRUE(chosen.contains(p.index) && !seen.contains(p.index));
+      for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ASSERT_TRUE(seen.contains(parent)) << "trial " << trial; });
+      if (i > 0) {
+        ASSERT_LE(ranks[order[i]], ranks[order[i - 1]]) << "trial " << trial;
+      }
+      seen.insert(p.index);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, Ranks, ::testing::Range(0u, 10u));
+
+}  // namespace
+}  // namespace intervale

@@ -1,0 +1,225 @@
+#include "common/view.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "support/cameras.h"
+
+namespace intervale {
+namespace {
+
+using testing::NaiveCamera;
+using testing::Vector;
+
+// World coordinates that are not the samples'.
+const Grid kGrid{{40, 30, 20}, {0.5, 1, 3}, {-4, 100, 7}};
+
+Vector world(const Grid& g, const Vector& sample) {
+  return {g.origin[0] + g.spacing[0] * sample[0], g.origin[1] + g.spacing[1] * sample[1], g.origin[2] + g.spacing[2] * sample[2]};
+}
+
+// The region of this size in world units that has its middle there.
+View::Region region_at(const Grid& g, const Vector& middle, const Vector& reach = {}) {
+  View::Region region;
+  for (int i = 0; i < 3; ++i) {
+    region.middle[i] = (middle[i] - g.origin[i]) / g.spacing[i];
+    region.reach[i] = reach[i] / g.spacing[i];
+  }
+  return region;
+}
+
+View::Region random_region(const Grid& g, std::mt19937& random) {
+  View::Region region;
+  const double size = std::pow(10.0, testing::uniform(random, -2, 0));
+  for (int i = 0; i < 3; ++i) {
+    region.middle[i] = testing::uniform(random, 0, 1) * g.dims[i];
+    region.reach[i] = random() % 5 == 0 ? 0 : testing::uniform(random, 0, size) * g.dims[i];
+  }
+  return region;
+}
+
+class Views : public ::testing::TestWithParam<unsigned> {
+ protected:
+  std::mt19937 random_{GetParam()};  // the seed is the test's number
+};
+
+TEST_P(Views, NothingInThePictureShowsLarger) {
+  std::size_t seen = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const Camera camera = testing::random_camera(kGrid, random_);
+    const View view(camera, kGrid);
+    const NaiveCamera naive(camera);
+    const View::Region region = random_region(kGrid, random_);
+    const double pixels = view.pixels_per_unit(region);
+    for (int i = 0; i < 40; ++i) {
+      Vector sample;
+      for (int k = 0; k < 3; ++k) sample[k] = region.middle[k] + region.reach[k] * testing::uniform(random_, -1, 1);
+      const Vector p = world(kGrid, sample);
+      if (!naive.shows(p) || naive.depth(p) < 1e-3 * 0.5) continue;  // nothing is taken to be nearer than a thousandth of the least spacing
+      ++seen;
+      EXPECT_LE(naive.pixels_per_unit(p), pixels * (1 + 1e-9)) << "trial " << trial;
+      // Across the line of sight that is what the pinhole shows, however far; and along any other line the corners' slant more.
+      const double length = naive.depth(p) * testing::uniform(random_, 0, 0.5);
+      const Vector any = testing::random_direction(random_), across = testing::unit(testing::cross(naive.ahead(), any));
+      EXPECT_LE(naive.pixels_between(p, testing::along(p, length, across)), pixels * length * (1 + 1e-6)) << "trial " << trial;
+      const double little = 1e-4 * naive.depth(p);
+      EXPECT_LE(naive.pixels_between(p, testing::along(p, little, any)), pixels * little * naive.slant() * (1 + 1e-2)) << "trial " << trial;
+    }
+  }
+  EXPECT_GT(seen, 500u);
+}
+
+// What bricks are passed over by.
+TEST_P(Views, ARegionHasNoFewerPixelsThanAnythingInIt) {
+  for (int trial = 0; trial < 2000; ++trial) {
+    const View view(testing::random_camera(kGrid, random_), kGrid);
+    const View::Region whole = random_region(kGrid, random_);
+    View::Region part;
+    for (int k = 0; k < 3; ++k) {
+      part.reach[k] = whole.reach[k] * testing::uniform(random_, 0, 0.5);
+      part.middle[k] = whole.middle[k] + (whole.reach[k] - part.reach[k]) * testing::uniform(random_, -1, 1);
+    }
+    EXPECT_LE(view.pixels_per_unit(part), view.pixels_per_unit(whole) * (1 + 1e-9)) << "trial " << trial;
+  }
+}
+
+TEST_P(Views, PixelsAreFiniteAndAboveZeroEvenAroundTheEye) {
+  for (int trial = 0; trial < 500; ++trial) {
+    Camera camera = testing::random_camera(kGrid, random_);
+    View::Region region = random_region(kGrid, random_);
+    switch (trial % 4) {
+      case 0:  // the eye in the region's middle, then in a corner of it, then anywhere inside, then anywhere
+        camera.eye = world(kGrid, region.middle);
+        break;
+      case 1:
+        for (int k = 0; k < 3; ++k) camera.eye[k] = kGrid.origin[k] + kGrid.spacing[k] * (region.middle[k] - region.reach[k]);
+        break;
+      case 2:
+        for (int k = 0; k < 3; ++k) {
+          camera.eye[k] = kGrid.origin[k] + kGrid.spacing[k] * (region.middle[k] + region.reach[k] * testing::uniform(random_, -1, 1));
+        }
+        break;
+      default:
+        break;
+    }
+    if (!check_lod({.camera = camera})) continue;
+    const double pixels = View(camera, kGrid).pixels_per_unit(region);
+    EXPECT_TRUE(std::isfinite(pixels) && pixels > 0) << "trial " << trial << ": " << pixels;
+  }
+}
+
+// A region goes from the middle of the picture across its edge, and on.
+TEST_P(Views, NothingJumpsAtThePicturesEdge) {
+  for (int trial = 0; trial < 40; ++trial) {
+    const Camera camera = testing::random_camera(kGrid, random_);
+    const View view(camera, kGrid);
+    const NaiveCamera naive(camera);
+    const double distance = testing::uniform(random_, 5, 100), step = distance / 5000;
+    const Vector reach{distance * testing::uniform(random_, 0, 0.05), distance * testing::uniform(random_, 0, 0.05), 0};
+    const Vector across = testing::unit(testing::cross(naive.ahead(), testing::random_direction(random_)));
+    const double reach_across = reach[0] * std::abs(across[0]) + reach[1] * std::abs(across[1]);
+    Vector at = testing::along(camera.eye, distance, naive.ahead());
+    double last = view.pixels_per_unit(region_at(kGrid, at, reach));
+    for (int i = 0; i < 5000; ++i) {
+      at = testing::along(at, step, across);
+      const double now = view.pixels_per_unit(region_at(kGrid, at, reach));
+      // Neither the depth nor the way outside changes by more than the step.
+      EXPECT_LE(std::abs(std::log(now / last)), 60 * step / distance) << "trial " << trial << ", step " << i;
+      if (step * i > reach_across) {
+        EXPECT_LE(now, last * (1 + 1e-9)) << "trial " << trial << ", step " << i << ": all of it goes away sideways";
+      }
+      last = now;
+    }
+  }
+}
+
+// The same region at the same distance, further and further around the eye.
+TEST_P(Views, TheFurtherRoundTheSmaller) {
+  for (int trial = 0; trial < 40; ++trial) {
+    Camera camera = testing::random_camera(kGrid, random_);
+    camera.fov = testing::uniform(random_, 2, 90);
+    camera.viewport = trial % 2 == 0 ? std::array<int, 2>{1920, 1080} : std::array<int, 2>{600, 800};
+    const View view(camera, kGrid);
+    const NaiveCamera naive(camera);
+    const double distance = testing::uniform(random_, 5, 100);
+    const Vector across = trial % 3 == 0 ? naive.right() : trial % 3 == 1 ? naive.up() : testing::along(testing::Vector{}, -1, naive.right());
+    const double edge = trial % 3 == 1 ? naive.half_height() : naive.half_width();
+    const auto pixels_at = [&](double angle) {
+      const Vector at = testing::along(testing::along(camera.eye, distance * std::cos(angle), naive.ahead()), distance * std::sin(angle), across);
+      return view.pixels_per_unit(region_at(kGrid, at));
+    };
+    double last = pixels_at(edge);
+    EXPECT_GE(last * (1 + 1e-9), pixels_at(0));
+    for (int i = 1; i <= 1000; ++i) {
+      const double now = pixels_at(edge + (std::numbers::pi - edge) * i / 1000);
+      EXPECT_LE(now, last * (1 + 1e-9)) << "trial " << trial << ", step " << i << ", fov " << camera.fov;
+      last = now;
+    }
+    EXPECT_LE(last, pixels_at(edge) / 4) << "trial " << trial << ", fov " << camera.fov << ": right behind the eye";
+  }
+}
+
+// What lies behind the eye, and goes away from it backwards.
+TEST_P(Views, TheFurtherBehindTheSmaller) {
+  for (int trial = 0; trial < 100; ++trial) {
+    const Camera camera = testing::random_camera(kGrid, random_);
+    const View view(camera, kGrid);
+    const NaiveCamera naive(camera);
+    const double size = testing::uniform(random_, 0, 5), step = testing::uniform(random_, 0.1, 2);
+    const Vector reach{size * testing::uniform(random_, 0, 1), size * testing::uniform(random_, 0, 1), size * testing::uniform(random_, 0, 1)};
+    const Vector aside = testing::unit(testing::cross(naive.ahead(), testing::random_direction(random_)));
+    Vector at = testing::along(testing::along(camera.eye, testing::uniform(random_, 0, 20), aside), -2 * size - 0.1, naive.ahead());
+    double last = view.pixels_per_unit(region_at(kGrid, at, reach));
+    for (int i = 0; i < 50; ++i) {
+      at = testing::along(at, -step, naive.ahead());
+      const double now = view.pixels_per_unit(region_at(kGrid, at, reach));
+      EXPECT_LE(now, last * (1 + 1e-9)) << "trial " << trial << ", step " << i;
+      last = now;
+    }
+  }
+}
+
+TEST_P(Views, CentralIsTheMiddleHalfOfThePictureEachWay) {
+  std::size_t central = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Camera camera = testing::random_camera(kGrid, random_);
+    const NaiveCamera naive(camera);
+    const View::Region region = random_region(kGrid, random_);
+    const Vector p = world(kGrid, region.middle);
+    const auto [x, y] = naive.project(p);
+    const double across = std::abs(x) / (camera.viewport[0] / 4.0), up = std::abs(y) / (camera.viewport[1] / 4.0);
+    if (std::abs(across - 1) < 1e-9 || std::abs(up - 1) < 1e-9) continue;
+    const bool expected = naive.depth(p) > 0 && across < 1 && up < 1;
+    EXPECT_EQ(View(camera, kGrid).is_central(region), expected) << "trial " << trial;
+    central += expected;
+  }
+  EXPECT_GT(central, 50u);
+}
+
+// World units are no more than a choice: the same picture of the same samples.
+TEST_P(Views, SpacingAndOriginAreWhereTheSamplesLie) {
+  const Grid unit{kGrid.dims, {1, 1, 1}, {0, 0, 0}};
+  for (int trial = 0; trial < 200; ++trial) {
+    const double scale = testing::uniform(random_, 0.01, 50);
+    const Vector shift{testing::uniform(random_, -99, 99), testing::uniform(random_, -99, 99), testing::uniform(random_, -99, 99)};
+    const Grid moved{unit.dims, {scale, scale, scale}, shift};
+    const Camera camera = testing::random_camera(unit, random_);
+    Camera same = camera;
+    for (int k = 0; k < 3; ++k) {
+      same.eye[k] = shift[k] + scale * camera.eye[k];
+      same.look_at[k] = shift[k] + scale * camera.look_at[k];
+      same.up[k] = scale * camera.up[k];
+    }
+    const View::Region region = random_region(unit, random_);
+    const double pixels = View(camera, unit).pixels_per_unit(region);
+    EXPECT_NEAR(View(same, moved).pixels_per_unit(region) * scale, pixels, 1e-6 * pixels) << "trial " << trial;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, Views, ::testing::Range(1u, 9u));
+
+}  // namespace
+}  // namespace intervale
