@@ -95,7 +95,7 @@ IntervalVolume::IntervalVolume(Parts parts)
         n += codes_[i].coefficients();
         most = std::max(most, codes_[i].error_level());
       }
-      supercube_level_.push_back(std::uint8_t(most / 2));
+      supercube_level_.push_back(half_of_level(most));
       brick_level_[b] = std::max(brick_level_[b], std::uint16_t(most));
       brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
     });
@@ -128,10 +128,9 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
 }
 
 UpdateView IntervalVolume::update(const Place& p) const {
-  std::uint32_t first = brick_first_[p.brick] + first_in_brick_[p.supercube];
-  for (UpdateIndex i = set_.first(p.brick, p.supercube); i < p.index; ++i) first += codes_[i].coefficients();
-  const UpdateCode code = codes_[p.index];
-  return {code.side_difference(), code.first_cuts(), std::span(differences_).subspan(first, code.coefficients())};
+  std::uint32_t difference = first_difference(p.brick, p.supercube);
+  for (UpdateIndex i = set_.first(p.brick, p.supercube); i < p.index; ++i) difference += codes_[i].coefficients();
+  return update(p.index, difference);
 }
 
 std::size_t IntervalVolume::memory_bytes() const {

@@ -93,10 +93,11 @@ class IntervalVolume {
   [[nodiscard]] std::span<const float> error_levels() const { return error_levels_; }
   [[nodiscard]] std::span<const UpdateCode> codes() const { return codes_; }
   [[nodiscard]] std::span<const std::uint8_t> differences() const { return differences_; }
-  // No lower than the level of error of any of a supercube's updates, and hardly higher.
-  [[nodiscard]] unsigned supercube_error_level(std::uint32_t supercube) const {
-    return std::min(2u * supercube_level_[supercube] + 1, unsigned(error_levels_.size()) - 1);
-  }
+  // Levels of error in a byte: of each supercube the highest of its updates.
+  [[nodiscard]] std::span<const std::uint8_t> supercube_half_levels() const { return supercube_level_; }
+  [[nodiscard]] static std::uint8_t half_of_level(unsigned level) { return std::uint8_t(level / 2); }
+  // No lower than the level that half_of_level() took, and higher by one at most.
+  [[nodiscard]] unsigned level_of_half(std::uint8_t half) const { return std::min(2u * half + 1, unsigned(error_levels_.size()) - 1); }
   // How far the surfaces can still move where an update's diamond is refined to the end, in world units: no less, as far as is known. By its
   // supercube, that one's scale, and the update's level of error, with which it grows. Not saturated.
   [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned level) const {
@@ -105,6 +106,14 @@ class IntervalVolume {
   [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
   [[nodiscard]] std::span<const Yield> yields() const { return yields_; }
   [[nodiscard]] UpdateView update(const Place& p) const;  // O(1): at most 55 codes are summed
+  // The same, for those who go through a supercube and sum as they go: its first difference, and an update by its own first one.
+  [[nodiscard]] std::uint32_t first_difference(std::uint32_t brick, std::uint32_t supercube) const {
+    return brick_first_[brick] + first_in_brick_[supercube];
+  }
+  [[nodiscard]] UpdateView update(UpdateIndex i, std::uint32_t difference) const {
+    const UpdateCode code = codes_[i];
+    return {code.side_difference(), code.first_cuts(), std::span(differences_).subspan(difference, code.coefficients())};
+  }
 
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -124,7 +133,7 @@ class IntervalVolume {
   std::vector<std::uint8_t> differences_;
   std::vector<float> error_levels_;
   std::vector<Yield> yields_;                  // by supercube
-  std::vector<std::uint8_t> supercube_level_;  // by supercube: half the highest level of its updates, rounded down
+  std::vector<std::uint8_t> supercube_level_;  // by supercube: half_of_level() of the highest of its updates
   std::vector<float> brick_object_error_;      // the largest of its updates
   std::array<float, 256> factor_;              // of each step of a Yield
   float reach_ = 0;                            // no surface moves further, for h = 1: what a diamond measures across

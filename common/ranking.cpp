@@ -54,10 +54,9 @@ bool Ranking::meets_roi(const Diamond& d) const {
   return true;
 }
 
-Ranking::Brick Ranking::of_brick(std::uint32_t brick) const {
+Ranking::Brick Ranking::of_brick(std::uint32_t brick, unsigned level, float object_error) const {
   Brick b;
   b.ranking_ = this;
-  const unsigned level = volume_.brick_error_level(brick);
   const SupercubeKey key = volume_.set().bricks()[brick].key;
   b.scale_ = scale_of_key(key);
   if (level < level_) return b;
@@ -75,7 +74,7 @@ Ranking::Brick Ranking::of_brick(std::uint32_t brick) const {
   }
   b.pixels_ = float(view_->pixels_per_unit(region));
   b.near_ = view_->is_near(region);
-  const float pixels = volume_.brick_object_error(brick) * b.pixels_;
+  const float pixels = object_error * b.pixels_;
   if (pixels > pixel_error_) b.bound_ = rank_of(pixels);
   b.aside_ = view_->is_central(region) ? 0 : kAside;  // the middle of the picture a little sooner
   if (!b.near_ && b.bound_ != 0) b.bound_ = Rank(b.bound_ - b.aside_);
@@ -107,7 +106,7 @@ double Ranking::bound(Rank rank) const {
 Ranking::Rank Ranking::band_below(Rank top) const {
   if (view_) return Rank(std::max(1, top - kBand + 1));
   const auto levels = volume_.error_levels();
-  const float low = levels[top - 1u] * float(std::sqrt(0.5));
+  const float low = levels[top - 1u] * 0.25F;
   return Rank(std::lower_bound(levels.begin(), levels.end(), low) - levels.begin() + 1);
 }
 

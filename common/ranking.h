@@ -44,8 +44,8 @@ class Ranking {
       if (importance == 0) return 0;
       return ranking_->view_ ? Rank(rank_of(importance) - aside_) : Rank(importance);
     }
-    // No lower than that of any update here.
-    [[nodiscard]] Rank bound() const { return rank(importance(ranking_->volume_.supercube_error_level(supercube_))); }
+    // No lower than that of any update here whose level of error is no higher.
+    [[nodiscard]] Rank bound(unsigned level) const { return rank(importance(level)); }
     // Whether the diamond in a slot meets the region of interest.
     [[nodiscard]] bool meets_roi(int slot) const { return !ranking_->roi_ || ranking_->meets_roi(Diamond(centre_of(key_, slot))); }
     // Of an update, by number and slot.
@@ -77,11 +77,15 @@ class Ranking {
     float pixels_ = 0;
     Rank bound_ = 0;
   };
-  [[nodiscard]] Brick of_brick(std::uint32_t brick) const;
+  [[nodiscard]] Brick of_brick(std::uint32_t brick) const {
+    return of_brick(brick, volume_.brick_error_level(brick), volume_.brick_object_error(brick));
+  }
+  // Where only updates of no higher level, and no greater object error, matter any more.
+  [[nodiscard]] Brick of_brick(std::uint32_t brick, unsigned level, float object_error) const;
 
   // What is left once all of a rank above this one is there: the field error, or the pixels on the screen, that updates of this rank have at most.
   [[nodiscard]] double bound(Rank rank) const;
-  // The ranks from the result up to `top` are sent as one: errors on the screen differ by a factor of 2 at most, field errors by its square root.
+  // The ranks from the result up to `top` are sent as one: errors on the screen differ by a factor of 2 at most, field errors by 4.
   [[nodiscard]] Rank band_below(Rank top) const;
 
   [[nodiscard]] bool has_camera() const { return view_.has_value(); }

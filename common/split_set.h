@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/domain.h"
-#include "common/links.h"
 #include "common/supercube.h"
+#include "common/surroundings.h"
 
 namespace intervale {
 
@@ -26,8 +26,9 @@ class SplitSet {
   void insert(UpdateIndex i) { words_[i / 64] |= std::uint64_t(1) << (i % 64); }
   void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }
   [[nodiscard]] std::uint64_t count() const;
-  [[nodiscard]] std::uint64_t slots(const SupercubeSet& set, std::uint32_t brick, std::uint32_t supercube) const;  // of a supercube, that are in it
-  [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;                                      // all of it, in order
+  // The slots of a supercube's diamonds that are in it. occupancy: of that supercube, not 0; first: the number of its first diamond.
+  [[nodiscard]] std::uint64_t slots(UpdateIndex first, std::uint64_t occupancy) const;
+  [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;  // all of it, in order
   [[nodiscard]] std::vector<std::uint64_t>& words() { return words_; }
   friend bool operator==(const SplitSet&, const SplitSet&) = default;
 
@@ -39,7 +40,7 @@ class SplitSet {
 class Readiness {
  public:
   // All must outlive it; `split` is not to change between move_to() and ready().
-  Readiness(const SupercubeSet& set, const Domain& domain, const SplitSet& split) : set_(set), domain_(domain), split_(split) {}
+  Readiness(const SupercubeSet& set, const Domain& domain, const SplitSet& split) : domain_(domain), split_(split), around_(set) {}
 
   void move_to(SupercubeKey key);
 
@@ -47,13 +48,12 @@ class Readiness {
   [[nodiscard]] std::uint64_t ready();
 
  private:
-  [[nodiscard]] bool is_split(Link link);
-  const SupercubeSet& set_;
+  // The slots of a supercube around that are split.
+  [[nodiscard]] std::uint64_t split_slots(int where);
+  [[nodiscard]] std::uint64_t ready_inside();
   const Domain& domain_;
   const SplitSet& split_;
-  int scale_ = 0;
-  Vertex position_;
-  const std::array<Links, kSlots>* links_ = nullptr;
+  Surroundings around_;
   std::array<std::uint64_t, kCorner> slots_{};  // split ones of the supercubes around
   std::uint64_t known_ = 0;                     // which of those were looked up
 };

@@ -89,17 +89,26 @@ std::size_t SupercubeSet::home(SupercubeKey brick_key) const {
   return std::size_t((unsigned __int128)(h)*directory_.size() >> 64);
 }
 
-std::optional<SupercubeSet::Supercube> SupercubeSet::find_supercube(int scale, Vertex position) const {
-  if (bricks_.empty() || scale >= kMaxLevels) return {};
-  const SupercubeKey key = supercube_key(scale, position), brick = key & ~SupercubeKey(63);
-  for (std::size_t i = home(brick); directory_[i] != 0; i = i + 1 == directory_.size() ? 0 : i + 1) {
-    const std::uint32_t b = directory_[i] - 1;
-    if (bricks_[b].key != brick) continue;
-    const std::uint64_t bit = std::uint64_t(1) << (key & 63);
-    if (!(bricks_[b].mask & bit)) return {};
-    return Supercube{b, bricks_[b].first_supercube + std::uint32_t(std::popcount(bricks_[b].mask & (bit - 1))), key};
+std::optional<std::uint32_t> SupercubeSet::find_brick(SupercubeKey brick_key) const {
+  if (bricks_.empty()) return {};
+  for (std::size_t i = home(brick_key); directory_[i] != 0; i = i + 1 == directory_.size() ? 0 : i + 1) {
+    if (bricks_[directory_[i] - 1].key == brick_key) return directory_[i] - 1;
   }
   return {};
+}
+
+std::optional<std::uint32_t> SupercubeSet::find_brick(int scale, Vertex position) const {
+  if (scale >= kMaxLevels) return {};
+  return find_brick(supercube_key(scale, {4 * position.x, 4 * position.y, 4 * position.z}));
+}
+
+std::optional<SupercubeSet::Supercube> SupercubeSet::find_supercube(int scale, Vertex position) const {
+  if (scale >= kMaxLevels) return {};
+  const SupercubeKey key = supercube_key(scale, position);
+  const auto b = find_brick(key & ~SupercubeKey(63));
+  const std::uint64_t bit = std::uint64_t(1) << (key & 63);
+  if (!b || !(bricks_[*b].mask & bit)) return {};
+  return Supercube{*b, bricks_[*b].first_supercube + std::uint32_t(std::popcount(bricks_[*b].mask & (bit - 1))), key};
 }
 
 std::optional<Place> SupercubeSet::find(const Diamond& d) const {

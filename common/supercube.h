@@ -83,6 +83,8 @@ class SupercubeSet {
     SupercubeKey key = 0;
   };
   [[nodiscard]] std::optional<Supercube> find_supercube(int scale, Vertex position) const;
+  // The brick at a position, in bricks; not negative.
+  [[nodiscard]] std::optional<std::uint32_t> find_brick(int scale, Vertex position) const;
 
   [[nodiscard]] static Vertex centre(const Place& p) { return centre_of(p.key, int(p.slot)); }
 
@@ -136,6 +138,7 @@ class SupercubeSet {
 
  private:
   [[nodiscard]] std::size_t home(SupercubeKey brick_key) const;
+  [[nodiscard]] std::optional<std::uint32_t> find_brick(SupercubeKey brick_key) const;
   std::vector<Brick> bricks_;
   std::vector<std::uint64_t> occupancy_;
   std::vector<std::uint16_t> first_in_brick_;  // at most 63 * 56

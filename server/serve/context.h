@@ -8,15 +8,18 @@
 #include "server/serve/connections.h"
 #include "server/serve/metrics.h"
 #include "server/serve/options.h"
+#include "server/serve/turnstile.h"
 
 namespace intervale {
 
 // Outlives every session. The catalogue and the options do not change while serving.
 struct ServerContext {
+  explicit ServerContext(unsigned threads) : turnstile(threads) {}
   ServeOptions options;
   Catalogue catalogue;
   Metrics metrics;
   Connections connections;
+  Turnstile turnstile;
   std::atomic<std::uint64_t> next_session_id{1};
 };
 

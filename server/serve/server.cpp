@@ -19,6 +19,7 @@ namespace asio = boost::asio;
 
 // Destroyed from the bottom up: threads are joined in stop(), then sessions go with the io_context that holds them, the context last.
 struct Server::Running {
+  explicit Running(unsigned count) : context(count) {}
   ServerContext context;
   asio::io_context io;
   std::unique_ptr<Listener> listener;
@@ -31,14 +32,14 @@ Server::Server(std::unique_ptr<Running> running) : running_(std::move(running)) 
 Server::~Server() { stop(); }
 
 Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catalogue catalogue) {
-  auto running = std::make_unique<Running>();
+  const unsigned count = options.threads != 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  auto running = std::make_unique<Running>(count);
   running->context.options = options;
   running->context.catalogue = std::move(catalogue);
   auto listener = Listener::open(running->io, options.listen, running->context);
   if (!listener) return tl::unexpected(listener.error());
   running->listener = std::move(*listener);
   running->listener->start();
-  const unsigned count = options.threads != 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
   for (unsigned i = 0; i < count; ++i) {
     running->threads.emplace_back([&io = running->io, work = asio::make_work_guard(running->io)] { io.run(); });
   }
@@ -62,6 +63,7 @@ void Server::stop() {
   }
   running_->io.stop();
   for (std::thread& thread : running_->threads) thread.join();
+  running_->context.turnstile.clear();
 }
 
 }  // namespace intervale

@@ -23,7 +23,6 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   if (!volume_) return fault(CloseCode::no_such_dataset, "no such data set; see /api/datasets");
   dataset_ = open.dataset;
   plan_.emplace(volume_);
-  target_ = kFirstPayload;
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
 }
@@ -42,8 +41,9 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (viewing_ && view.epoch <= epoch_) return fault(CloseCode::out_of_order, "a View's epoch must be greater than the last one's");
   epoch_ = view.epoch;
   asked_ = view.lod;
-  viewing_ = true;
+  viewing_ = fresh_ = true;
   done_ = false;
+  target_ = kFirstPayload;
   return {};
 }
 
@@ -58,17 +58,18 @@ std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
   return {};
 }
 
-std::optional<protocol::ServerMessage> SessionState::next() {
+std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
   if (!std::exchange(announced_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
-  if (!viewing_ || done_) return {};
+  if (!working()) return {};
   if (asked_) plan_->set_lod(*std::exchange(asked_, std::nullopt));
-  if (credit_ < protocol::kMinCredit) return {};
-  return next_batch_or_done();
+  auto message = next_batch_or_done(max_payload);
+  if (message) fresh_ = false;
+  return message;
 }
 
-std::optional<protocol::ServerMessage> SessionState::next_batch_or_done() {
-  const std::size_t size = std::min<std::uint64_t>(target_, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
+std::optional<protocol::ServerMessage> SessionState::next_batch_or_done(std::size_t max_payload) {
+  const std::size_t size = std::min<std::uint64_t>(std::min(target_, max_payload), credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
   auto batch = plan_->next(size);
   if (!batch) {
     if (!plan_->done()) return {};

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "protocol/limits.h"
 #include "protocol/messages.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/stream_plan.h"
@@ -20,12 +21,14 @@ class SessionState {
   // Takes a client's message. A fault ends the session: nothing else may be called after.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
-  // The next message to send, or nothing for now; searching() tells whether to ask again at once. Takes a few milliseconds at most, but for a first
-  // view with a budget of updates, whose time is linear in the data set's updates.
-  [[nodiscard]] std::optional<protocol::ServerMessage> next();
+  // The next message to send, or nothing for now; working() tells whether to ask again. While it does, this takes a few milliseconds: about one for
+  // each 16 KiB of max_payload, which bounds the size of a batch. A view with a budget of updates takes time linear in the data set's updates first.
+  [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
-  // There may be something to send, which took too long to find in one turn.
-  [[nodiscard]] bool searching() const { return viewing_ && !done_ && !starved(); }
+  // There is a batch to choose and pack, or to be looked for further.
+  [[nodiscard]] bool working() const { return announced_ && viewing_ && !done_ && !starved(); }
+  // Nothing was sent yet in answer to the last view.
+  [[nodiscard]] bool fresh() const { return fresh_; }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
   [[nodiscard]] bool starved() const { return viewing_ && !done_ && credit_ < protocol::kMinCredit; }  // sends only once there is more credit
   [[nodiscard]] const std::string& dataset() const { return dataset_; }
@@ -37,7 +40,7 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
   std::optional<protocol::Fault> on(const protocol::Have& have);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
-  std::optional<protocol::ServerMessage> next_batch_or_done();
+  std::optional<protocol::ServerMessage> next_batch_or_done(std::size_t max_payload);
 
   const Catalogue& catalogue_;
   Catalogue::Volume volume_;
@@ -51,6 +54,7 @@ class SessionState {
   bool resumed_ = false;        // the client has updates of this very data
   bool announced_ = false;      // Opened was sent
   bool viewing_ = false;        // a View came
+  bool fresh_ = false;          // nothing was sent yet for epoch_
   bool done_ = false;           // Done was sent for epoch_
 };
 

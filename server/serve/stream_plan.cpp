@@ -5,7 +5,9 @@
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <boost/unordered/unordered_flat_set.hpp>
 
+#include "common/links.h"
 #include "common/refinement.h"
+#include "common/surroundings.h"
 
 namespace intervale {
 namespace {
@@ -20,11 +22,24 @@ constexpr std::uint32_t kTurn = 1 << 16;      // updates looked at before others
 
 // The batch being put together.
 struct StreamPlan::Chunk {
-  boost::unordered_flat_map<std::uint32_t, SlotGroup> groups;  // by supercube
+  Surroundings around;  // of the supercube looked into
+  std::vector<SlotGroup> groups;
+  boost::unordered_flat_map<std::uint32_t, std::uint32_t> group_of;  // by supercube
   boost::unordered_flat_set<std::uint32_t> bricks;
   std::size_t max_bytes = 0, bytes = kPlaneBytes;
   std::uint32_t updates = 0;
   std::uint32_t seen = 0;  // updates looked at
+
+  Chunk(const SupercubeSet& set, std::size_t most) : around(set), max_bytes(most) {}
+  SlotGroup* find(std::uint32_t supercube) {
+    if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
+    const auto found = group_of.find(supercube);
+    return found == group_of.end() ? nullptr : &groups[found->second];
+  }
+  SlotGroup& add(const SlotGroup& group) {
+    group_of.emplace(group.supercube, std::uint32_t(groups.size()));
+    return groups.emplace_back(group);
+  }
 };
 
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()) {
@@ -33,7 +48,11 @@ StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(s
   for (std::uint32_t b = 0; b < bricks.size(); ++b) {
     const UpdateIndex end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
     waiting_[b].unsent = std::uint16_t(end - bricks[b].first);
+    waiting_[b].level = std::uint16_t(volume_->brick_error_level(b));
+    waiting_[b].object_error = Up16(volume_->brick_object_error(b));
   }
+  const auto half_levels = volume_->supercube_half_levels();
+  half_levels_.assign(half_levels.begin(), half_levels.end());
 }
 
 bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
@@ -62,8 +81,9 @@ void StreamPlan::set_lod(const Lod& lod) {
   }
   ranking_.emplace(*volume_, lod);
   for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
-    if (waiting_[b].unsent == 0) continue;
-    set_waiting(b, std::max(ranking_->of_brick(b).bound(), only_ ? Rank(1) : Rank(0)), waiting_[b].unsent);
+    const Waiting& w = waiting_[b];
+    if (w.unsent == 0) continue;
+    set_waiting(b, std::max(ranking_->of_brick(b, w.level, float(w.object_error)).bound(), only_ ? Rank(1) : Rank(0)), w.unsent);
   }
   begin_band();
 }
@@ -97,7 +117,7 @@ StreamPlan::ToGo StreamPlan::to_go() const {
   to_go.pixels = ranking_->bound(top);
   unsigned level = 0;
   for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
-    if (waiting_[b].rank != 0) level = std::max(level, volume_->brick_error_level(b));
+    if (waiting_[b].rank != 0) level = std::max(level, unsigned(waiting_[b].level));
   }
   to_go.error = volume_->error_levels()[level];
   return to_go;
@@ -114,19 +134,33 @@ bool StreamPlan::take(const Place& place, Chunk& chunk) {
     const auto parent = set.find(c);
     if (parent && !take(*parent, chunk)) return false;
   }
-  const UpdateCode code = volume_->codes()[place.index];
-  const auto group = chunk.groups.find(place.supercube);
-  std::size_t bytes = 1 + code.coefficients();
-  if (group == chunk.groups.end()) bytes += kSupercubeBytes + (chunk.bricks.contains(place.brick) ? 0 : kBrickBytes);
+  return put(place, chunk);
+}
+
+// ... in the supercube whose surroundings the batch is in: most have all their parents.
+bool StreamPlan::take_here(const Place& place, Chunk& chunk) {
+  const Links& links = chunk.around.links(int(place.slot));
+  const int parents = diamond_type(kTypeOfSlot[place.slot]).parents;
+  for (int k = 0; k < parents; ++k) {
+    const Link link = links.vertex[links.parent[k]];
+    const Surroundings::Seen& seen = chunk.around.at(link.where);
+    if (!seen.has(link.slot) || sent_.contains(seen.number(link.slot))) continue;
+    if (!take(seen.place(link.slot), chunk)) return false;
+  }
+  return sent_.contains(place.index) || put(place, chunk);
+}
+
+bool StreamPlan::put(const Place& place, Chunk& chunk) {
+  std::size_t bytes = 1 + volume_->codes()[place.index].coefficients();
+  SlotGroup* group = chunk.find(place.supercube);
+  const bool new_brick = group == nullptr && !chunk.bricks.contains(place.brick);
+  if (group == nullptr) bytes += kSupercubeBytes + (new_brick ? kBrickBytes : 0);
   if (chunk.bytes + bytes > chunk.max_bytes || chunk.updates == kBatchUpdatesMost) return false;
   chunk.bytes += bytes;
   ++chunk.updates;
-  if (group == chunk.groups.end()) {
-    chunk.bricks.insert(place.brick);
-    chunk.groups.emplace(place.supercube, SlotGroup{place.brick, place.supercube, place.key, std::uint64_t(1) << place.slot});
-  } else {
-    group->second.slots |= std::uint64_t(1) << place.slot;
-  }
+  if (new_brick) chunk.bricks.insert(place.brick);
+  if (group == nullptr) group = &chunk.add({place.brick, place.supercube, place.key, 0});
+  group->slots |= std::uint64_t(1) << place.slot;
   sent_.insert(place.index);
   ++sent_count_;
   Waiting& w = waiting_[place.brick];
@@ -139,8 +173,10 @@ bool StreamPlan::take(const Place& place, Chunk& chunk) {
 bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
   const SupercubeSet& set = volume_->set();
   const Ranking::Brick ranking = ranking_->of_brick(brick);
-  Rank most = 0;  // no lower than any of what is left
-  unsigned left_wanted = 0;
+  // Of what is left: no lower than any of it.
+  Rank most = 0;
+  unsigned left_wanted = 0, level = 0;
+  float object_error = 0;
   bool full = false;
   set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
     if (full) return;
@@ -148,48 +184,77 @@ bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
     const std::uint64_t occupancy = set.occupancy()[s];
     const auto count = unsigned(std::popcount(occupancy));
     ++chunk.seen;
-    std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
-    if (only_) unsent &= only_->some(first, count);
-    if (unsent == 0) return;
-    const Ranking::Supercube here = ranking.supercube(s, key);
-    const Rank bound = only_ ? std::max(here.bound(), Rank(1)) : here.bound();  // only_ has ancestors too: they come last
-    if (bound < band_) {
-      most = std::max(most, bound);
-      left_wanted += bound == 0 ? 0 : unsigned(std::popcount(unsent));
-      return;
-    }
-    chunk.seen += count;
-    const float in_band = here.least(band_);
-    float most_left = only_ ? here.least(1) : 0;
-    bool some_left = false;
-    int slot = -1;  // of the update last looked at
-    std::uint64_t slots = occupancy;
-    unsigned at = 0;  // its number in the supercube, and 1
-    for (; unsent != 0 && !full; unsent &= unsent - 1) {
-      const auto k = unsigned(std::countr_zero(unsent));
-      float importance = here.importance(volume_->error_level(first + k));
-      if (importance == 0 && !only_) continue;
-      for (; at <= k; ++at, slots &= slots - 1) slot = std::countr_zero(slots);
-      if (!here.meets_roi(slot)) importance = 0;
-      if (only_) importance = std::max(importance, here.least(1));
-      if (importance == 0) continue;
-      if (importance >= in_band) {
-        full = !take({key, brick, s, std::uint32_t(slot), first + k}, chunk);
+    const std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
+    const std::uint64_t may_be_sent = only_ ? unsent & only_->some(first, count) : unsent;
+    unsigned level_here = 0;
+    if (may_be_sent != 0) {
+      const Ranking::Supercube here = ranking.supercube(s, key);
+      level_here = volume_->level_of_half(half_levels_[s]);
+      const Rank bound = std::max(here.bound(level_here), only_ ? Rank(1) : Rank(0));  // only_ has ancestors too: they come last
+      if (bound < band_) {
+        most = std::max(most, bound);
+        left_wanted += bound == 0 ? 0 : unsigned(std::popcount(may_be_sent));
       } else {
-        most_left = std::max(most_left, importance);
-        some_left = true;
-        ++left_wanted;
+        chunk.seen += count;
+        chunk.around.move_to(key);
+        const Left left = look_into(here, {key, brick, s, 0, first}, occupancy, may_be_sent, chunk);
+        full = left.full;
+        if (full) return;
+        most = std::max(most, left.most);
+        left_wanted += left.wanted;
+        level_here = left.level;
+        for (std::uint64_t others = unsent & ~may_be_sent; others != 0; others &= others - 1) {
+          level_here = std::max(level_here, volume_->error_level(first + UpdateIndex(std::countr_zero(others))));
+        }
+        half_levels_[s] = volume_->half_of_level(level_here);
       }
+    } else if (unsent != 0) {
+      level_here = volume_->level_of_half(half_levels_[s]);
     }
-    if (some_left) most = std::max(most, here.rank(most_left));
+    if (unsent == 0) return;
+    level = std::max(level, level_here);
+    object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), level_here));
   });
-  if (!full) set_waiting(brick, most, left_wanted);
-  return !full;
+  if (full) return false;
+  set_waiting(brick, most, left_wanted);
+  waiting_[brick].level = std::uint16_t(level);
+  waiting_[brick].object_error = Up16(object_error);
+  return true;
+}
+
+// Takes what the band wants of a supercube. place: its first update. may_be_sent: a bit for each of its updates, in their order.
+StreamPlan::Left StreamPlan::look_into(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent,
+                                       Chunk& chunk) {
+  const float in_band = ranking.least(band_), least = only_ ? ranking.least(1) : 0;
+  const UpdateIndex first = place.index;
+  Left left;
+  float most = 0;
+  unsigned at = 0;  // of the update last looked at, its number in the supercube, and 1
+  for (; may_be_sent != 0; may_be_sent &= may_be_sent - 1) {
+    const auto k = unsigned(std::countr_zero(may_be_sent));
+    for (; at <= k; ++at, occupancy &= occupancy - 1) place.slot = std::uint32_t(std::countr_zero(occupancy));
+    const unsigned level = volume_->error_level(first + k);
+    float importance = ranking.importance(level);
+    if (importance > 0 && !ranking.meets_roi(int(place.slot))) importance = 0;
+    importance = std::max(importance, least);
+    if (importance > 0 && importance >= in_band) {
+      place.index = first + k;
+      if (!take_here(place, chunk)) {
+        left.full = true;
+        return left;
+      }
+      continue;
+    }
+    left.level = std::max(left.level, level);
+    left.wanted += importance > 0;
+    most = std::max(most, importance);
+  }
+  left.most = ranking.rank(most);
+  return left;
 }
 
 std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
-  Chunk chunk;
-  chunk.max_bytes = max_bytes;
+  Chunk chunk(volume_->set(), max_bytes);
   while (!done()) {
     if (next_brick_ == 0) {
       if (chunk.bytes >= kSmallBatch) break;
@@ -204,9 +269,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
     if (chunk.seen >= kTurn) break;
   }
   if (chunk.updates == 0) return {};
-  std::vector<SlotGroup> groups;
-  groups.reserve(chunk.groups.size());
-  for (const auto& [supercube, group] : chunk.groups) groups.push_back(group);
+  std::vector<SlotGroup>& groups = chunk.groups;
   std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
   Batch batch;
   batch.payload = encode_batch(*volume_, sent_, groups);

@@ -1,10 +1,12 @@
 // What a session sends next: a pure function of the data set, what was asked for and what was sent. No I/O.
 //
-// Updates go out in bands of falling rank (ranking.h), half an octave of error each. Within a band they go region by region, each with the ancestors
-// it still lacks: neighbours share names and code tables, and a batch is small for what it holds. A brick is looked into only when its turn comes, so
-// a new view costs a glance at each brick, and then what it sends.
+// Updates go out in bands of falling rank (ranking.h): errors within one differ by a factor of 2 on the screen, of 4 without a camera. Within a band
+// they go region by region, each with the ancestors it still lacks: neighbours share names and code tables, and a batch is small for what it holds. A
+// brick is looked into only when its turn comes, and what was found there is kept, so a new view costs a glance at each brick, and then what it
+// sends.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -28,8 +30,8 @@ struct Batch {
 // The first batch is small, so that there is something to draw soon; each is twice the last, up to where a larger one gains nothing.
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
-// The stream of one session over one data set. One thread at a time. Beside the data set it takes one bit for each update and six bytes for each
-// brick; another bit for each update while there is a budget of updates.
+// The stream of one session over one data set. One thread at a time. Beside the data set it takes one bit for each update, a byte for each supercube
+// and ten for each brick. Another bit for each update while there is a budget of updates.
 class StreamPlan {
  public:
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
@@ -59,20 +61,39 @@ class StreamPlan {
  private:
   using Rank = Ranking::Rank;
   struct Chunk;
+  // A number that is not negative, rounded up by at most a hundredth.
+  struct Up16 {
+    std::uint16_t bits = 0;
+    Up16() = default;
+    explicit Up16(float value) : bits(std::uint16_t((std::bit_cast<std::uint32_t>(value) + 0xffff) >> 16)) {}
+    explicit operator float() const { return std::bit_cast<float>(std::uint32_t(bits) << 16); }
+  };
   // Of a brick. No brick has more updates than 64 * kSlots.
   struct Waiting {
     Rank rank = 0;             // no lower than that of any update wanted and not sent; 0: there is none
     std::uint16_t unsent = 0;  // updates
     std::uint16_t wanted = 0;  // of those, at most
+    std::uint16_t level = 0;   // of error: no lower than that of any not sent
+    Up16 object_error;         // no less than that of any not sent
   };
   void set_waiting(std::uint32_t brick, Rank rank, unsigned wanted);
   void begin_band();
   bool look_into(std::uint32_t brick, Chunk& chunk);
+  // Of a supercube, after a look.
+  struct Left {
+    bool full = false;  // the batch is: the rest is not known
+    Rank most = 0;
+    unsigned wanted = 0, level = 0;
+  };
+  Left look_into(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent, Chunk& chunk);
   bool take(const Place& place, Chunk& chunk);
+  bool take_here(const Place& place, Chunk& chunk);
+  bool put(const Place& place, Chunk& chunk);
 
   std::shared_ptr<const IntervalVolume> volume_;
   SplitSet sent_;
-  std::vector<Waiting> waiting_;  // by brick
+  std::vector<Waiting> waiting_;           // by brick
+  std::vector<std::uint8_t> half_levels_;  // by supercube: of what is not sent, IntervalVolume::half_of_level() or more
   std::optional<Ranking> ranking_;
   std::optional<SplitSet> only_;  // with a budget of updates: those within it
   std::uint64_t sent_count_ = 0, wanted_count_ = 0;

@@ -31,6 +31,8 @@ using protocol::Fault;
 using Clock = std::chrono::steady_clock;
 using Request = http::request<http::empty_body>;
 
+constexpr std::size_t kCrowdedAnswer = 4 << 10, kCrowdedPayload = 16 << 10;
+
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
@@ -144,6 +146,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (!message) return end({CloseCode::malformed, message.error().message});
     if (!state_.starved()) stalled_since_ = Clock::now();  // in case this message makes it so
     if (auto fault = state_.receive(*message)) return end(std::move(*fault));
+    if (state_.fresh()) context_.turnstile.hurry(id_);
     wake_.cancel();
   }
 
@@ -161,18 +164,36 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   asio::awaitable<void> write_messages([[maybe_unused]] std::shared_ptr<WebSocketSession> self) {
     while (!gone_) {
       if (why_) co_return co_await take_leave();
-      if (auto message = state_.next()) {
+      std::optional<protocol::ServerMessage> message;
+      if (state_.working()) {
+        co_await context_.turnstile.enter(id_, turn(), asio::use_awaitable);
+        message = compute();
+      } else {
+        message = state_.next();
+      }
+      if (message) {
         if (!co_await send(*message)) co_return cut_off();
         stalled_since_ = Clock::now();
         if (const auto* batch = std::get_if<protocol::Batch>(&*message)) context_.metrics.updates_sent_total += batch->updates;
         continue;
       }
-      if (state_.searching()) {
-        co_await asio::post(ws_.get_executor(), asio::use_awaitable);  // others' turn
-        continue;
-      }
-      co_await wait();
+      if (!why_ && !state_.working()) co_await wait();
     }
+  }
+
+  [[nodiscard]] Turnstile::Turn turn() const { return state_.fresh() ? Turnstile::Turn::answer : Turnstile::Turn::more; }
+
+  // What the session has next. Leaves the turnstile.
+  std::optional<protocol::ServerMessage> compute() {
+    struct Inside {
+      Turnstile& turnstile;
+      Turnstile::Turn turn;
+      Clock::time_point since = Clock::now();
+      ~Inside() { turnstile.leave(turn, Clock::now() - since); }
+    } const inside{context_.turnstile, turn()};
+    if (gone_ || why_) return {};
+    const bool crowded = context_.turnstile.crowded();
+    return state_.next(!crowded ? protocol::kMaxBatchPayload : state_.fresh() ? kCrowdedAnswer : kCrowdedPayload);
   }
 
   // Until something changes, or the client has kept us waiting too long.
