@@ -107,6 +107,7 @@ class LoadClient {
   Time now_;         // when the message that is looked at had come
   Time line_free_{};
   Grants grants_;
+  Time asked_;  // when Open was sent
   LoadFigures& figures_;
   LoadProgress& progress_;
   std::optional<StreamClient> mesh_;
@@ -170,10 +171,11 @@ asio::awaitable<bool> LoadClient::connect() {
 asio::awaitable<void> LoadClient::write_messages() {
   // Open, the first grant and the first view go out together, to save a round trip. Messages have names: g++ 12 destroys temporaries in a co_await
   // twice.
-  const protocol::ClientMessage open = protocol::Open{plan_.url.name, "intervale-load " INTERVALE_VERSION, grants_.take(), {}};
+  const protocol::ClientMessage open = protocol::Open{plan_.url.name, "intervale-load " INTERVALE_VERSION, grants_.take_all(), {}};
   const protocol::ClientMessage first = protocol::View{1, view_of(path_, 0)};
   if (path_.scenario == Scenario::full) pending_.push_back({1, first_view_});
   ++figures_.views;
+  asked_ = LoadClock::now();
   if (!co_await send(open) || !co_await send(first)) co_return;
   while (!gone_) {
     if (closing_) {
@@ -249,6 +251,7 @@ void LoadClient::receive(std::size_t size) {
 
 void LoadClient::take(protocol::Opened opened) {
   if (std::exchange(opened_, true)) return fail("the server sent nonsense: a second description");
+  grants_.round_trip(now_ - asked_);
   if (opened.description.content_hash != plan_.description.content_hash) return fail("the server sent nonsense: another volume than before");
   if (!plan_.verify) return;
   auto client = StreamClient::start(std::move(opened.description));
@@ -280,7 +283,8 @@ void LoadClient::take(const protocol::Batch& batch) {
   }
   if (batch.updates > 0 && (!mesh_ || mesh_->tet_count() > 0)) note_mesh();
   close_if_answered();
-  credit_due_ += grants_.take();
+  grants_.applied(protocol::cost_of(batch), now_);
+  while (const std::uint64_t bytes = grants_.take()) credit_due_ += bytes;
   if (credit_due_ != 0) wake_.cancel();
 }
 
@@ -293,6 +297,7 @@ void LoadClient::take(const protocol::Done& done) {
   ++figures_.done_views;
   has_mesh_ = true;  // if it has none, there is none
   done_ = done.epoch == view_ + 1;
+  grants_.pause();
   serve(done.epoch);
   if (path_.scenario == Scenario::full) return leave();
   close_if_answered();

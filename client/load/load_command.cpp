@@ -91,10 +91,11 @@ void add_line(CLI::App& app, LoadOptions& load) {
   app.get_option("--patience")->group(group);
   within(app.add_option_function<std::uint64_t>(
              "--rate", [&load](std::uint64_t bytes) { load.rate = bytes; }, "Bytes a second that each client reads at most; default: no limit"),
-         4096, 1e12, "BYTES_PER_S")
+         1024, 1e12, "BYTES_PER_S")
       ->group(group);
-  within(app.add_option("--window", load.window, "Credit in bytes that each client has outstanding at most: so much may come of an older view")
-             ->capture_default_str(),
+  within(app.add_option_function<std::uint64_t>(
+             "--window", [&load](std::uint64_t bytes) { load.window = bytes; },
+             "Credit in bytes that each client has outstanding at most: so much may come of an older view; default: by the line, as clients do"),
          4 * double(protocol::kMinCredit), double(protocol::kMaxWindow), "BYTES")
       ->group(group);
   within(app.add_option("--threads", load.threads, "Threads that the clients share; by default half of the cores"), 1, 256, "N")->group(group);

@@ -21,8 +21,8 @@ struct LoadOptions {
   double views_per_second = 5;
   double pixel_error = 2;
   std::uint64_t seed = 1;
-  std::optional<std::uint64_t> rate;  // see LoadPlan
-  std::uint64_t window = protocol::kDefaultWindow;
+  std::optional<std::uint64_t> rate;           // see LoadPlan
+  std::optional<std::uint64_t> window;         // off: goes by the line
   std::chrono::duration<double> patience{10};  // to be connected, and then for the WebSocket's handshake
   unsigned threads = 1;
   bool verify = false;  // keeps a mesh for each client, and compares them all at the end: see verify_meshes

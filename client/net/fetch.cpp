@@ -113,7 +113,7 @@ Result<void> Fetch::run_session() {
 // Opened took of it.
 Result<void> Fetch::open() {
   grants_.forget_outstanding();
-  protocol::Open open{url_.name, "intervale-client " INTERVALE_VERSION, options_.max_bytes ? 0 : grants_.take(), {}};
+  protocol::Open open{url_.name, "intervale-client " INTERVALE_VERSION, options_.max_bytes ? 0 : grants_.take_all(), {}};
   if (client_) open.resume = client_->description().content_hash;
   if (auto sent = connection_->send(open); !sent) return sent;
   if (client_) {
@@ -125,16 +125,20 @@ Result<void> Fetch::open() {
     }
   }
   if (auto sent = connection_->send(protocol::View{kEpoch, options_.lod}); !sent) return sent;
+  const auto asked = Clock::now();
   auto answer = connection_->receive();
   if (!answer) return tl::unexpected(answer.error());
+  const auto round_trip = Clock::now() - asked;
   auto* opened = std::get_if<protocol::Opened>(&*answer);
   if (opened == nullptr) return nonsense("something else than the data set's description");
   if (auto taken = take_description(*opened); !taken) return taken;
   note_first_mesh();
   count();
+  grants_.round_trip(round_trip);
   if (!options_.max_bytes) return {};
   const std::uint64_t taken = figures_.bytes_received + kDoneBytes;
   grants_ = Grants(*options_.max_bytes > taken ? *options_.max_bytes - taken : 0);
+  grants_.round_trip(round_trip);
   return grant();
 }
 
@@ -175,13 +179,15 @@ Result<void> Fetch::apply(const protocol::Batch& batch) {
   figures_.remaining_error = batch.remaining_error;
   figures_.remaining_pixels = batch.remaining_pixels;
   figures_.updates_to_go = batch.updates_to_go;
+  grants_.applied(protocol::cost_of(batch), Clock::now());
   return grant();
 }
 
 Result<void> Fetch::grant() {
-  const std::uint64_t bytes = grants_.take();
-  if (bytes == 0) return {};
-  return connection_->send(protocol::Credit{bytes});
+  while (const std::uint64_t bytes = grants_.take()) {
+    if (auto sent = connection_->send(protocol::Credit{bytes}); !sent) return sent;
+  }
+  return {};
 }
 
 Fetched Fetch::finish() && {

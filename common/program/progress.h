@@ -18,6 +18,7 @@ class Progress {
   void fraction(double done);           // 0 to 1
   void text(const std::string& state);  // anything short
   void note(const std::string& line);   // a line that stays, also in a pipe
+  [[nodiscard]] bool is_seen() const { return terminal_; }
 
  private:
   void show_locked(const std::string& state);

@@ -1,5 +1,6 @@
 #include "server/build/surface_moves.h"
 
+#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
@@ -82,6 +83,7 @@ class Cubes {
         for (std::int32_t x = begin.x; x <= end.x; ++x) {
           // The finest tetrahedra's edges: along one, two or three axes, from where those coordinates are even to where they are odd.
           const std::array<std::int32_t, 3> v{x, y, z};
+          if (x < end.x && y < end.y && z < end.z && !is_crossed(row + x, step)) continue;
           for (unsigned axes = 1; axes < 8; ++axes) {
             if (((axes & 1) != 0 && x == end.x) || ((axes & 2) != 0 && y == end.y) || ((axes & 4) != 0 && z == end.z)) continue;
             std::array<double, 3> even{}, odd{};  // from v
@@ -95,7 +97,7 @@ class Cubes {
             const double a = double(*first), b = double(*second);
             for (int k = 0; k < surfaces_; ++k) {
               const double surface = surface_[k].value;
-              if (surface_[k].is_beta ? (a > surface) == (b > surface) : (a < surface) == (b < surface)) continue;
+              if (!differ(a, b, surface_[k])) continue;
               const double t = (surface - a) / (b - a);
               std::array<double, 3> p;
               for (int i = 0; i < 3; ++i) {
@@ -125,6 +127,28 @@ class Cubes {
   }
 
  private:
+  struct CutAt {
+    double value;
+    bool is_beta;
+  };
+  // As the sides of samples tell (range.h): one equal to alpha or beta is inside.
+  [[nodiscard]] static bool differ(double a, double b, const CutAt& cut) {
+    return cut.is_beta ? (a > cut.value) != (b > cut.value) : (a < cut.value) != (b < cut.value);
+  }
+  // Whether a cell's eight samples, from one on, lie on different sides of a surface.
+  [[nodiscard]] bool is_crossed(const T* sample, const std::array<std::ptrdiff_t, 3>& step) const {
+    T least = *sample, most = *sample;
+    for (unsigned corner = 1; corner < 8; ++corner) {
+      const T value = sample[(corner & 1 ? step[0] : 0) + (corner & 2 ? step[1] : 0) + (corner & 4 ? step[2] : 0)];
+      least = std::min(least, value);
+      most = std::max(most, value);
+    }
+    for (int k = 0; k < surfaces_; ++k) {
+      if (differ(double(least), double(most), surface_[k])) return true;
+    }
+    return false;
+  }
+
   static constexpr std::array<std::array<int, 3>, 6> kPaths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
 
   // The tetrahedra of a cube are those of the paths along its edges from one end of the spine to the other.
@@ -233,11 +257,6 @@ class Cubes {
   const SupercubeSet& set_;
   std::vector<float>& moves_;
   double width_;
-  // As the sides of samples tell (range.h): one equal to alpha or beta is inside.
-  struct CutAt {
-    double value;
-    bool is_beta;
-  };
   std::array<CutAt, 2> surface_{};
   int surfaces_ = 0;
   double zero_ = 0;
@@ -252,10 +271,11 @@ std::vector<float> surface_moves(const Volume& volume, const Range& range, const
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain.last()};
     const Cubes<T> cubes(field, range, volume.grid, domain, set, moves);
-    const auto [begin, end] = set.of_scale(top);
-    tbb::parallel_for(begin, end, [&](std::uint32_t brick) {
+    std::vector<Diamond> all;  // few, and even fewer bricks
+    set.for_each(top, 0, [&](const Place& p) { all.emplace_back(set.centre(p)); });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, all.size(), 1), [&](const auto& some) {
       std::vector<Crossing> crossings;
-      set.for_each_in_brick(brick, kSlotsOfClass[0], [&](const Place& p) { cubes.measure(Diamond(set.centre(p)), crossings); });
+      for (std::size_t i = some.begin(); i < some.end(); ++i) cubes.measure(all[i], crossings);
     });
   });
   for (int scale = top + 1; scale < domain.levels(); ++scale) {

@@ -55,6 +55,7 @@ std::optional<Fault> SessionState::on(const protocol::Credit& credit) {
 std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
   if (bytes > protocol::kMaxWindow - credit_) return fault(CloseCode::too_large, "more credit than the largest window");
   credit_ += bytes;
+  last_grant_ = bytes;
   return {};
 }
 
@@ -69,7 +70,11 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
 }
 
 std::optional<protocol::ServerMessage> SessionState::next_batch_or_done(std::size_t max_payload) {
-  const std::size_t size = std::min<std::uint64_t>(std::min(target_, max_payload), credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
+  // Not all the credit at once: a line would run dry while the client's next grant is under way. Clients grant a quarter of their window or more, and
+  // a batch takes half of its bound.
+  const std::uint64_t bound =
+      std::min({std::uint64_t(target_), std::uint64_t(max_payload), std::max<std::uint64_t>(protocol::kMinPayload, 2 * last_grant_)});
+  const std::uint64_t size = std::min(bound, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
   auto batch = plan_->next(size);
   if (!batch) {
     if (!plan_->done()) return {};

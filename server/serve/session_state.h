@@ -48,7 +48,8 @@ class SessionState {
   std::optional<StreamPlan> plan_;
   std::optional<Lod> asked_;  // a view that the plan has not taken up yet
   std::uint64_t epoch_ = 0;
-  std::uint64_t credit_ = 0;    // outstanding
+  std::uint64_t credit_ = 0;  // outstanding
+  std::uint64_t last_grant_ = 0;
   std::uint64_t sequence_ = 0;  // of the next batch
   std::size_t target_ = 0;      // payload of the next batch, if credit allows
   bool resumed_ = false;        // the client has updates of this very data
