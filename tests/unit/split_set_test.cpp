@@ -1,0 +1,119 @@
+// What a server knows of a client's mesh, against the front of one that has it.
+#include "common/split_set.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <random>
+
+#include "common/extraction.h"
+#include "common/refinement.h"
+#include "server/build/field_hierarchy.h"
+#include "support/analytic_fields.h"
+
+namespace intervale {
+namespace {
+
+IntervalVolume made(unsigned seed) {
+  constexpr std::array<std::array<std::int32_t, 3>, 5> shapes{{{17, 17, 17}, {24, 17, 20}, {33, 12, 7}, {40, 9, 20}, {30, 2, 11}}};
+  const Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 5]) : testing::digits(shapes[seed % 5], seed);
+  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
+  EXPECT_TRUE(sigma);
+  return std::move(*sigma);
+}
+
+// Closed under parents: some of the updates, and their ancestors.
+SplitSet some_of(const IntervalVolume& volume, double share, std::mt19937& random) {
+  std::bernoulli_distribution wanted(share);
+  return select(volume.set(), [&](const Place&) { return wanted(random); });
+}
+
+class SplitSets : public ::testing::TestWithParam<unsigned> {
+ protected:
+  IntervalVolume volume_ = made(GetParam());
+  std::mt19937 random_{GetParam()};  // the seed is the test's number
+};
+
+TEST_P(SplitSets, SlotsAreThoseOfTheUpdatesInIt) {
+  const SupercubeSet& set = volume_.set();
+  for (const double share : {0.0, 0.02, 0.5, 1.0}) {
+    const SplitSet split = some_of(volume_, share, random_);
+    std::vector<std::uint64_t> expected(set.supercubes());
+    set.for_each_down([&](const Place& p) { expected[p.supercube] |= std::uint64_t(split.contains(p.index)) << p.slot; });
+    for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+      set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey) { ASSERT_EQ(split.slots(set.first(b, s), set.occupancy()[s]), expected[s]); });
+    }
+  }
+}
+
+// In the keys' order, which is what it is made for, and in any other.
+TEST_P(SplitSets, SurroundingsAreWhatIsFound) {
+  const SupercubeSet& set = volume_.set();
+  std::vector<SupercubeKey> keys;
+  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+    set.for_each_supercube(b, [&](std::uint32_t, SupercubeKey key) { keys.push_back(key); });
+  }
+  for (const bool shuffled : {false, true}) {
+    if (shuffled) std::shuffle(keys.begin(), keys.end(), random_);
+    Surroundings around(set);
+    for (const SupercubeKey key : keys) {
+      around.move_to(key);
+      for (int where = 0; where < kCorner; ++where) {
+        const auto [scale, position] = supercube_at(where, scale_of_key(key), position_of_key(key));
+        const bool outside = (position.x | position.y | position.z) < 0;
+        const auto found = outside ? std::nullopt : set.find_supercube(scale, position);
+        const Surroundings::Seen& seen = around.at(where);
+        ASSERT_EQ(seen.occupancy != 0, found.has_value());
+        if (!found) continue;
+        ASSERT_EQ(seen.key, found->key);
+        ASSERT_EQ(seen.brick, found->brick);
+        ASSERT_EQ(seen.supercube, found->supercube);
+        ASSERT_EQ(seen.occupancy, set.occupancy()[found->supercube]);
+        for (unsigned slot = 0; slot < unsigned(kSlots); ++slot) {
+          if (!seen.has(slot)) continue;
+          const Place p = set.place_in(found->brick, found->supercube, found->key, int(slot));
+          ASSERT_EQ(seen.number(slot), p.index);
+          ASSERT_EQ(seen.place(slot).index, p.index);
+        }
+      }
+    }
+  }
+}
+
+// Split ones count as ready too: what is not split and ready is what the front can split.
+TEST_P(SplitSets, ReadyIsWhatAFrontCanSplit) {
+  const SupercubeSet& set = volume_.set();
+  const Description& d = volume_.description();
+  for (const double share : {0.0, 0.01, 0.1, 0.6, 1.0}) {
+    const SplitSet split = some_of(volume_, share, random_);
+    const auto extraction =
+        extract(d.grid, *decode_base(d.base, volume_.domain()), set, split, [&](Front& front, Front::Handle handle, const Place& p) {
+          const DiamondContext context = front.context(handle);
+      Prediction prediction(context);
+          const UpdateView u = volume_.update(p);
+          const Side side = Side((unsigned(prediction.side()) + u.side_difference) % 3);
+          std::array<std::uint8_t, kMaxCuts> cuts;
+          prediction.decode(side, u.differences, cuts.data());
+          front.split(handle, side, std::span(cuts).first(u.differences.size()));
+          return true;
+        });
+    ASSERT_TRUE(extraction);
+    Readiness readiness(set, volume_.domain(), split);
+    for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+      set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+        readiness.move_to(key);
+        const std::uint64_t ready = readiness.ready(), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
+        ASSERT_EQ(is_split & ~ready, 0u) << "the ancestors of what is split are split";
+        for (int slot = 0; slot < kSlots; ++slot) {
+          const bool can_be = extraction->front.find(centre_of(key, slot)).has_value();
+          ASSERT_EQ(((ready & ~is_split) >> slot & 1) != 0, can_be) << "share " << share << ", slot " << slot;
+        }
+      });
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, SplitSets, ::testing::Range(0u, 10u));
+
+}  // namespace
+}  // namespace intervale
