@@ -31,6 +31,7 @@ Front::Front(const Grid& grid, const Base& base) : grid_(grid), domain_(grid.dim
     assert((is_origin || link.where == kCoarser) && "the other corners are in the supercube at (0, 0, 0)");
     Split& s = block.of[is_origin ? 0 : link.slot];
     block.split |= std::uint64_t(1) << (is_origin ? 0 : link.slot);
+    block.shown = block.split;
     s.bits = std::uint32_t(base.side[v]) << kSideBit;
     sides |= std::uint32_t(base.side[v]) << (2 * v);
     // Its cuts in order of the other end's number, which is not the order of the root's edges.
@@ -88,7 +89,14 @@ bool Front::merge(Vertex centre) {
   const int slot = kSlotOfType[d.type];
   const Block* const found = find_block(d.scale, {centre.x >> (d.scale + 2), centre.y >> (d.scale + 2), centre.z >> (d.scale + 2)});
   if (found == nullptr || !(found->split >> slot & 1)) return false;
-  const Existing e = existing(d);
+  if (has_children_among(d, existing(d), &Block::split)) return false;
+  if (found->shown >> slot & 1) hide({supercube_key(d.scale, found->position), slot});
+  const_cast<Block*>(found)->split &= ~(std::uint64_t(1) << slot);
+  --split_count_;
+  return true;
+}
+
+bool Front::has_children_among(const Diamond& d, const Existing& e, std::uint64_t Block::*slots) const {
   for (int k = 0; k < d.row->children && d.has_children(); ++k) {
     const Diamond child(d.child(k));
     bool handed = false;
@@ -96,16 +104,34 @@ bool Front::merge(Vertex centre) {
     if (!handed) continue;
     const int up = child.scale + 2;
     const Block* const block = find_block(child.scale, {child.centre.x >> up, child.centre.y >> up, child.centre.z >> up});
-    if (block != nullptr && (block->split >> kSlotOfType[child.type] & 1)) return false;
+    if (block != nullptr && (block->*slots >> kSlotOfType[child.type] & 1)) return true;
   }
+  return false;
+}
+
+bool Front::hide(Handle handle) {
   Cursor cursor(*this);
-  cursor.move_to(d.scale, found->position);
-  [[maybe_unused]] const bool is_there = cursor.gather(slot);
-  assert(is_there && "the ancestors of a split diamond are split");
-  const std::uint32_t sides = cursor.context().sides | std::uint32_t(found->of[slot].side()) << (2 * kCentre);
-  tet_count_ += count_tets(d, e, sides) - count_halves(d, e, sides);
-  const_cast<Block*>(found)->split &= ~(std::uint64_t(1) << slot);
-  --split_count_;
+  cursor.move_to(handle.supercube);
+  if (!cursor.gather(handle.slot)) return false;
+  Block& block = obtain_block(scale_of_key(handle.supercube), position_of_key(handle.supercube));
+  if (!(block.shown >> handle.slot & 1) || has_children_among(cursor.diamond(), cursor.existing_, &Block::shown)) return false;
+  tet_count_ -= std::uint64_t(cursor.added_tets(block.of[handle.slot]));
+  block.shown &= ~(std::uint64_t(1) << handle.slot);
+  --shown_count_;
+  return true;
+}
+
+bool Front::show(Handle handle, std::uint64_t max_tets) {
+  Cursor cursor(*this);
+  cursor.move_to(handle.supercube);
+  if (!cursor.gather(handle.slot) || !cursor.is_split()) return false;
+  Block& block = obtain_block(scale_of_key(handle.supercube), position_of_key(handle.supercube));
+  if ((block.shown >> handle.slot & 1) || !cursor.parents_are_shown()) return false;
+  const std::uint64_t tets = tet_count_ + std::uint64_t(cursor.added_tets(block.of[handle.slot]));
+  if (tets > max_tets) return false;
+  tet_count_ = tets;
+  block.shown |= std::uint64_t(1) << handle.slot;
+  ++shown_count_;
   return true;
 }
 
@@ -116,6 +142,16 @@ std::vector<SlotGroup> Front::splits() const {
   }
   std::sort(splits.begin(), splits.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.key < b.key; });
   return splits;
+}
+
+std::uint64_t Front::shown_slots(SupercubeKey supercube) const {
+  const Block* const block = find_block(scale_of_key(supercube), position_of_key(supercube));
+  return block == nullptr ? 0 : block->shown;
+}
+
+bool Front::is_hidden(Handle handle) const {
+  const Block* const block = find_block(scale_of_key(handle.supercube), position_of_key(handle.supercube));
+  return block != nullptr && ((block->split & ~block->shown) >> handle.slot & 1) != 0;
 }
 
 std::size_t Front::memory_bytes() const { return blocks_.size() * sizeof(Block) + index_.bucket_count() * 17 + q_.capacity(); }
@@ -311,20 +347,34 @@ const DiamondContext& Front::Cursor::look_closer() {
 
 std::uint64_t Front::Cursor::split_slots() { return at({kHere, 0}).block->split; }
 
-// Writes the diamond's split to where there is room for it. Returns how many more tetrahedra there are.
-std::int64_t Front::Cursor::write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first) {
+// Writes the diamond's split to where there is room for it.
+void Front::Cursor::write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first) {
   Split& s = block.of[slot_];
   s.first = first;
   s.bits = context_.cut_bits(side) | std::uint32_t(side) << kSideBit;
   std::copy(cuts.begin(), cuts.end(), front_.q_.begin() + first);
-  if (!existing_.straddles && (s.bits & kCutBits) == 0) {  // all on one side: every tetrahedron inside becomes two
-    return side == Side::inside ? std::popcount(existing_.tets) : 0;
+}
+
+std::int64_t Front::Cursor::added_tets(const Split& split) const {
+  if (!existing_.straddles && (split.bits & kCutBits) == 0) {  // all on one side: every tetrahedron inside becomes two
+    return split.side() == Side::inside ? std::popcount(existing_.tets) : 0;
   }
-  const std::uint32_t sides = context_.sides | std::uint32_t(side) << (2 * kCentre);
+  const std::uint32_t sides = context_.sides | std::uint32_t(split.side()) << (2 * kCentre);
   return std::int64_t(front_.count_halves(*diamond_, existing_, sides) - front_.count_tets(*diamond_, existing_, sides));
 }
 
-void Front::Cursor::split(Side side, std::span<const std::uint8_t> cuts) {
+bool Front::Cursor::parents_are_shown() {
+  const Links& links = (*links_)[slot_];
+  for (int k = 0; k < diamond_type(kTypeOfSlot[slot_]).parents; ++k) {
+    const int v = links.parent[k];
+    if (!(existing_.vertices >> v & 1)) continue;
+    const Found parent = at(links.vertex[v]);
+    if (!(parent.block->shown >> parent.slot & 1)) return false;
+  }
+  return true;
+}
+
+void Front::Cursor::split(Side side, std::span<const std::uint8_t> cuts, std::uint64_t max_tets) {
   assert(int(cuts.size()) == context_.count_cuts(side).all && "the caller counted");
   Block& block = front_.obtain_block(scale_, position_);
   near_[kHere] = &block;
@@ -335,9 +385,16 @@ void Front::Cursor::split(Side side, std::span<const std::uint8_t> cuts) {
     first = std::uint32_t(front_.q_.size());
     front_.q_.resize(front_.q_.size() + cuts.size() + (side == Side::inside ? 1 : 0));
   }
-  front_.tet_count_ += std::uint64_t(write(block, side, cuts, first));
+  write(block, side, cuts, first);
+  const bool all_shown = front_.shown_count_ == front_.split_count_;
   block.split |= std::uint64_t(1) << slot_;
   ++front_.split_count_;
+  if (!all_shown) return;
+  const std::uint64_t tets = front_.tet_count_ + std::uint64_t(added_tets(block.of[slot_]));
+  if (tets > max_tets) return;
+  front_.tet_count_ = tets;
+  block.shown |= std::uint64_t(1) << slot_;
+  ++front_.shown_count_;
 }
 
 }  // namespace intervale

@@ -6,7 +6,10 @@
 // eight bytes and its cuts, a merge clears one bit, and the front is implied. The mesh is made of duets all the same: the halves that split diamonds
 // leave to children that are not split.
 //
-// After any sequence of splits and merges the mesh is conforming and positively oriented, and depends only on which diamonds are split.
+// A split can also be hidden, with all that came after it: it is kept, what is split further is found by it, but the mesh is made without it, and it
+// comes back at the cost of counting its tetrahedra. So a client with a budget keeps more than it draws.
+//
+// After any sequence of splits, merges, hides and shows the mesh is conforming and positively oriented, and depends only on which splits are shown.
 #pragma once
 
 #include <algorithm>
@@ -51,19 +54,27 @@ class Front {
   // What the diamond knows before its split. Its count_cuts tells how many coefficients splitting takes.
   [[nodiscard]] DiamondContext context(Handle handle) const;
 
-  // Splits a diamond. cuts: q (see Cuts) of each cut on the subdivision edges, centre to vertex, in order of local vertices, alpha before beta:
-  // context(handle).count_cuts(side).all of them.
+  // Splits a diamond, and shows that if all splits so far are shown. cuts: q (see Cuts) of each cut on the subdivision edges, centre to vertex, in
+  // order of local vertices, alpha before beta: context(handle).count_cuts(side).all of them.
   void split(Handle handle, Side side, std::span<const std::uint8_t> cuts);
 
   // Undoes the split of a diamond none of whose children is split. False, and nothing done, if there is no such.
   bool merge(Vertex centre);
 
-  [[nodiscard]] std::uint64_t tet_count() const { return tet_count_; }
-  [[nodiscard]] std::uint64_t split_count() const { return split_count_; }  // diamonds that are split
+  // Takes a split that is shown out of the mesh, or puts one that is hidden back. False, and nothing done, if a child's split is shown, or a parent's
+  // hidden; or if the mesh would have more than max_tets tetrahedra.
+  bool hide(Handle handle);
+  bool show(Handle handle, std::uint64_t max_tets);
+
+  [[nodiscard]] std::uint64_t tet_count() const { return tet_count_; }      // of the mesh
+  [[nodiscard]] std::uint64_t split_count() const { return split_count_; }  // diamonds that are split, hidden ones too
+  [[nodiscard]] std::uint64_t shown_count() const { return shown_count_; }  // of those, the mesh's
   [[nodiscard]] std::size_t memory_bytes() const;
 
-  // The diamonds that are split, by supercube, keys ascending; only keys and slots mean something.
+  // The diamonds that are split, hidden ones too, by supercube, keys ascending; only keys and slots mean something.
   [[nodiscard]] std::vector<SlotGroup> splits() const;
+  [[nodiscard]] std::uint64_t shown_slots(SupercubeKey supercube) const;  // of that one's splits
+  [[nodiscard]] bool is_hidden(Handle handle) const;                      // split, but not shown
 
   // The mesh, in world coordinates.
   [[nodiscard]] Mesh mesh(const ParallelFor& parallel = in_turn) const;
@@ -72,8 +83,8 @@ class Front {
   // else. O(front).
   [[nodiscard]] bool is_part_of(const Front& other) const;
 
-  // Merges every diamond that is not split in `coarse`, children first: of two fronts of one stream, the finer becomes equal to the coarser. False
-  // if some could not be merged, because what `coarse` has split needs them. O(front).
+  // Merges every diamond whose split is not shown in `coarse`, children first: of two fronts of one stream, the finer one's mesh becomes equal to the
+  // coarser one's. False if some could not be merged, because what `coarse` shows needs them. O(front).
   [[nodiscard]] bool coarsen_to(const Front& coarse);
 
   // Every invariant that can be checked from inside; the first one that does not hold, as a text. For tests; O(front).
@@ -108,6 +119,7 @@ class Front {
     Vertex position;  // centre >> (scale + 2)
     std::int32_t scale = 0;
     std::uint64_t split = 0;  // slots
+    std::uint64_t shown = 0;  // of those
     std::array<Split, kSlots> of{};
     // Numbers of the supercubes around it that were looked for and found, and 1; by where (links.h). Kept by whoever looks, on any thread.
     mutable std::array<std::uint32_t, kCorner> near{};
@@ -129,6 +141,8 @@ class Front {
     return std::span(q_).subspan(split.first, split.centre() - split.first);
   }
   [[nodiscard]] bool has_splits_of(const Block& block, const Front& owner) const;
+  // Whether a diamond handed tetrahedra to a child with one of these.
+  [[nodiscard]] bool has_children_among(const Diamond& d, const Existing& e, std::uint64_t Block::*slots) const;
   [[nodiscard]] Existing existing(const Diamond& d) const;
   [[nodiscard]] bool is_border(Vertex v) const;
   [[nodiscard]] std::uint64_t count_tets(const Diamond& d, const Existing& e, std::uint32_t sides) const;
@@ -143,7 +157,7 @@ class Front {
   boost::unordered_flat_map<std::uint64_t, std::uint32_t> index_;  // of blocks, by scale and position
   Block corner_;                                                   // vertex (0, 0, 0): slot 0
   std::vector<std::uint8_t> q_;                                    // of every cut; one more for a centre inside
-  std::uint64_t tet_count_ = 0, split_count_ = 0;
+  std::uint64_t tet_count_ = 0, split_count_ = 0, shown_count_ = 0;
 };
 
 class Front::Cursor {
@@ -165,11 +179,12 @@ class Front::Cursor {
   [[nodiscard]] const DiamondContext& context() const { return context_; }  // but for its cuts, which are those of any diamond
   const DiamondContext& look_closer();                                      // with its cuts
   [[nodiscard]] bool is_split() { return (split_slots() >> slot_ & 1) != 0; }
+  [[nodiscard]] bool is_shown() { return (at({kHere, 0}).block->shown >> slot_ & 1) != 0; }
 
   [[nodiscard]] std::uint64_t split_slots();  // of this supercube
 
-  // Splits the diamond found last, after a closer look. As Front::split.
-  void split(Side side, std::span<const std::uint8_t> cuts);
+  // Splits the diamond found last, after a closer look. As Front::split; but hidden if the mesh would have more than max_tets tetrahedra.
+  void split(Side side, std::span<const std::uint8_t> cuts, std::uint64_t max_tets = ~std::uint64_t(0));
 
  private:
   friend class Front;
@@ -186,7 +201,9 @@ class Front::Cursor {
     return {block, link.slot | corner_slot_[link.where]};
   }
   [[nodiscard]] bool is_idle() const { return existing_.straddles && front_.domain_.is_idle(*diamond_); }
-  std::int64_t write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first);
+  void write(Block& block, Side side, std::span<const std::uint8_t> cuts, std::uint32_t first);
+  [[nodiscard]] std::int64_t added_tets(const Split& split) const;  // by showing the split of the diamond found last
+  [[nodiscard]] bool parents_are_shown();                           // of the diamond found last
 
   Front& front_;
   int scale_ = 0, slot_ = 0;
@@ -219,8 +236,9 @@ std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const 
       size += cut_count(i) + 1;
     }
     // Said before it is so: whoever looks has come to a later pass than its ancestors.
-    block->split = g.slots;
+    block->split = block->shown = g.slots;
     split_count_ += std::uint64_t(std::popcount(g.slots));
+    shown_count_ += std::uint64_t(std::popcount(g.slots));
   }
   q_.resize(size);
   constexpr std::size_t kPiece = 32, kPiecesBetweenProgress = 512;  // in supercubes; in pieces
@@ -256,7 +274,8 @@ std::optional<Vertex> Front::split_all(const SupercubeSet& set, std::span<const 
               if (!failed.exchange(true)) wrong = centre_of(g.key, slot);
               return;
             }
-            sum += cursor.write(*blocks[k], *side, std::span(q).first(n), blocks[k]->of[slot].first);
+            cursor.write(*blocks[k], *side, std::span(q).first(n), blocks[k]->of[slot].first);
+            sum += cursor.added_tets(blocks[k]->of[slot]);
           }
         }
         added += sum;

@@ -40,7 +40,7 @@ bool Front::coarsen_to(const Front& coarse) {
     for (int cls = 2; cls >= 0; --cls) {
       for (auto block = first; block != last; ++block) {
         const Block* const kept = coarse.find_block((*block)->scale, (*block)->position);
-        const std::uint64_t surplus = (*block)->split & kSlotsOfClass[cls] & ~(kept == nullptr ? 0 : kept->split);
+        const std::uint64_t surplus = (*block)->split & kSlotsOfClass[cls] & ~(kept == nullptr ? 0 : kept->shown);
         for (std::uint64_t left = surplus; left != 0; left &= left - 1) {
           if (!merge(centre_of((*block)->scale, (*block)->position, std::countr_zero(left)))) return false;
         }

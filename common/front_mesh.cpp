@@ -123,7 +123,7 @@ class FrontMesh {
   template <class Visit>
   void for_each_point(const Front::Block& block, const Visit& visit) const {
     const bool at_border = is_at_border(block);
-    for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+    for (std::uint64_t left = block.shown; left != 0; left &= left - 1) {
       const int slot = std::countr_zero(left);
       for_each_point(Diamond(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]), block.of[slot], at_border, visit);
     }
@@ -149,7 +149,7 @@ class FrontMesh {
     if (piece == 0) for_corner(use);
     for_each_block(piece, [&](const Front::Block& block) {
       if (is_at_border(block)) return for_each_point(block, use);
-      for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+      for (std::uint64_t left = block.shown; left != 0; left &= left - 1) {
         const Front::Split& split = block.of[std::countr_zero(left)];
         std::fill(used_.begin() + split.first, used_.begin() + split.centre() + (split.side() == Side::inside), std::uint8_t(1));
       }
@@ -162,7 +162,7 @@ class FrontMesh {
     for_each_block(piece, [&](const Front::Block& block) {
       if (block.scale == front_.domain_.levels()) return;
       cursor.move_to(block.scale, block.position);
-      for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+      for (std::uint64_t left = block.shown; left != 0; left &= left - 1) {
         const Links& links = (*cursor.links_)[std::countr_zero(left)];
         const Links::Edge spine = links.edge[0];
         const auto found = cursor.at(links.vertex[spine.owner]);
@@ -227,9 +227,9 @@ class FrontMesh {
       emit_root(names, out);
       return;
     }
-    if (block.split == 0) return;
+    if (block.shown == 0) return;
     cursor.move_to(block.scale, block.position);
-    for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
+    for (std::uint64_t left = block.shown; left != 0; left &= left - 1) {
       const int slot = std::countr_zero(left);
       const unsigned children = unsplit_children(cursor, slot);
       if (children != 0 && cursor.gather(slot)) emit_halves(cursor, block.of[slot], children, names, out);
@@ -240,7 +240,7 @@ class FrontMesh {
     const Diamond root(front_.domain_.root());
     Front::Cursor cursor(front_);
     cursor.move_to(root.scale, {});
-    if (!cursor.gather(kSlotOfType[root.type]) || cursor.is_split()) return;
+    if (!cursor.gather(kSlotOfType[root.type]) || cursor.is_shown()) return;
     PointsAround points;
     gather_points(cursor, names, points);
     for (int t = 0; t < root.row->tets; ++t) {
@@ -250,14 +250,14 @@ class FrontMesh {
     }
   }
 
-  // A bit for each child that is not split.
+  // A bit for each child whose split is not shown.
   [[nodiscard]] unsigned unsplit_children(Front::Cursor& cursor, int slot) const {
     const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
     const Links& links = (*cursor.links_)[slot];
     unsigned unsplit = 0;
     for (int k = 0; k < row.children; ++k) {
       const auto found = cursor.at(links.child[k]);
-      unsplit |= unsigned(~found.block->split >> found.slot & 1) << k;
+      unsplit |= unsigned(~found.block->shown >> found.slot & 1) << k;
     }
     return unsplit;
   }

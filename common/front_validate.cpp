@@ -5,7 +5,7 @@
 namespace intervale {
 
 std::optional<std::string> Front::validate() const {
-  std::uint64_t splits = 0;
+  std::uint64_t splits = 0, shown = 0;
   Cursor cursor(*this);
   const Diamond root(domain_.root());
   cursor.move_to(root.scale, {});
@@ -25,13 +25,18 @@ std::optional<std::string> Front::validate() const {
       if (unsigned(split.side()) > 2) return "a side is none" + where;
       if ((split.bits & kCutBits) != context.cut_bits(split.side())) return "the cuts do not fit the sides" + where;
       if (std::size_t(split.centre()) + (split.side() == Side::inside ? 1 : 0) > q_.size()) return "a cut has no place" + where;
+      ++splits;
+      if (!(block.shown >> slot & 1)) continue;
+      ++shown;
+      if (!cursor.parents_are_shown()) return "a split is shown before its parents'" + where;
       const Existing e = existing(d);
       const std::uint32_t sides = context.sides | std::uint32_t(split.side()) << (2 * kCentre);
       tets += count_halves(d, e, sides) - count_tets(d, e, sides);
-      ++splits;
     }
+    if ((block.shown & ~block.split) != 0) return "what is not split is shown";
   }
   if (splits != split_count_) return "the split diamonds are miscounted: " + std::to_string(split_count_) + " for " + std::to_string(splits);
+  if (shown != shown_count_) return "the shown splits are miscounted: " + std::to_string(shown_count_) + " for " + std::to_string(shown);
   if (tets != tet_count_) return "the tetrahedra are miscounted: " + std::to_string(tet_count_) + " for " + std::to_string(tets);
   return {};
 }

@@ -29,23 +29,6 @@ Ranking::Ranking(const IntervalVolume& volume, const Lod& lod) : volume_(volume)
   }
 }
 
-// The diamonds of a cube of `cells` supercubes a side, from that with this key on: they reach h further down, and no further up.
-View::Region Ranking::region_of(SupercubeKey key, std::int32_t cells) const {
-  const int scale = scale_of_key(key);
-  const Vertex p = position_of_key(key), last = volume_.domain().last();
-  const std::int32_t h = 1 << scale;
-  View::Region region;
-  const auto along = [&](int axis, std::int32_t at, std::int32_t end) {
-    const double low = std::max(0.0, 4.0 * at * h - h), high = std::min(double(end), 4.0 * (at + cells) * h);
-    region.middle[axis] = (low + high) / 2;
-    region.reach[axis] = std::max(0.0, (high - low) / 2);
-  };
-  along(0, p.x, last.x);
-  along(1, p.y, last.y);
-  along(2, p.z, last.z);
-  return region;
-}
-
 bool Ranking::meets_roi(const Diamond& d) const {
   const double c[3] = {double(d.centre.x), double(d.centre.y), double(d.centre.z)};
   for (int i = 0; i < 3; ++i) {
@@ -64,7 +47,7 @@ Ranking::Brick Ranking::of_brick(std::uint32_t brick, unsigned level, float obje
     b.bound_ = Rank(level + 1);
     return b;
   }
-  const View::Region region = region_of(key, 4);
+  const View::Region region = region_of(volume_.domain(), key, 4);
   for (int i = 0; i < 3 && roi_; ++i) {
     if (region.middle[i] + region.reach[i] < roi_->min[i] || region.middle[i] - region.reach[i] > roi_->max[i]) return b;
   }
@@ -90,7 +73,7 @@ Ranking::Supercube Ranking::Brick::supercube(std::uint32_t supercube, SupercubeK
   s.pixels_ = pixels_;
   s.aside_ = aside_;
   if (near_) {
-    const View::Region region = ranking_->region_of(key, 1);
+    const View::Region region = region_of(ranking_->volume_.domain(), key, 1);
     s.pixels_ = float(ranking_->view_->pixels_per_unit(region));
     s.aside_ = ranking_->view_->is_central(region) ? 0 : kAside;
   }

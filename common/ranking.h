@@ -101,7 +101,6 @@ class Ranking {
   // The least pixels of a rank, but for what aside_ takes off.
   [[nodiscard]] static float pixels_of(int rank) { return std::bit_cast<float>(std::uint32_t(rank + kRankFrom) << kRankShift); }
   [[nodiscard]] bool meets_roi(const Diamond& d) const;
-  [[nodiscard]] View::Region region_of(SupercubeKey key, std::int32_t cells) const;
 
   const IntervalVolume& volume_;
   unsigned level_ = 0;  // the lowest level of field error that is wanted

@@ -129,13 +129,13 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
   return out;
 }
 
-Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::optional<std::uint64_t> max_tets) {
+Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::uint64_t max_tets) {
   const auto keys = take_supercubes(bytes, kBatchUpdatesMost);
   if (!keys) return damaged(keys.error().message.c_str());
   const auto length = take_varint(bytes);
   if (!length || *length != bytes.size()) return damaged("its length");
 
-  Applied applied;
+  std::uint64_t updates = 0;
   const char* wrong = nullptr;
   RangeDecoder coder(bytes);
   FlagModel flags;
@@ -150,7 +150,7 @@ Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, s
       return false;
     }
     if (!is_split) return true;
-    if (applied.updates == kBatchUpdatesMost) {
+    if (updates == kBatchUpdatesMost) {
       wrong = "it has too many updates";
       return false;
     }
@@ -166,13 +166,8 @@ Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, s
       return false;
     }
     prediction.decode(side, std::span(coded).first(std::size_t(count.all)), cuts.data());
-    cursor.split(side, std::span(cuts).first(std::size_t(count.all)));
-    if (max_tets && front.tet_count() > *max_tets) {
-      front.merge(cursor.diamond().centre);
-      applied.over_budget = true;
-      return false;
-    }
-    ++applied.updates;
+    cursor.split(side, std::span(cuts).first(std::size_t(count.all)), max_tets);
+    ++updates;
     return true;
   };
   for_each_class(
@@ -186,9 +181,8 @@ Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, s
         return true;
       });
   if (wrong != nullptr) return damaged(wrong);
-  if (applied.over_budget) return applied;
   if (!coder.is_spent()) return damaged("it has more than its updates call for");
-  return applied;
+  return updates;
 }
 
 }  // namespace intervale

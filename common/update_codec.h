@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,12 +24,8 @@ inline constexpr std::size_t kBatchUpdatesMost = 1 << 17;  // in one batch; what
 // is applied, closed under parents; the groups' updates are in it.
 [[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups);
 
-struct Applied {
-  std::uint64_t updates = 0;
-  bool over_budget = false;  // an update was left out, and all after it, because the mesh would have passed max_tets
-};
-
-// Applies a batch from outside. Fails where the bytes are no batch or an update does not fit the front, which is then of no more use.
-[[nodiscard]] Result<Applied> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::optional<std::uint64_t> max_tets = {});
+// Applies a batch from outside, and returns how many updates it had. Those that the mesh has no room for below max_tets, and all after them, are
+// hidden (Front::hide). Fails where the bytes are no batch or an update does not fit the front, which is then of no more use.
+[[nodiscard]] Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0));
 
 }  // namespace intervale

@@ -82,4 +82,21 @@ bool View::is_central(const Region& region) const {
   return std::abs(dot(at, right_)) <= tan_x_ / 2 * depth && std::abs(dot(at, up_)) <= tan_y_ / 2 * depth;
 }
 
+// Diamonds reach h further down than their supercubes, and no further up.
+View::Region region_of(const Domain& domain, SupercubeKey key, std::int32_t cells) {
+  const int scale = scale_of_key(key);
+  const Vertex p = position_of_key(key), last = domain.last();
+  const std::int32_t h = 1 << scale;
+  View::Region region;
+  const auto along = [&](int axis, std::int32_t at, std::int32_t end) {
+    const double low = std::max(0.0, 4.0 * at * h - h), high = std::min(double(end), 4.0 * (at + cells) * h);
+    region.middle[axis] = (low + high) / 2;
+    region.reach[axis] = std::max(0.0, (high - low) / 2);
+  };
+  along(0, p.x, last.x);
+  along(1, p.y, last.y);
+  along(2, p.z, last.z);
+  return region;
+}
+
 }  // namespace intervale

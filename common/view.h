@@ -6,8 +6,10 @@
 
 #include <array>
 
+#include "common/domain.h"
 #include "common/grid.h"
 #include "common/lod.h"
+#include "common/supercube.h"
 
 namespace intervale {
 
@@ -43,5 +45,8 @@ class View {
   double tan_x_ = 0, tan_y_ = 0;  // of half the angles of view
   double cos_corner_ = 0;         // of the angle between the line of sight and the picture's corners
 };
+
+// Where the diamonds of a cube of `cells` supercubes a side lie, from that with this key on, as far as there are samples.
+[[nodiscard]] View::Region region_of(const Domain& domain, SupercubeKey key, std::int32_t cells);
 
 }  // namespace intervale

@@ -59,7 +59,7 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
   const FetchFigures& figures = fetched.figures;
   const double volume = volume_of(mesh);
   if (options.json) {
-    return print_json({{"updates", fetched.client.updates()},
+    return print_json({{"updates", fetched.client.updates_in_mesh()},
                        {"vertices", mesh.points.size()},
                        {"tets", mesh.tets.size()},
                        {"volume", volume},
@@ -70,7 +70,7 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
                        {"seconds", figures.seconds}});
   }
   std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}\n", fetched.client.description().name,
-                                 fetched.client.updates(), mesh.points.size(), mesh.tets.size(), volume);
+                                 fetched.client.updates_in_mesh(), mesh.points.size(), mesh.tets.size(), volume);
   text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(figures.bytes_received),
                       figures.messages, 1000 * figures.seconds_first_mesh, figures.complete ? "all" : "budget reached", 1000 * figures.seconds);
   if (options.output) text += "wrote " + options.output->string() + "\n";

@@ -13,22 +13,25 @@ Result<StreamClient> StreamClient::start(Description description, std::optional<
   if (!base) return tl::unexpected(base.error());
   Front front(description.grid, *base);
   StreamClient client(std::move(description), std::move(front));
-  client.max_tets_ = max_tets;
-  client.over_budget_ = max_tets && client.front_.tet_count() > *max_tets;
+  if (max_tets) client.max_tets_ = *max_tets;
   return client;
 }
 
 Result<void> StreamClient::apply(std::span<const std::uint8_t> payload) {
-  if (over_budget_) return {};
   const auto applied = apply_batch(front_, payload, max_tets_);
   if (!applied) return tl::unexpected(applied.error());
-  updates_ += applied->updates;
-  over_budget_ = applied->over_budget;
+  if (importance_ && over_budget()) balance(front_, max_tets_, importance_);
   return {};
 }
 
-bool StreamClient::over_budget() const { return over_budget_; }
-std::uint64_t StreamClient::updates() const { return updates_; }
+void StreamClient::look(const Camera& camera) {
+  importance_ = size_on_screen(camera, description_.grid);
+  if (over_budget()) balance(front_, max_tets_, importance_);
+}
+
+bool StreamClient::over_budget() const { return front_.shown_count() < front_.split_count() || front_.tet_count() > max_tets_; }
+std::uint64_t StreamClient::updates() const { return front_.split_count(); }
+std::uint64_t StreamClient::updates_in_mesh() const { return front_.shown_count(); }
 std::uint64_t StreamClient::tet_count() const { return front_.tet_count(); }
 const Description& StreamClient::description() const { return description_; }
 const Front& StreamClient::front() const { return front_; }

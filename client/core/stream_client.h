@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "client/core/budget.h"
 #include "common/description.h"
 #include "common/front.h"
 #include "common/mesh.h"
@@ -20,12 +21,16 @@ class StreamClient {
   static Result<StreamClient> start(Description description, std::optional<std::uint64_t> max_tets = {});
 
   // Applies one batch (the payload of a Batch). After every successful call the mesh is conforming. A payload that is damaged,
-  // or does not fit the mesh so far, is an error, and this object must not be used again. Stops applying (see over_budget) when max_tets would be
-  // passed.
+  // or does not fit what came so far, is an error, and this object must not be used again. Where the mesh has no room for more below max_tets, what
+  // comes is kept; in the mesh stays what came first, or once look() was called, what matters most.
   Result<void> apply(std::span<const std::uint8_t> payload);
 
-  [[nodiscard]] bool over_budget() const;         // an update was left out for max_tets: nothing more will be applied
-  [[nodiscard]] std::uint64_t updates() const;    // applied so far
+  // Where the mesh is seen from, from now on. camera: one that check_lod lets pass.
+  void look(const Camera& camera);
+
+  [[nodiscard]] bool over_budget() const;       // not all that came is in the mesh
+  [[nodiscard]] std::uint64_t updates() const;  // that came so far
+  [[nodiscard]] std::uint64_t updates_in_mesh() const;
   [[nodiscard]] std::uint64_t tet_count() const;  // of the mesh now; O(1)
   [[nodiscard]] const Description& description() const;
   [[nodiscard]] std::vector<SlotGroup> splits() const { return front_.splits(); }  // what to resume with; see Front::splits
@@ -36,9 +41,8 @@ class StreamClient {
   explicit StreamClient(Description description, Front front);
   Description description_;
   Front front_;
-  std::optional<std::uint64_t> max_tets_;
-  std::uint64_t updates_ = 0;
-  bool over_budget_ = false;
+  std::uint64_t max_tets_ = ~std::uint64_t(0);
+  Importance importance_;  // of what is looked at; none before
 };
 
 }  // namespace intervale

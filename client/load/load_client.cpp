@@ -79,6 +79,7 @@ class LoadClient {
   asio::awaitable<bool> send(const protocol::ClientMessage& message);
   asio::awaitable<void> pass_line(std::size_t bytes);
   void receive(std::size_t size);
+  void look();
   void take(protocol::Opened opened);
   void take(const protocol::Batch& batch);
   void take(const protocol::Done& done);
@@ -111,6 +112,7 @@ class LoadClient {
   LoadFigures& figures_;
   LoadProgress& progress_;
   std::optional<StreamClient> mesh_;
+  std::uint64_t least_tets_ = 0;  // of the mesh without any update: no budget makes it smaller
   std::deque<Pending> pending_;
   std::uint64_t credit_due_ = 0;  // granted, and still to be sent
   std::uint64_t view_ = 0;        // number of the last one asked for; its epoch is one more
@@ -214,6 +216,7 @@ std::optional<protocol::View> LoadClient::due_view() {
     pending_.push_back({view_ + 1, next});
   }
   done_ = false;
+  look();
   return protocol::View{view_ + 1, view_of(path_, view_)};
 }
 
@@ -254,9 +257,17 @@ void LoadClient::take(protocol::Opened opened) {
   grants_.round_trip(now_ - asked_);
   if (opened.description.content_hash != plan_.description.content_hash) return fail("the server sent nonsense: another volume than before");
   if (!plan_.verify) return;
-  auto client = StreamClient::start(std::move(opened.description));
+  auto client = StreamClient::start(std::move(opened.description), plan_.max_tets);
   if (!client) return fail("the server sent nonsense: " + client.error().message);
   mesh_ = std::move(*client);
+  least_tets_ = mesh_->tet_count();
+  look();
+}
+
+// A mesh with a budget keeps what matters most from where it is seen.
+void LoadClient::look() {
+  const auto camera = view_of(path_, view_).camera;
+  if (mesh_ && camera) mesh_->look(*camera);
 }
 
 void LoadClient::take(const protocol::Batch& batch) {
@@ -275,6 +286,7 @@ void LoadClient::take(const protocol::Batch& batch) {
   if (mesh_) {
     auto applied = mesh_->apply(batch.payload);
     if (applied && mesh_->updates() != updates_) applied = intervale::fail("a batch of another size than it says");
+    if (applied && plan_.max_tets && mesh_->tet_count() > std::max(*plan_.max_tets, least_tets_)) applied = intervale::fail("a mesh over its budget");
     if (!applied) {
       mesh_.reset();  // it must not be used again
       return fail("the server sent nonsense: " + applied.error().message);

@@ -174,7 +174,7 @@ Result<void> Fetch::apply(const protocol::Batch& batch) {
   if (!grants_.spend(protocol::cost_of(batch))) return nonsense("more than it was granted");
   const std::uint64_t before = client_->updates();
   if (auto applied = client_->apply(batch.payload); !applied) return nonsense(applied.error().message);
-  if (!client_->over_budget() && client_->updates() - before != batch.updates) return nonsense("a batch of another size than it says");
+  if (client_->updates() - before != batch.updates) return nonsense("a batch of another size than it says");
   note_first_mesh();
   figures_.remaining_error = batch.remaining_error;
   figures_.remaining_pixels = batch.remaining_pixels;

@@ -81,6 +81,17 @@ TEST_P(LoadScenarios, EveryViewIsAnswered) {
 
 INSTANTIATE_TEST_SUITE_P(Load, LoadScenarios, testing::Values("orbit", "zoom", "jump"));
 
+// A client whose mesh is ever larger fails; what it shows is compared with what extract gives for that.
+TEST(Load, ABudgetIsKeptWhereverClientsLook) {
+  ServerProgram server;
+  const auto figures = load(server.url("buckyball"), {"--clients", "4", "--duration", "1.2", "--ramp", "0.2", "--scenario", "jump", "--pixel-error",
+                                                      "0.5", "--views-per-second", "8", "--threads", "2", "--verify", "--max-tets", "20000"});
+  EXPECT_EQ(figures.at("connected"), 4);
+  EXPECT_EQ(figures.at("failed"), 0);
+  EXPECT_EQ(figures.at("verified"), 4);
+  EXPECT_EQ(figures.at("differing"), 0);
+}
+
 TEST(Load, ARateIsKeptTo) {
   ServerProgram server;
   const auto figures = load(server.url("buckyball"), {"--clients", "2", "--duration", "0.5", "--ramp", "0", "--scenario", "full", "--rate", "40000"});

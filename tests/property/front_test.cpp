@@ -129,6 +129,68 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
   EXPECT_EQ(canonical(front.mesh()), coarse);
 }
 
+// What is hidden is no part of the mesh; what comes back is as it was.
+TEST_P(FrontLaws, HidingIsLeavingOut) {
+  const IntervalVolume sigma = made(volume, range);
+  const Base base = *decode_base(sigma.description().base, sigma.domain());
+  Front front = extract(sigma, {})->front;
+  const testing::Canonical full = canonical(front.mesh());
+  std::vector<Place> all;
+  sigma.set().for_each_down([&](const Place& p) { all.push_back(p); });
+  SplitSet shown(sigma.size());
+  for (const Place& p : all) shown.insert(p.index);
+  const auto afresh = [&] {
+    return canonical(extract(volume.grid, base, sigma.set(), shown, [&](Front& fresh, Front::Handle handle, const Place& p) {
+                       return apply_update(fresh, handle, sigma.update(p));
+                     })->front.mesh());
+  };
+  const auto may_hide = [&](const Place& p) {
+    if (!shown.contains(p.index)) return false;
+    return std::none_of(all.begin(), all.end(), [&](const Place& child) {
+      bool is_child = false;
+      if (!shown.contains(child.index)) return false;
+      for_each_parent(sigma.set(), child, [&](UpdateIndex parent) { is_child = is_child || parent == p.index; });
+      return is_child;
+    });
+  };
+  std::mt19937 random(GetParam());
+  for (int step = 0; step < 400 && !all.empty(); ++step) {
+    const Place& p = all[random() % all.size()];
+    const Front::Handle handle{p.key, int(p.slot)};
+    ASSERT_NE(front.is_hidden(handle), shown.contains(p.index));
+    const std::uint64_t before = front.tet_count();
+    if (random() % 3 != 0) {
+      const bool may = may_hide(p);
+      ASSERT_EQ(front.hide(handle), may);
+      if (may) shown.erase(p.index);
+    } else {
+      bool may = !shown.contains(p.index);
+      for_each_parent(sigma.set(), p, [&](UpdateIndex parent) { may = may && shown.contains(parent); });
+      if (may && random() % 4 == 0) {
+        const bool fits = front.show(handle, before);  // no more than it had
+        ASSERT_EQ(fits, !front.is_hidden(handle));
+        ASSERT_LE(front.tet_count(), before);
+      } else {
+        ASSERT_EQ(front.show(handle, ~std::uint64_t(0)), may);
+      }
+      if (!front.is_hidden(handle)) shown.insert(p.index);
+    }
+    ASSERT_EQ(front.split_count(), all.size());
+    ASSERT_EQ(front.shown_count(), shown.count());
+    if (step % 40 != 0) continue;
+    ASSERT_EQ(front.validate(), std::nullopt);
+    ASSERT_EQ(broken_law(front.mesh(), volume.grid, range.alpha == range.beta), "");
+    ASSERT_EQ(front.mesh().tets.size(), front.tet_count());
+    ASSERT_EQ(canonical(front.mesh()), afresh());
+  }
+  for (const Place& p : all) {
+    if (!shown.contains(p.index)) {
+      ASSERT_TRUE(front.show({p.key, int(p.slot)}, ~std::uint64_t(0)));
+    }
+  }
+  EXPECT_EQ(canonical(front.mesh()), full);
+}
+
 INSTANTIATE_TEST_SUITE_P(Random, FrontLaws, ::testing::Range(1u, 25u));
 
 TEST(Front, RefusesWhatCannotBeSplit) {

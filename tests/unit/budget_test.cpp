@@ -1,0 +1,114 @@
+#include "client/core/budget.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+#include <random>
+
+#include "client/core/stream_client.h"
+#include "common/extraction.h"
+#include "server/build/field_hierarchy.h"
+#include "server/serve/stream_plan.h"
+#include "support/analytic_fields.h"
+#include "support/cameras.h"
+#include "support/mesh_laws.h"
+
+namespace intervale {
+namespace {
+
+using testing::broken_law;
+using testing::canonical;
+
+IntervalVolume made(unsigned seed) {
+  constexpr std::array<std::array<std::int32_t, 3>, 4> shapes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
+  const Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 4]) : testing::digits(shapes[seed % 4], seed);
+  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
+  EXPECT_TRUE(sigma);
+  return std::move(*sigma);
+}
+
+class Budgets : public ::testing::TestWithParam<unsigned> {
+ protected:
+  IntervalVolume volume_ = made(GetParam());
+  std::mt19937 random_{GetParam()};  // the seed is the test's number
+};
+
+// Whatever was shown before: within the budget, and a mesh that holds its laws.
+TEST_P(Budgets, BalanceShowsWhatMattersMost) {
+  Front front = extract(volume_, {})->front;
+  const std::uint64_t full = front.tet_count();
+  std::uint64_t coarse = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    const Importance importance = size_on_screen(testing::random_camera(volume_.description().grid, random_), volume_.description().grid);
+    const std::uint64_t most = trial == 0 ? 0 : coarse + std::uint64_t(double(full - std::min(full, coarse)) * testing::uniform(random_, 0, 1.1));
+    balance(front, most, importance);
+    if (trial == 0) {
+      coarse = front.tet_count();
+      EXPECT_EQ(front.shown_count(), 0u) << "nothing can be left out any more";
+      continue;
+    }
+    ASSERT_LE(front.tet_count(), most);
+    ASSERT_EQ(front.validate(), std::nullopt);
+    ASSERT_EQ(broken_law(front.mesh(), volume_.description().grid, false), "");
+    if (most >= full) {
+      EXPECT_EQ(front.tet_count(), full);
+    }
+  }
+}
+
+// A client that looks around while the stream goes on, and never has more than its budget.
+TEST_P(Budgets, NoMeshOnTheWayIsLarger) {
+  const auto volume = std::make_shared<const IntervalVolume>(volume_);
+  const Grid& g = volume->description().grid;
+  const std::uint64_t full = volume->description().full.tets;
+  const std::uint64_t most = StreamClient::start(volume->description())->tet_count() + full / 3;
+  auto client = StreamClient::start(volume->description(), most);
+  ASSERT_TRUE(client);
+  StreamPlan plan(volume);
+  for (int view = 0; view < 12; ++view) {
+    Lod lod;
+    lod.camera = testing::random_camera(g, random_);
+    lod.camera->pixel_error = 0.5;
+    plan.set_lod(lod);
+    client->look(*lod.camera);
+    for (int batches = 0; batches < 5; ++batches) {
+      const auto batch = plan.next(2048);
+      if (!batch) break;
+      ASSERT_TRUE(client->apply(batch->payload));
+      ASSERT_LE(client->tet_count(), most);
+      ASSERT_EQ(client->updates(), plan.sent());
+      ASSERT_EQ(client->front().validate(), std::nullopt);
+    }
+    ASSERT_EQ(broken_law(client->mesh(), g, false), "");
+    ASSERT_EQ(client->mesh().tets.size(), client->tet_count());
+  }
+  // With room enough again everything comes back, without a byte.
+  Front all = client->front();
+  balance(all, ~std::uint64_t(0), size_on_screen(testing::random_camera(g, random_), g));
+  EXPECT_EQ(all.shown_count(), all.split_count());
+}
+
+// A view that comes back finds the mesh that it had.
+TEST_P(Budgets, WhatMattersDoesNotDependOnWhereOneWas) {
+  Front front = extract(volume_, {})->front;
+  const Grid& g = volume_.description().grid;
+  const std::uint64_t most = front.tet_count() / 2;
+  const Importance here = size_on_screen(testing::random_camera(g, random_), g), there = size_on_screen(testing::random_camera(g, random_), g);
+  const auto shown_weight = [&] {
+    double sum = 0;
+    for (const SlotGroup& group : front.splits()) sum += here(group.key) * std::popcount(front.shown_slots(group.key));
+    return sum;
+  };
+  balance(front, most, here);
+  const double first = shown_weight();
+  balance(front, most, there);
+  balance(front, most, here);
+  EXPECT_GE(shown_weight(), 0.9 * first);
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, Budgets, ::testing::Range(0u, 8u));
+
+}  // namespace
+}  // namespace intervale
