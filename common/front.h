@@ -45,6 +45,7 @@ class Front {
   struct Handle {
     SupercubeKey supercube = 0;
     int slot = 0;
+    friend bool operator==(const Handle&, const Handle&) = default;
   };
 
   // The diamond with this centre, if it is in the front with all its tetrahedra, is not split and not idle. Any vertex will do, also one that is no

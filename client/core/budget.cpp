@@ -31,6 +31,7 @@ class Balance {
     for (std::size_t g = 0; g < end_ && front_.shown_count() < front_.split_count(); ++g) {
       const std::uint64_t hidden = groups_[g].slots & ~front_.shown_slots(groups_[g].key);
       for (std::uint64_t left = hidden; left != 0; left &= left - 1) {
+        wanted_.clear();
         if (!show({groups_[g].key, std::countr_zero(left)}, groups_[g].importance / kWorthIt)) return;
       }
     }
@@ -43,11 +44,12 @@ class Balance {
     std::uint64_t slots = 0;
   };
 
-  // Shows a split and its ancestors; what matters less than `worth` makes room. False if there is none.
+  // Shows a split and its ancestors; what matters less than `worth` and is not one of them makes room. False if there is none.
   bool show(Front::Handle handle, double worth) {
-    if (front_.shown_slots(handle.supercube) >> handle.slot & 1) return true;
+    wanted_.push_back(handle);
+    if (!front_.is_hidden(handle)) return true;
     bool all = true;
-    for_each_parent(handle, [&](Front::Handle parent) { all = all && (!front_.is_hidden(parent) || show(parent, worth)); });
+    for_each_parent(handle, [&](Front::Handle parent) { all = all && show(parent, worth); });
     if (!all) return false;
     while (!front_.show(handle, max_tets_)) {
       if (!hide_least(worth)) return false;
@@ -70,7 +72,7 @@ class Balance {
 
   // Hides a split if none of its children is shown, and then its ancestors that waited for that: those that matter less.
   bool hide(Front::Handle handle) {
-    if (!front_.hide(handle)) return false;
+    if (std::find(wanted_.begin(), wanted_.end(), handle) != wanted_.end() || !front_.hide(handle)) return false;
     for_each_parent(handle, [&](Front::Handle parent) {
       const auto place = place_.find(parent.supercube);
       if (place != place_.end() && place->second >= end_) hide(parent);
@@ -98,6 +100,7 @@ class Balance {
   std::vector<Group> groups_;                                   // what matters most first
   boost::unordered_flat_map<SupercubeKey, std::size_t> place_;  // of a group among them
   std::size_t end_ = 0;                                         // from here on all is hidden that could be
+  std::vector<Front::Handle> wanted_;                           // a split to be shown, and those of its ancestors that were looked at
 };
 
 }  // namespace

@@ -12,8 +12,8 @@ namespace intervale {
 
 // A window that is opened again as batches are applied, and closes as the budget runs out.
 //
-// What is under way when the view changes is of the old view: the window bounds it. So it goes by the line: twice what that carries within a round trip
-// and kSlack. Half of that would do, were grants not saved up, and it would never find out that the line carries more.
+// What is under way when the view changes is of the old view: the window bounds it. So it goes by the line: twice what that carries within a round
+// trip and kSlack. Half of that would do, were grants not saved up, and it would never find out that the line carries more.
 class Grants {
  public:
   using Clock = std::chrono::steady_clock;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "common/description.h"
 #include "common/result.h"
@@ -26,6 +28,13 @@ inline constexpr const char* kCaseSyntax =
 
 // One of the product's own samples, with a range that suits it.
 [[nodiscard]] Result<Case> sample_case(std::string_view name, int size);
+
+// What the measurements do about errors.
+template <class T>
+T or_throw(Result<T> result) {
+  if (!result) throw std::runtime_error(result.error().message);
+  return std::move(*result);
+}
 
 // "[59.1, 124.1]", with ", uniform" after it where that is so.
 [[nodiscard]] std::string range_text(const Case& c);

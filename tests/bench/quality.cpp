@@ -44,12 +44,6 @@ constexpr int kPoints = 3000;
 
 using Sigma = std::shared_ptr<const IntervalVolume>;
 
-template <class T>
-T or_throw(Result<T> result) {
-  if (!result) throw std::runtime_error(result.error().message);
-  return std::move(*result);
-}
-
 struct Look {
   const char* name;
   double away;  // from the middle, in diagonals of the box

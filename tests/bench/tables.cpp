@@ -58,12 +58,6 @@ struct Row {
   std::optional<Speeds> speeds;
 };
 
-template <class T>
-T or_throw(Result<T> result) {
-  if (!result) throw std::runtime_error(result.error().message);
-  return std::move(*result);
-}
-
 Sigma build(const Case& c) {
   const FieldHierarchy hierarchy(*c.volume, {c.range, c.refine, {}});
   return std::make_shared<const IntervalVolume>(or_throw(hierarchy.compact()));

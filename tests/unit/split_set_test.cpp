@@ -89,7 +89,7 @@ TEST_P(SplitSets, ReadyIsWhatAFrontCanSplit) {
     const auto extraction =
         extract(d.grid, *decode_base(d.base, volume_.domain()), set, split, [&](Front& front, Front::Handle handle, const Place& p) {
           const DiamondContext context = front.context(handle);
-      Prediction prediction(context);
+          Prediction prediction(context);
           const UpdateView u = volume_.update(p);
           const Side side = Side((unsigned(prediction.side()) + u.side_difference) % 3);
           std::array<std::uint8_t, kMaxCuts> cuts;
