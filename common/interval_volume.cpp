@@ -75,7 +75,7 @@ IntervalVolume::IntervalVolume(Parts parts)
       differences_(std::move(parts.differences)),
       error_levels_(std::move(parts.error_levels)),
       yields_(std::move(parts.yields)),
-      reach_(float(diamond_width(description_.grid))) {
+      reach_(float(diamond_width(description_.grid) / 2)) {
   const auto unit = float(yield_unit(description_.grid, error_levels_.empty() ? 0.0 : double(error_levels_.back())));
   for (unsigned step = 0; step < factor_.size(); ++step) factor_[step] = Yield(std::uint8_t(step)).ratio(unit);
   brick_object_error_.resize(set_.bricks().size());

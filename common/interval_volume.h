@@ -98,8 +98,9 @@ class IntervalVolume {
   [[nodiscard]] static std::uint8_t half_of_level(unsigned level) { return std::uint8_t(level / 2); }
   // No lower than the level that half_of_level() took, and higher by one at most.
   [[nodiscard]] unsigned level_of_half(std::uint8_t half) const { return std::min(2u * half + 1, unsigned(error_levels_.size()) - 1); }
-  // How far the surfaces can still move where an update's diamond is refined to the end, in world units: no less, as far as is known. By its
-  // supercube, that one's scale, and the update's level of error, with which it grows. Not saturated.
+  // Half of how far the surfaces can still move where an update's diamond is refined to the end, in world units: hardly anything moves further than
+  // this, and nothing twice as far, as far as is known. By its supercube, that one's scale, and the update's level of error, with which it grows. Not
+  // saturated.
   [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned level) const {
     return std::min(error_levels_[level] * factor_[yields_[supercube].step()], reach_ * float(1 << scale));
   }
@@ -136,7 +137,7 @@ class IntervalVolume {
   std::vector<std::uint8_t> supercube_level_;  // by supercube: half_of_level() of the highest of its updates
   std::vector<float> brick_object_error_;      // the largest of its updates
   std::array<float, 256> factor_;              // of each step of a Yield
-  float reach_ = 0;                            // no surface moves further, for h = 1: what a diamond measures across
+  float reach_ = 0;                            // the largest object error for h = 1: half of what a diamond measures across
 };
 
 // What Yields are in units of.

@@ -13,7 +13,7 @@
 
 namespace intervale {
 
-inline constexpr std::uint32_t kIvmVersion = 3;
+inline constexpr std::uint32_t kIvmVersion = 4;
 
 // The file's bytes. Equal volumes give equal bytes; the name is not stored.
 [[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = in_turn);

@@ -314,7 +314,7 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
   }
 }
 
-// What makes moves of errors, supercube by supercube.
+// What makes object errors, which are half of moves, of errors: supercube by supercube.
 std::vector<Yield> FieldHierarchy::yields(double max_error, const std::vector<UpdateCode>& codes, const std::vector<float>& levels) const {
   std::vector<float> moves = surface_moves(volume_, range_, domain_, set_);
   saturate(moves);
@@ -326,7 +326,7 @@ std::vector<Yield> FieldHierarchy::yields(double max_error, const std::vector<Up
       double most = 0;
       for (UpdateIndex i = first; i < end; ++i) {
         const double error = double(levels[codes[i].error_level()]);
-        if (error > 0) most = std::max(most, double(moves[i]) / error);
+        if (error > 0) most = std::max(most, double(moves[i]) / (2 * error));
       }
       yields[s] = Yield::at_least(most, unit);
     });

@@ -20,12 +20,13 @@ namespace {
 
 constexpr int kTopScale = 4;  // cubes of this scale are gone through one by one; coarser diamonds keep their width
 
+constexpr double kLeast = 1e-4;             // of what the finest diamonds measure across: what moves less stays
 constexpr double kNudge = 1.0 / (1 << 16);  // of a sample: so far into the box are points on its far sides taken to be
 
-// A point where the field crosses a surface.
+// A point where the field crosses a surface. Values in tetrahedra are counted from Cubes::zero_, so that floats will do.
 struct Crossing {
   std::array<float, 4> at;  // barycentric coordinates
-  float value;              // alpha or beta; all values are counted from Cubes::zero_, so that floats will do
+  int surface;              // which
 };
 
 struct Corner {
@@ -104,7 +105,7 @@ class Cubes {
                 p[i] = std::min(v[i] - low[i] + even[i] + t * (odd[i] - even[i]), most[i]);
                 p[i] = (flip[i] ? side - p[i] : p[i]) / side;
               }
-              add(p, surface - zero_, of_tet);
+              add(p, k, of_tet);
             }
           }
         }
@@ -124,6 +125,29 @@ class Cubes {
       crossings = std::move(of_tet[t]);
       descend(tet, crossings, near);
     }
+  }
+
+  // From where a patch cuts a diamond's spine to where the field crosses that nearest by, in world units.
+  [[nodiscard]] double measure_tip(const Diamond& d) const {
+    const Vertex a = d.vertex(0), b = d.vertex(1);
+    if (!domain_.contains(a) || !domain_.contains(b)) return 0;
+    const Vertex step{(b.x - a.x) / (2 * d.h), (b.y - a.y) / (2 * d.h), (b.z - a.z) / (2 * d.h)};
+    const T* const samples = &field_.samples[field_.index(a)];
+    const std::ptrdiff_t stride = &field_.samples[field_.index({a.x + step.x, a.y + step.y, a.z + step.z})] - samples;
+    const int steps = 2 * d.h;
+    double far = 0;
+    for (int k = 0; k < surfaces_; ++k) {
+      const double kappa = surface_[k].value, first = double(samples[0]), last = double(samples[steps * stride]);
+      if (!differ(first, last, surface_[k])) continue;
+      const double cut = steps * (kappa - first) / (last - first);
+      double nearest = steps;
+      for (int i = 0; i < steps; ++i) {
+        const double u = double(samples[i * stride]), w = double(samples[(i + 1) * stride]);
+        if (differ(u, w, surface_[k])) nearest = std::min(nearest, std::abs(i + (kappa - u) / (w - u) - cut));
+      }
+      far = std::max(far, nearest);
+    }
+    return far * std::hypot(grid_.spacing[0] * step.x, grid_.spacing[1] * step.y, grid_.spacing[2] * step.z);
   }
 
  private:
@@ -152,11 +176,11 @@ class Cubes {
   static constexpr std::array<std::array<int, 3>, 6> kPaths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
 
   // The tetrahedra of a cube are those of the paths along its edges from one end of the spine to the other.
-  static void add(const std::array<double, 3>& p, double surface, std::array<std::vector<Crossing>, 6>& of_tet) {
+  static void add(const std::array<double, 3>& p, int surface, std::array<std::vector<Crossing>, 6>& of_tet) {
     for (int t = 0; t < 6; ++t) {
       const double x = p[kPaths[t][0]], y = p[kPaths[t][1]], z = p[kPaths[t][2]];
       if (x < y || y < z) continue;
-      of_tet[t].push_back({{float(1 - x), float(x - y), float(y - z), float(z)}, float(surface)});
+      of_tet[t].push_back({{float(1 - x), float(x - y), float(y - z), float(z)}, surface});
       return;
     }
   }
@@ -205,23 +229,43 @@ class Cubes {
     return here.first + UpdateIndex(std::popcount(here.occupancy & ((std::uint64_t(1) << slot) - 1)));
   }
 
+  // Whether there is a patch of that surface in the tetrahedron, or at least in its diamond.
+  [[nodiscard]] bool has_patch(const Tet& tet, Vertex centre, const CutAt& surface) const {
+    const double first = tet.corner[0].value + zero_;
+    for (int i = 1; i < 4; ++i) {
+      if (differ(first, tet.corner[i].value + zero_, surface)) return true;
+    }
+    const Diamond diamond(centre);
+    for (int i = 0; i < diamond.row->vertices; ++i) {
+      if (differ(first, value(diamond.vertex(i)) + zero_, surface)) return true;
+    }
+    return false;
+  }
+
   void descend(const Tet& tet, std::span<Crossing> crossings, NearByScale& near) const {
     const int tail = 3 - tet.cls;
     const Vertex a = tet.corner[0].at, b = tet.corner[tail].at;
     const Vertex centre{(a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2};
     const auto update = find(centre, tet.scale, near);
     if (!update) return;
-    double off = 0;
+    std::array<double, 2> off{-1, -1};  // none
     for (const Crossing& c : crossings) {
       double at = 0;
       for (int i = 0; i < 4; ++i) at += double(c.at[i]) * double(tet.corner[i].value);
-      off = std::max(off, std::abs(at - double(c.value)));
+      off[c.surface] = std::max(off[c.surface], std::abs(at - (surface_[c.surface].value - zero_)));
     }
     const double most = width_ * double(1 << tet.scale);
-    const bool moved = !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Corner& c) { return domain_.contains(c.at); });
-    const double slope = std::sqrt(steepness(tet));
-    const double move = moved || !(off < most * slope) ? most : off / slope;
-    if (move > 1e-4 * width_) raise(moves_[*update], round_up(move));
+    double move = 0;
+    if (!std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Corner& c) { return domain_.contains(c.at); })) {
+      move = most;
+    } else {
+      const double slope = std::sqrt(steepness(tet));
+      for (int k = 0; k < surfaces_; ++k) {
+        if (off[k] < 0) continue;
+        move = std::max(move, off[k] < most * slope && has_patch(tet, centre, surface_[k]) ? off[k] / slope : most);
+      }
+    }
+    if (move > kLeast * width_) raise(moves_[*update], round_up(move));
     if (tet.scale == 0 && tet.cls == 2) return;
     const auto nearer_tail = std::partition(crossings.begin(), crossings.end(), [tail](const Crossing& c) { return c.at[0] >= c.at[tail]; });
     const auto split = std::size_t(nearer_tail - crossings.begin());
@@ -276,6 +320,12 @@ std::vector<float> surface_moves(const Volume& volume, const Range& range, const
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, all.size(), 1), [&](const auto& some) {
       std::vector<Crossing> crossings;
       for (std::size_t i = some.begin(); i < some.end(); ++i) cubes.measure(all[i], crossings);
+    });
+    tbb::parallel_for(std::uint32_t(0), std::uint32_t(set.bricks().size()), [&](std::uint32_t b) {
+      set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
+        const double tip = cubes.measure_tip(Diamond(SupercubeSet::centre(p)));
+        if (tip > kLeast * width) moves[p.index] = std::max(moves[p.index], round_up(tip));
+      });
     });
   });
   for (int scale = top + 1; scale < domain.levels(); ++scale) {

@@ -1,9 +1,13 @@
 // How far the surfaces of a diamond's tetrahedra are from those of the full mesh: what its refinement can still move, in world units.
 //
 // The full mesh's surfaces have their corners on the edges of the finest tetrahedra: of its cells' sides and diagonals. In a coarser tetrahedron's
-// interpolant such a point has another value; that difference over the interpolant's gradient is the point's distance from the coarse surface, to
-// first order, and nothing between the corners is further off. Points go down the bisection with their barycentric coordinates, of which each step
-// changes two (Maubach 1995, for the order of vertices).
+// interpolant such a point has another value; that difference over the interpolant's gradient is the point's distance from the coarse patch, to
+// first order, and nothing between the corners is further off. Where there is no patch, in the tetrahedron or its diamond, it is as far as the
+// diamond is wide. Points go down the bisection with their barycentric coordinates, of which each step changes two (Maubach 1995, for the order of
+// vertices).
+//
+// That bounds what the full mesh is off the coarse one. The other way round there are tips of thin pieces: they slide along an edge, near to the
+// plane all the while. An edge is the spine of the diamond that splits it, so that one tells how far apart the two meshes cut it.
 #pragma once
 
 #include <vector>

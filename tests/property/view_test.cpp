@@ -120,7 +120,7 @@ TEST_P(Pictures, AreOffByNoMoreThanWasAskedFor) {
       }
     }
   }
-  EXPECT_LE(far_off, points / 1000) << "of " << points << " points";
+  EXPECT_EQ(far_off, 0u) << "of " << points << " points";
   EXPECT_LT(updates, sigma->size()) << "nothing was left out";
 }
 

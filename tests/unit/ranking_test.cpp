@@ -57,11 +57,11 @@ void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const Visit&
   v.set().for_each_down([&](const Place& p) { visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, int(p.slot))); });
 }
 
-// How far the surfaces can move in an update's diamond, from what is stored.
+// Half of how far the surfaces can move in an update's diamond, from what is stored.
 double object_error(const IntervalVolume& v, const Place& p) {
   const Grid& g = v.description().grid;
   const std::uint8_t step = v.yields()[p.supercube].step();
-  const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) * h;
+  const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) / 2 * h;
   if (step == 0 || v.error(p.index) == 0) return 0;
   if (step == 255) return widest;
   const double unit = std::min({g.spacing[0], g.spacing[1], g.spacing[2]}) / v.description().max_error;

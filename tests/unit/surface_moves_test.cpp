@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,16 @@ using Vector = std::array<double, 3>;  // in samples
 struct Crossing {
   Vector at;
   double surface;
+  bool is_beta;
 };
+
+// Whether alpha, or beta, lies between two of these values.
+bool lies_between(std::span<const double> values, const Range& range, bool is_beta) {
+  return std::any_of(values.begin(), values.end(), [&](double v) {
+    const Side first = side_of(values[0], range), side = side_of(v, range);
+    return is_beta ? beta_cuts(first, side) : alpha_cuts(first, side);
+  });
+}
 
 struct Case {
   std::string name;
@@ -74,13 +84,13 @@ std::vector<Crossing> crossings_of(const Volume& v, const Range& range) {
           const Vertex from{p[0], p[1], p[2]}, to{q[0], q[1], q[2]};
           if (!domain.contains(from) || !domain.contains(to) || !done.insert({p, q}).second) continue;
           const double a = testing::sample(v, p[0], p[1], p[2]), b = testing::sample(v, q[0], q[1], q[2]);
-          const auto add = [&](double surface) {
+          const auto add = [&](double surface, bool is_beta) {
             const double t = (surface - a) / (b - a);
-            all.push_back({{p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1]), p[2] + t * (q[2] - p[2])}, surface});
+            all.push_back({{p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1]), p[2] + t * (q[2] - p[2])}, surface, is_beta});
           };
           const Side side = side_of(a, range), other = side_of(b, range);
-          if (alpha_cuts(side, other)) add(range.alpha);
-          if (beta_cuts(side, other)) add(range.beta);
+          if (alpha_cuts(side, other)) add(range.alpha, false);
+          if (beta_cuts(side, other)) add(range.beta, true);
         }
       }
     }
@@ -115,9 +125,9 @@ class NaiveTet {
     }
     return true;
   }
-  // How far a point is from the interpolant's surface, if the interpolant is off by so much more.
-  [[nodiscard]] double distance(const Crossing& c, double more) const {
-    if (moved_ || slope_ == 0) return most_;
+  // How far a point is from the interpolant's surface, if there is one and the interpolant is off by so much more.
+  [[nodiscard]] double distance(const Crossing& c, double more, bool has_patch) const {
+    if (moved_ || slope_ == 0 || !has_patch) return most_;
     return std::min(most_, std::max(0.0, std::abs(interpolant(c.at) - c.surface) + more) / slope_);
   }
 
@@ -143,6 +153,38 @@ class NaiveTet {
   double det_ = 0, slope_ = 0, most_;
   bool moved_ = false;
 };
+
+double value_at(const Volume& volume, const Domain& domain, Vertex v) {
+  const Vertex c = domain.clamp(v);
+  return testing::sample(volume, c.x, c.y, c.z);
+}
+
+// How far apart the coarse mesh and the full one cut a diamond's spine.
+double tip_of(const Case& c, const Domain& domain, const Diamond& d) {
+  const Vertex a = d.vertex(0), b = d.vertex(1);
+  if (!domain.contains(a) || !domain.contains(b)) return 0;
+  std::vector<double> values;
+  for (int i = 0; i <= 2 * d.h; ++i) {
+    const auto on = [&](std::int32_t from, std::int32_t to) { return from + (to - from) / (2 * d.h) * i; };
+    values.push_back(value_at(c.volume, domain, {on(a.x, b.x), on(a.y, b.y), on(a.z, b.z)}));
+  }
+  const auto& spacing = c.volume.grid.spacing;
+  const double length = std::hypot(spacing[0] * (b.x - a.x), spacing[1] * (b.y - a.y), spacing[2] * (b.z - a.z));
+  double furthest = 0;
+  for (const bool is_beta : {false, true}) {
+    const double surface = is_beta ? c.range.beta : c.range.alpha;
+    const std::array<double, 2> ends{values.front(), values.back()};
+    if (!lies_between(ends, c.range, is_beta)) continue;
+    const double cut = (surface - ends[0]) / (ends[1] - ends[0]);
+    double nearest = 1;
+    for (int i = 0; i < 2 * d.h; ++i) {
+      if (!lies_between(std::span(values).subspan(std::size_t(i), 2), c.range, is_beta)) continue;
+      nearest = std::min(nearest, std::abs((i + (surface - values[i]) / (values[i + 1] - values[i])) / (2 * d.h) - cut));
+    }
+    furthest = std::max(furthest, nearest * length);
+  }
+  return furthest;
+}
 
 Case made(unsigned seed) {
   Case c;
@@ -201,7 +243,12 @@ TEST_P(Moves, AreThoseOfTheFurthestCrossing) {
           EXPECT_NEAR(move, width * d.h, 1e-6 * width * d.h);
           return;
         }
-        double most = 0;
+        const double tip = tip_of(c, domain, d);
+        EXPECT_GE(move, tip * (1 - 1e-5) - kLeast * width * 1.001);
+        double most = tip;
+        std::vector<double> values;
+        for (int i = 0; i < d.row->vertices; ++i) values.push_back(value_at(c.volume, domain, d.vertex(i)));
+        const std::array<bool, 2> has_patch{lies_between(values, c.range, false), lies_between(values, c.range, true)};
         for (int t = 0; t < d.row->tets; ++t) {
           if ((domain.tets(d) >> t & 1) == 0) continue;
           const NaiveTet tet(c.volume, domain, d, t);
@@ -211,8 +258,9 @@ TEST_P(Moves, AreThoseOfTheFurthestCrossing) {
               continue;
             if (!tet.holds(at)) continue;
             is_there[i] = true;
-            most = std::max(most, tet.distance(crossings[i], rounding));
-            if (move >= tet.distance(crossings[i], -rounding) * (1 - 1e-5) - kLeast * width * 1.001) is_told[i] = true;
+            const bool patch = has_patch[crossings[i].is_beta];
+            most = std::max(most, tet.distance(crossings[i], rounding, patch));
+            if (move >= tet.distance(crossings[i], -rounding, patch) * (1 - 1e-5) - kLeast * width * 1.001) is_told[i] = true;
           }
         }
         EXPECT_LE(move, most * (1 + 1e-5) + 1e-5 * width) << "scale " << scale << ", class " << cls << ": further than any crossing";
