@@ -135,6 +135,64 @@ bool Front::show(Handle handle, std::uint64_t max_tets) {
   return true;
 }
 
+// A child is one by its place, whether it was handed anything or not: so says the server too, which knows no more.
+void Front::forget(std::span<const SlotGroup> groups) {
+  const auto has_split_child = [this](const Diamond& d) {
+    for (int k = 0; k < d.row->children && d.has_children(); ++k) {
+      const Diamond child(d.child(k));
+      const int up = child.scale + 2;
+      const Block* const block = find_block(child.scale, {child.centre.x >> up, child.centre.y >> up, child.centre.z >> up});
+      if (block != nullptr && (block->split >> kSlotOfType[child.type] & 1)) return true;
+    }
+    return false;
+  };
+  for_each_finest_first(groups, [&](const SlotGroup& g, std::uint64_t slots) {
+    const int scale = scale_of_key(g.key);
+    const std::uint32_t number = scale < domain_.levels() ? find_number(scale, position_of_key(g.key)) : kNone;
+    if (number == kNone) return;
+    Block& block = blocks_[number];
+    for (std::uint64_t left = slots & block.split; left != 0; left &= left - 1) {
+      const int slot = std::countr_zero(left);
+      if (has_split_child(Diamond(centre_of(g.key, slot)))) continue;
+      if (block.shown >> slot & 1) hide({g.key, slot});
+      block.split &= ~(std::uint64_t(1) << slot);
+      --split_count_;
+    }
+  });
+  pack();
+}
+
+// Leaves out supercubes without splits, and cuts that belong to none.
+void Front::pack() {
+  std::deque<Block> blocks;
+  std::vector<std::uint8_t> q;
+  const auto take = [&](Block& block) {
+    block.near = {};
+    for (int slot = 0; slot < kSlots; ++slot) {
+      Split& s = block.of[slot];
+      if (!(block.split >> slot & 1)) {
+        s = {};
+        continue;
+      }
+      const std::span<const std::uint8_t> cuts = cuts_of(s);
+      s.first = std::uint32_t(q.size());
+      q.insert(q.end(), cuts.begin(), cuts.end());
+      if (s.side() == Side::inside) q.push_back(0);
+    }
+  };
+  index_.clear();
+  take(corner_);
+  for (Block& block : blocks_) {
+    if (block.split == 0) continue;
+    take(block);
+    index_.emplace(index_key(block.scale, block.position), std::uint32_t(blocks.size()));
+    blocks.push_back(block);
+  }
+  blocks_ = std::move(blocks);
+  q.shrink_to_fit();
+  q_ = std::move(q);
+}
+
 std::vector<SlotGroup> Front::splits() const {
   std::vector<SlotGroup> splits;
   for (const Block& b : blocks_) {

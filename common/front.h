@@ -67,6 +67,10 @@ class Front {
   bool hide(Handle handle);
   bool show(Handle handle, std::uint64_t max_tets);
 
+  // Undoes splits and gives their room back: of those named, finest first, each that is split and by then has no child that is. groups: keys strictly
+  // ascending. What is not split counts for nothing. O(front).
+  void forget(std::span<const SlotGroup> groups);
+
   [[nodiscard]] std::uint64_t tet_count() const { return tet_count_; }      // of the mesh
   [[nodiscard]] std::uint64_t split_count() const { return split_count_; }  // diamonds that are split, hidden ones too
   [[nodiscard]] std::uint64_t shown_count() const { return shown_count_; }  // of those, the mesh's
@@ -141,6 +145,7 @@ class Front {
   [[nodiscard]] std::span<const std::uint8_t> cuts_of(const Split& split) const {
     return std::span(q_).subspan(split.first, split.centre() - split.first);
   }
+  void pack();
   [[nodiscard]] bool has_splits_of(const Block& block, const Front& owner) const;
   // Whether a diamond handed tetrahedra to a child with one of these.
   [[nodiscard]] bool has_children_among(const Diamond& d, const Existing& e, std::uint64_t Block::*slots) const;

@@ -53,6 +53,20 @@ struct SlotGroup {
   friend bool operator==(const SlotGroup&, const SlotGroup&) = default;
 };
 
+// Goes through groups whose keys ascend strictly, children before parents: visit(group, slots) with some of the group's slots at a time, none of
+// which is another's ancestor.
+template <class Visit>
+void for_each_finest_first(std::span<const SlotGroup> groups, Visit&& visit) {
+  for (std::size_t end = groups.size(), begin = end; end > 0; end = begin) {
+    while (begin > 0 && scale_of_key(groups[begin - 1].key) == scale_of_key(groups[end - 1].key)) --begin;
+    for (int cls = 2; cls >= 0; --cls) {
+      for (std::size_t i = begin; i < end; ++i) {
+        if (const std::uint64_t slots = groups[i].slots & kSlotsOfClass[std::size_t(cls)]) visit(groups[i], slots);
+      }
+    }
+  }
+}
+
 // An immutable set of diamonds. Supercubes in turn stand in bricks: the 4 x 4 x 4 of one scale whose keys differ in the lowest six bits only.
 class SupercubeSet {
  public:

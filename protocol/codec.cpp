@@ -56,7 +56,8 @@ Body encode_body(FlatBufferBuilder& out, const View& message) {
     camera = fbs::Camera(to_vector(c->eye), to_vector(c->look_at), to_vector(c->up), c->fov, c->viewport[0], c->viewport[1], c->pixel_error);
   const auto table = fbs::CreateLod(out, lod.error, percent, lod.roi ? &box : nullptr, to_wire(lod.max_tets), to_wire(lod.max_updates),
                                     lod.camera ? &camera : nullptr);
-  return body(fbs::ClientBody::View, fbs::CreateView(out, message.epoch, table));
+  const auto forget = message.forget.empty() ? 0 : out.CreateVector(encode_splits(message.forget));
+  return body(fbs::ClientBody::View, fbs::CreateView(out, message.epoch, table, to_wire(message.room), forget));
 }
 
 Body encode_body(FlatBufferBuilder& out, const Credit& message) { return body(fbs::ClientBody::Credit, fbs::CreateCredit(out, message.bytes)); }
@@ -86,7 +87,7 @@ Body encode_body(FlatBufferBuilder& out, const Batch& message) {
 }
 
 Body encode_body(FlatBufferBuilder& out, const Done& message) {
-  return body(fbs::ServerBody::Done, fbs::CreateDone(out, message.epoch, message.updates_sent));
+  return body(fbs::ServerBody::Done, fbs::CreateDone(out, message.epoch, message.updates_sent, message.full));
 }
 
 Body encode_body(FlatBufferBuilder& out, const Fault& message) {
@@ -132,7 +133,13 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
                         .pixel_error = c->pixel_error()};
   }
   if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
-  return View{table.epoch(), lod};
+  View view{table.epoch(), lod, from_wire(table.room()), {}};
+  if (const auto* forget = table.forget()) {
+    auto splits = decode_splits({forget->data(), forget->size()}, kMaxHave);
+    if (!splits) return malformed(splits.error().message);
+    view.forget = std::move(*splits);
+  }
+  return view;
 }
 
 Result<ClientMessage> decode_body(const fbs::Credit& table) { return Credit{table.bytes()}; }
@@ -177,7 +184,7 @@ Result<ServerMessage> decode_body(const fbs::Batch& table) {
   return batch;
 }
 
-Result<ServerMessage> decode_body(const fbs::Done& table) { return Done{table.epoch(), table.updates_sent()}; }
+Result<ServerMessage> decode_body(const fbs::Done& table) { return Done{table.epoch(), table.updates_sent(), table.full()}; }
 
 Result<ServerMessage> decode_body(const fbs::Fault& table) {
   if (longer_than(table.text(), kMaxText)) return malformed("the fault's text is too long");

@@ -7,10 +7,10 @@
 
 namespace intervale::protocol {
 
-// A client's largest message is a Have: room for kMaxHave supercubes.
+// A client's largest messages are a Have, or a View that forgets: room for kMaxHave supercubes.
 inline constexpr std::size_t kMaxClientMessage = 64 << 10;
 
-// Supercubes in one Have: 25 bytes each at most, uncompressed.
+// Supercubes in one Have, or to be forgotten in one View: 25 bytes each at most, uncompressed.
 inline constexpr std::size_t kMaxHave = 2048;
 
 // Largest payload of a Batch. A batch is cut by what it would take if nothing could be compressed; it takes about half of that, and 64 KiB keep a

@@ -39,7 +39,7 @@ struct Open {
   std::optional<std::uint64_t> resume = {};  // the content_hash of what the client holds updates of, and will name in Have
   friend bool operator==(const Open&, const Open&) = default;
 };
-// What a client that resumes has split already: between Open and the first View, as many as it takes.
+// What a client that resumes has split already: between Open and the first View, as many Haves as it takes.
 struct Have {
   std::vector<SlotGroup> splits;  // at most kMaxHave; keys ascending; only keys and slots are sent
   friend bool operator==(const Have&, const Have&) = default;
@@ -47,6 +47,9 @@ struct Have {
 struct View {
   std::uint64_t epoch = 0;  // greater than that of the View before
   Lod lod;
+  std::optional<std::uint64_t> room = {};  // the most updates that the client keeps: no more are sent than make so many
+  // What it gives up for this view: at most kMaxHave; keys ascending; only keys and slots are sent. See Front::forget, which both sides do.
+  std::vector<SlotGroup> forget = {};
   friend bool operator==(const View&, const View&) = default;
 };
 struct Credit {
@@ -84,7 +87,8 @@ struct Batch {
 
 struct Done {
   std::uint64_t epoch = 0;
-  std::uint64_t updates_sent = 0;  // in this session
+  std::uint64_t updates_sent = 0;  // that the client has
+  bool full = false;               // more was wanted, but there was no room
   friend bool operator==(const Done&, const Done&) = default;
 };
 struct Fault {

@@ -14,14 +14,44 @@ namespace {
 
 constexpr double kWorthIt = 1.1;  // what is shown instead of something else matters more by this: a view that trembles does not change the mesh
 
+// Splits of a supercube.
+struct Group {
+  double importance = 0;
+  SupercubeKey key = 0;
+  std::uint64_t slots = 0;
+};
+
+// What matters most first; of those that matter alike, coarse ones.
+std::vector<Group> in_order(const std::vector<SlotGroup>& splits, const Importance& importance) {
+  std::vector<Group> groups;
+  for (const SlotGroup& g : splits) groups.push_back({importance(g.key), g.key, g.slots});
+  std::sort(groups.begin(), groups.end(),
+            [](const Group& a, const Group& b) { return std::pair(-a.importance, a.key) < std::pair(-b.importance, b.key); });
+  return groups;
+}
+
+// A diamond's place by its centre: its supercube, and its slot there.
+Front::Handle place_of(const Diamond& d) {
+  const int up = d.scale + 2;
+  return {supercube_key(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up}), kSlotOfType[d.type]};
+}
+
+template <class Visit>
+void for_each_parent(Front::Handle handle, const Visit& visit) {
+  const Diamond d(centre_of(handle.supercube, handle.slot));
+  for (int k = 0; k < d.row->parents; ++k) {
+    const Vertex c = d.parent(k);
+    if ((c.x | c.y | c.z) < 0) continue;
+    const Diamond parent(c);
+    if (parent.row->cls == 3) continue;  // a corner of the domain
+    visit(place_of(parent));
+  }
+}
+
 class Balance {
  public:
-  Balance(Front& front, std::uint64_t max_tets, const Importance& importance) : front_(front), max_tets_(max_tets) {
-    for (const SlotGroup& g : front.splits()) groups_.push_back({importance(g.key), g.key, g.slots});
-    // Of those that matter alike, coarse ones come first.
-    std::sort(groups_.begin(), groups_.end(),
-              [](const Group& a, const Group& b) { return std::pair(-a.importance, a.key) < std::pair(-b.importance, b.key); });
-    end_ = groups_.size();
+  Balance(Front& front, std::uint64_t max_tets, const Importance& importance)
+      : front_(front), max_tets_(max_tets), groups_(in_order(front.splits(), importance)), end_(groups_.size()) {
     for (std::size_t g = 0; g < end_; ++g) place_.emplace(groups_[g].key, g);
   }
 
@@ -38,12 +68,6 @@ class Balance {
   }
 
  private:
-  struct Group {
-    double importance = 0;
-    SupercubeKey key = 0;
-    std::uint64_t slots = 0;
-  };
-
   // Shows a split and its ancestors; what matters less than `worth` and is not one of them makes room. False if there is none.
   bool show(Front::Handle handle, double worth) {
     wanted_.push_back(handle);
@@ -55,19 +79,6 @@ class Balance {
       if (!hide_least(worth)) return false;
     }
     return true;
-  }
-
-  template <class Visit>
-  static void for_each_parent(Front::Handle handle, const Visit& visit) {
-    const Diamond d(centre_of(handle.supercube, handle.slot));
-    for (int k = 0; k < d.row->parents; ++k) {
-      const Vertex c = d.parent(k);
-      if ((c.x | c.y | c.z) < 0) continue;
-      const Diamond parent(c);
-      if (parent.row->cls == 3) continue;  // a corner of the domain
-      const int up = parent.scale + 2;
-      visit({supercube_key(parent.scale, {c.x >> up, c.y >> up, c.z >> up}), kSlotOfType[parent.type]});
-    }
   }
 
   // Hides a split if none of its children is shown, and then its ancestors that waited for that: those that matter less.
@@ -112,5 +123,49 @@ Importance size_on_screen(const Camera& camera, const Grid& grid) {
 }
 
 void balance(Front& front, std::uint64_t max_tets, const Importance& importance) { Balance(front, max_tets, importance).run(); }
+
+std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, std::size_t max_supercubes, const Importance& importance) {
+  const std::vector<SlotGroup> splits = front.splits();
+  boost::unordered_flat_map<SupercubeKey, std::uint64_t> left, chosen;  // slots: what is not chosen yet, and what is
+  for (const SlotGroup& g : splits) left.emplace(g.key, g.slots);
+  const auto is_left = [&left](Front::Handle h) {
+    const auto found = left.find(h.supercube);
+    return found != left.end() && (found->second >> h.slot & 1) != 0;
+  };
+  const auto has_child_left = [&is_left](Front::Handle h) {
+    const Diamond d(centre_of(h.supercube, h.slot));
+    bool any = false;
+    for (int k = 0; k < d.row->children && d.has_children() && !any; ++k) {
+      const Vertex c = d.child(k);
+      any = (c.x | c.y | c.z) >= 0 && is_left(place_of(Diamond(c)));
+    }
+    return any;
+  };
+  // A parent that waited for its last child, and matters less, follows it at once.
+  const std::vector<Group> groups = in_order(splits, importance);
+  boost::unordered_flat_map<SupercubeKey, std::size_t> place;
+  for (std::size_t g = 0; g < groups.size(); ++g) place.emplace(groups[g].key, g);
+  std::size_t now = groups.size();
+  const auto choose = [&](const auto& again, Front::Handle h) -> void {
+    if (count == 0 || !is_left(h) || has_child_left(h)) return;
+    if (!chosen.contains(h.supercube) && chosen.size() == max_supercubes) return;
+    left[h.supercube] &= ~(std::uint64_t(1) << h.slot);
+    chosen[h.supercube] |= std::uint64_t(1) << h.slot;
+    --count;
+    for_each_parent(h, [&](Front::Handle parent) {
+      const auto found = place.find(parent.supercube);
+      if (found != place.end() && found->second > now) again(again, parent);
+    });
+  };
+  while (now-- > 0 && count > 0) {
+    for (const std::uint64_t cls : {kSlotsOfClass[2], kSlotsOfClass[1], kSlotsOfClass[0]}) {
+      for (std::uint64_t slots = groups[now].slots & cls; slots != 0; slots &= slots - 1) choose(choose, {groups[now].key, std::countr_zero(slots)});
+    }
+  }
+  std::vector<SlotGroup> result;
+  for (const auto& [key, slots] : chosen) result.push_back({0, 0, key, slots});
+  std::sort(result.begin(), result.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.key < b.key; });
+  return result;
+}
 
 }  // namespace intervale

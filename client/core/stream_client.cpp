@@ -1,5 +1,7 @@
 #include "client/core/stream_client.h"
 
+#include <utility>
+
 #include "common/base.h"
 #include "common/update_codec.h"
 
@@ -7,29 +9,48 @@ namespace intervale {
 
 StreamClient::StreamClient(Description description, Front front) : description_(std::move(description)), front_(std::move(front)) {}
 
-Result<StreamClient> StreamClient::start(Description description, std::optional<std::uint64_t> max_tets) {
+Result<StreamClient> StreamClient::start(Description description, const Budget& budget) {
   if (auto ok = check_description(description); !ok) return fail("the server describes no volume: " + ok.error().message);
   const auto base = decode_base(description.base, Domain(description.grid.dims));
   if (!base) return tl::unexpected(base.error());
   Front front(description.grid, *base);
   StreamClient client(std::move(description), std::move(front));
-  if (max_tets) client.max_tets_ = *max_tets;
+  client.budget_ = budget;
   return client;
 }
 
-Result<void> StreamClient::apply(std::span<const std::uint8_t> payload) {
-  const auto applied = apply_batch(front_, payload, max_tets_);
+Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch) {
+  arrived(epoch);
+  const auto applied = apply_batch(front_, payload, budget_.max_tets);
   if (!applied) return tl::unexpected(applied.error());
-  if (importance_ && over_budget()) balance(front_, max_tets_, importance_);
+  if (updates() > budget_.max_updates) return fail("more updates than there is room for");
+  rebalance();
   return {};
 }
 
 void StreamClient::look(const Camera& camera) {
   importance_ = size_on_screen(camera, description_.grid);
-  if (over_budget()) balance(front_, max_tets_, importance_);
+  rebalance();
 }
 
-bool StreamClient::over_budget() const { return front_.shown_count() < front_.split_count() || front_.tet_count() > max_tets_; }
+void StreamClient::rebalance() {
+  if (importance_ && over_budget()) balance(front_, budget_.max_tets, importance_);
+}
+
+std::vector<SlotGroup> StreamClient::give_up(std::uint64_t epoch, std::size_t max_supercubes) {
+  const std::uint64_t most = budget_.max_updates - budget_.max_updates / 4;
+  if (!importance_ || !forget_.empty() || updates() <= most) return {};
+  forget_ = least_important(front_, updates() - most, max_supercubes, importance_);
+  forget_epoch_ = epoch;
+  return forget_;
+}
+
+void StreamClient::arrived(std::uint64_t epoch) {
+  if (forget_.empty() || epoch < forget_epoch_) return;
+  front_.forget(std::exchange(forget_, {}));
+}
+
+bool StreamClient::over_budget() const { return front_.shown_count() < front_.split_count() || front_.tet_count() > budget_.max_tets; }
 std::uint64_t StreamClient::updates() const { return front_.split_count(); }
 std::uint64_t StreamClient::updates_in_mesh() const { return front_.shown_count(); }
 std::uint64_t StreamClient::tet_count() const { return front_.tet_count(); }

@@ -80,6 +80,7 @@ class LoadClient {
   asio::awaitable<void> pass_line(std::size_t bytes);
   void receive(std::size_t size);
   void look();
+  void give_up(std::uint64_t epoch);
   void take(protocol::Opened opened);
   void take(const protocol::Batch& batch);
   void take(const protocol::Done& done);
@@ -94,6 +95,7 @@ class LoadClient {
   [[nodiscard]] Time due(std::uint64_t view) const {
     return first_view_ + std::chrono::duration_cast<LoadClock::duration>(std::chrono::duration<double>(double(view) / path_.views_per_second));
   }
+  [[nodiscard]] protocol::View view() const;
   [[nodiscard]] std::optional<protocol::View> due_view();
 
   websocket::stream<beast::tcp_stream> ws_;
@@ -174,7 +176,7 @@ asio::awaitable<void> LoadClient::write_messages() {
   // Open, the first grant and the first view go out together, to save a round trip. Messages have names: g++ 12 destroys temporaries in a co_await
   // twice.
   const protocol::ClientMessage open = protocol::Open{plan_.url.name, "intervale-load " INTERVALE_VERSION, grants_.take_all(), {}};
-  const protocol::ClientMessage first = protocol::View{1, view_of(path_, 0)};
+  const protocol::ClientMessage first = view();
   if (path_.scenario == Scenario::full) pending_.push_back({1, first_view_});
   ++figures_.views;
   asked_ = LoadClock::now();
@@ -204,6 +206,13 @@ asio::awaitable<bool> LoadClient::send(const protocol::ClientMessage& message) {
   co_return !error;
 }
 
+// The last one asked for.
+protocol::View LoadClient::view() const {
+  protocol::View view{view_ + 1, view_of(path_, view_)};
+  if (plan_.budget.max_updates != UINT64_MAX) view.room = plan_.budget.max_updates;
+  return view;
+}
+
 // The newest view that is due. Where several are, those before it are as good as sent: their answer is waited for all the same.
 std::optional<protocol::View> LoadClient::due_view() {
   if (path_.scenario == Scenario::full || views_over_) return {};
@@ -217,7 +226,9 @@ std::optional<protocol::View> LoadClient::due_view() {
   }
   done_ = false;
   look();
-  return protocol::View{view_ + 1, view_of(path_, view_)};
+  protocol::View view = this->view();
+  if (mesh_) view.forget = mesh_->give_up(view.epoch, protocol::kMaxHave);
+  return view;
 }
 
 asio::awaitable<void> LoadClient::read_messages() {
@@ -257,7 +268,7 @@ void LoadClient::take(protocol::Opened opened) {
   grants_.round_trip(now_ - asked_);
   if (opened.description.content_hash != plan_.description.content_hash) return fail("the server sent nonsense: another volume than before");
   if (!plan_.verify) return;
-  auto client = StreamClient::start(std::move(opened.description), plan_.max_tets);
+  auto client = StreamClient::start(std::move(opened.description), plan_.budget);
   if (!client) return fail("the server sent nonsense: " + client.error().message);
   mesh_ = std::move(*client);
   least_tets_ = mesh_->tet_count();
@@ -270,12 +281,20 @@ void LoadClient::look() {
   if (mesh_ && camera) mesh_->look(*camera);
 }
 
+// The answer to a view has come: what that was to forget is gone.
+void LoadClient::give_up(std::uint64_t epoch) {
+  if (!mesh_) return;
+  mesh_->arrived(epoch);
+  updates_ = mesh_->updates();
+}
+
 void LoadClient::take(const protocol::Batch& batch) {
   if (!opened_ || batch.sequence != sequence_++ || batch.epoch < std::max<std::uint64_t>(epoch_, 1) || batch.epoch > view_ + 1) {
     return fail("the server sent nonsense: a batch that is out of order");
   }
   if (!grants_.spend(protocol::cost_of(batch))) return fail("the server sent nonsense: more than it was granted");
   epoch_ = batch.epoch;
+  give_up(batch.epoch);
   updates_ += batch.updates;
   if (now_ <= plan_.end()) {
     figures_.updates += batch.updates;
@@ -284,9 +303,9 @@ void LoadClient::take(const protocol::Batch& batch) {
   serve(batch.epoch);
   for (Pending& view : pending_) view.stale_bytes += buffer_.size();
   if (mesh_) {
-    auto applied = mesh_->apply(batch.payload);
+    auto applied = mesh_->apply(batch.payload, batch.epoch);
     if (applied && mesh_->updates() != updates_) applied = intervale::fail("a batch of another size than it says");
-    if (applied && plan_.max_tets && mesh_->tet_count() > std::max(*plan_.max_tets, least_tets_)) applied = intervale::fail("a mesh over its budget");
+    if (applied && mesh_->tet_count() > std::max(plan_.budget.max_tets, least_tets_)) applied = intervale::fail("a mesh over its budget");
     if (!applied) {
       mesh_.reset();  // it must not be used again
       return fail("the server sent nonsense: " + applied.error().message);
@@ -304,6 +323,7 @@ void LoadClient::take(const protocol::Done& done) {
   if (!opened_ || done.epoch < std::max<std::uint64_t>(epoch_, 1) || done.epoch > view_ + 1) {
     return fail("the server sent nonsense: an end that is out of order");
   }
+  give_up(done.epoch);
   if (done.updates_sent != updates_) return fail("the server sent nonsense: the end of the stream, with updates missing");
   epoch_ = done.epoch;
   ++figures_.done_views;

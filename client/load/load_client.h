@@ -32,12 +32,12 @@ struct LoadPlan {
   unsigned clients = 1;
   LoadClock::time_point start;  // of the first client
   LoadClock::duration duration{};
-  LoadClock::duration ramp{};             // the clients' starts are spread over it evenly
-  std::optional<std::uint64_t> rate;      // bytes a second that a client reads, at least 1024; off: as fast as they come
-  std::optional<std::uint64_t> window;    // most credit that a client has outstanding; see Grants
-  LoadClock::duration patience{};         // to be connected, for the WebSocket's handshake and for closing: each
-  bool verify = false;                    // apply what comes
-  std::optional<std::uint64_t> max_tets;  // each client's budget, if it applies
+  LoadClock::duration ramp{};           // the clients' starts are spread over it evenly
+  std::optional<std::uint64_t> rate;    // bytes a second that a client reads, at least 1024; off: as fast as they come
+  std::optional<std::uint64_t> window;  // most credit that a client has outstanding; see Grants
+  LoadClock::duration patience{};       // to be connected, for the WebSocket's handshake and for closing: each
+  bool verify = false;                  // apply what comes
+  Budget budget;                        // each client's, if it applies
   [[nodiscard]] LoadClock::time_point end() const { return start + duration; }
 };
 

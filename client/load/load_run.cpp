@@ -90,7 +90,7 @@ LoadPlan plan_of(const ServerUrl& url, const LoadOptions& options, const Descrip
   plan.window = options.window;
   plan.patience = ticks(options.patience);
   plan.verify = options.verify;
-  plan.max_tets = options.max_tets;
+  plan.budget = options.budget;
   plan.start = LoadClock::now() + kThreadsStart;
   return plan;
 }

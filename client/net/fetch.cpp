@@ -117,7 +117,7 @@ Result<void> Fetch::open() {
   if (client_) open.resume = client_->description().content_hash;
   if (auto sent = connection_->send(open); !sent) return sent;
   if (client_) {
-    const auto splits = client_->splits();
+    const auto splits = client_->resume();
     for (std::size_t first = 0; first < splits.size(); first += protocol::kMaxHave) {
       const std::size_t count = std::min(protocol::kMaxHave, splits.size() - first);
       const auto some = splits.begin() + std::ptrdiff_t(first);
@@ -145,7 +145,7 @@ Result<void> Fetch::open() {
 Result<void> Fetch::take_description(protocol::Opened& opened) {
   if (client_ && opened.resumed) return {};
   if (client_ && events_.on_notice) events_.on_notice("the data at " + url_.authority() + " changed meanwhile; starting afresh");
-  auto client = StreamClient::start(std::move(opened.description), options_.lod.max_tets);
+  auto client = StreamClient::start(std::move(opened.description), {.max_tets = options_.lod.max_tets.value_or(UINT64_MAX)});
   if (!client) return nonsense(client.error().message);
   client_ = std::move(*client);
   return {};
@@ -173,7 +173,7 @@ Result<void> Fetch::apply(const protocol::Batch& batch) {
   if (batch.sequence != sequence_++ || batch.epoch != kEpoch) return nonsense("a batch that is out of order");
   if (!grants_.spend(protocol::cost_of(batch))) return nonsense("more than it was granted");
   const std::uint64_t before = client_->updates();
-  if (auto applied = client_->apply(batch.payload); !applied) return nonsense(applied.error().message);
+  if (auto applied = client_->apply(batch.payload, batch.epoch); !applied) return nonsense(applied.error().message);
   if (client_->updates() - before != batch.updates) return nonsense("a batch of another size than it says");
   note_first_mesh();
   figures_.remaining_error = batch.remaining_error;

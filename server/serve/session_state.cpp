@@ -39,6 +39,8 @@ std::optional<Fault> SessionState::on(const protocol::Have& have) {
 std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (!opened()) return fault(CloseCode::out_of_order, "View before Open");
   if (viewing_ && view.epoch <= epoch_) return fault(CloseCode::out_of_order, "a View's epoch must be greater than the last one's");
+  if (!plan_->forget(view.forget)) return fault(CloseCode::malformed, "the client gives up what the data set has not");
+  plan_->set_room(view.room.value_or(UINT64_MAX));
   epoch_ = view.epoch;
   asked_ = view.lod;
   viewing_ = fresh_ = true;
@@ -79,7 +81,7 @@ std::optional<protocol::ServerMessage> SessionState::next_batch_or_done(std::siz
   if (!batch) {
     if (!plan_->done()) return {};
     done_ = true;
-    return protocol::Done{epoch_, plan_->sent()};
+    return protocol::Done{epoch_, plan_->sent(), plan_->full()};
   }
   target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
   const StreamPlan::ToGo to_go = plan_->to_go();

@@ -69,6 +69,40 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   return true;
 }
 
+bool StreamPlan::forget(std::span<const SlotGroup> groups) {
+  const SupercubeSet& set = volume_->set();
+  const auto find = [&set](SupercubeKey key) { return set.find_supercube(scale_of_key(key), position_of_key(key)); };
+  for (const SlotGroup& g : groups) {
+    const auto found = find(g.key);
+    if (!found || (g.slots & ~set.occupancy()[found->supercube]) != 0) return false;
+  }
+  const auto has_sent_child = [&](const Diamond& d) {
+    for (int k = 0; k < d.row->children && d.has_children(); ++k) {
+      const Vertex c = d.child(k);
+      if ((c.x | c.y | c.z) < 0) continue;
+      const auto child = set.find(c);
+      if (child && sent_.contains(child->index)) return true;
+    }
+    return false;
+  };
+  for_each_finest_first(groups, [&](const SlotGroup& g, std::uint64_t slots) {
+    const auto found = *find(g.key);
+    Waiting& waiting = waiting_[found.brick];
+    for (std::uint64_t left = slots; left != 0; left &= left - 1) {
+      const Place place = set.place_in(found.brick, found.supercube, g.key, std::countr_zero(left));
+      if (!sent_.contains(place.index) || has_sent_child(Diamond(set.centre(place)))) continue;
+      sent_.erase(place.index);
+      --sent_count_;
+      ++waiting.unsent;
+      const unsigned level = volume_->error_level(place.index);
+      waiting.level = std::max(waiting.level, std::uint16_t(level));
+      waiting.object_error = Up16(std::max(float(waiting.object_error), volume_->object_error(found.supercube, scale_of_key(g.key), level)));
+      half_levels_[found.supercube] = std::max(half_levels_[found.supercube], volume_->half_of_level(level));
+    }
+  });
+  return true;
+}
+
 void StreamPlan::set_lod(const Lod& lod) {
   only_.reset();
   if (lod.max_updates) {
@@ -155,7 +189,7 @@ bool StreamPlan::put(const Place& place, Chunk& chunk) {
   SlotGroup* group = chunk.find(place.supercube);
   const bool new_brick = group == nullptr && !chunk.bricks.contains(place.brick);
   if (group == nullptr) bytes += kSupercubeBytes + (new_brick ? kBrickBytes : 0);
-  if (chunk.bytes + bytes > chunk.max_bytes || chunk.updates == kBatchUpdatesMost) return false;
+  if (chunk.bytes + bytes > chunk.max_bytes || chunk.updates == kBatchUpdatesMost || sent_count_ >= room_) return false;
   chunk.bytes += bytes;
   ++chunk.updates;
   if (new_brick) chunk.bricks.insert(place.brick);

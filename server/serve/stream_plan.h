@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/interval_volume.h"
@@ -40,14 +41,22 @@ class StreamPlan {
   // not all its ancestors among them is the client's own trouble.
   bool resume(SupercubeKey key, std::uint64_t slots);
 
-  // Replaces what is wanted. lod: one that check_lod lets pass. What was sent stays sent: nothing is ever sent twice. O(bricks); with max_updates
+  // Takes for not sent what the client gives up: Front::forget says which of these that is. False, and nothing done, if the data set has no such
+  // updates. groups: keys strictly ascending. Before the set_lod of the view that asks for it.
+  bool forget(std::span<const SlotGroup> groups);
+
+  // The client keeps no more updates than this.
+  void set_room(std::uint64_t updates) { room_ = updates; }
+
+  // Replaces what is wanted. lod: one that check_lod lets pass. What was sent stays sent, but for what forget() took back. O(bricks); with max_updates
   // O(updates).
   void set_lod(const Lod& lod);
 
   // The next batch. Nothing when all that is wanted has been sent, and when the search for more has taken long enough for one turn: done() tells.
   // max_bytes, at least 256, bounds the payload as it would be if nothing could be compressed; it is about half of that.
   std::optional<Batch> next(std::size_t max_bytes);
-  [[nodiscard]] bool done() const { return waiting_bricks_ == 0; }
+  [[nodiscard]] bool done() const { return waiting_bricks_ == 0 || full(); }
+  [[nodiscard]] bool full() const { return waiting_bricks_ != 0 && sent_count_ >= room_; }  // there is no room for what is wanted
 
   [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates that the client has, in all
   // Of what is wanted for its own sake and not yet sent. All are bounds from above, and 0 when all has been sent.
@@ -96,7 +105,7 @@ class StreamPlan {
   std::vector<std::uint8_t> half_levels_;  // by supercube: of what is not sent, IntervalVolume::half_of_level() or more
   std::optional<Ranking> ranking_;
   std::optional<SplitSet> only_;  // with a budget of updates: those within it
-  std::uint64_t sent_count_ = 0, wanted_count_ = 0;
+  std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);
   std::uint32_t waiting_bricks_ = 0;  // whose rank is not 0
   Rank band_ = 0;                     // the lowest rank of the current band
   std::uint32_t next_brick_ = 0;      // the band goes from the last brick to the first; those below this one are still to come

@@ -130,6 +130,11 @@ std::vector<Attack> attacks() {
          c.send(kEverything);
          c.send(protocol::Have{});
        }},
+      {"ForgetsWhatIsNotThere", CloseCode::malformed,
+       [](RawClient& c) {
+         c.send(kOpen);
+         c.send(View{1, {}, {}, {{0, 0, supercube_key(0, {1000, 0, 0}), 1}}});
+       }},
       {"OpenTwice", CloseCode::out_of_order,
        [](RawClient& c) {
          c.send(kOpen);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <deque>
 #include <memory>
 #include <random>
 
@@ -64,7 +65,7 @@ TEST_P(Budgets, NoMeshOnTheWayIsLarger) {
   const Grid& g = volume->description().grid;
   const std::uint64_t full = volume->description().full.tets;
   const std::uint64_t most = StreamClient::start(volume->description())->tet_count() + full / 3;
-  auto client = StreamClient::start(volume->description(), most);
+  auto client = StreamClient::start(volume->description(), {.max_tets = most});
   ASSERT_TRUE(client);
   StreamPlan plan(volume);
   for (int view = 0; view < 12; ++view) {
@@ -88,6 +89,78 @@ TEST_P(Budgets, NoMeshOnTheWayIsLarger) {
   Front all = client->front();
   balance(all, ~std::uint64_t(0), size_on_screen(testing::random_camera(g, random_), g));
   EXPECT_EQ(all.shown_count(), all.split_count());
+}
+
+// A client with little room looks around, while batches are under way that were made before the server knew what it gave up.
+TEST_P(Budgets, WhatIsForgottenIsForgottenAtBothEnds) {
+  const auto volume = std::make_shared<const IntervalVolume>(volume_);
+  const Grid& g = volume->description().grid;
+  const Front whole = extract(*volume, {})->front;
+  for (const unsigned part : {2u, 6u, 30u}) {
+    const Budget budget{.max_tets = volume->description().full.tets * 2 / part, .max_updates = volume->size() / part};
+    auto client = StreamClient::start(volume->description(), budget);
+    ASSERT_TRUE(client);
+    const std::uint64_t most_tets = std::max(client->tet_count(), budget.max_tets);
+    StreamPlan plan(volume);
+    struct UnderWay {
+      Batch batch;
+      std::uint64_t epoch;
+    };
+    std::deque<UnderWay> line;
+    const auto receive = [&] {
+      ASSERT_TRUE(client->apply(line.front().batch.payload, line.front().epoch));
+      line.pop_front();
+      ASSERT_LE(client->updates(), budget.max_updates);
+      ASSERT_LE(client->tet_count(), most_tets);
+    };
+    std::uint64_t forgotten = 0, full = 0;
+    for (std::uint64_t epoch = 1; epoch <= 30; ++epoch) {
+      Lod lod;
+      lod.camera = testing::random_camera(g, random_);
+      lod.camera->pixel_error = 0.5;
+      client->look(*lod.camera);
+      const auto given_up = client->give_up(epoch, 8 * part);
+      for (const SlotGroup& group : given_up) forgotten += std::uint64_t(std::popcount(group.slots));
+      ASSERT_TRUE(plan.forget(given_up));
+      plan.set_room(budget.max_updates);
+      plan.set_lod(lod);
+      const int rounds = int(testing::uniform(random_, 0, 12));
+      for (int round = 0; round < rounds; ++round) {
+        if (auto batch = plan.next(1024)) line.push_back({std::move(*batch), epoch});
+        if (line.empty() || round % 3 == 0) continue;
+        ASSERT_NO_FATAL_FAILURE(receive());
+      }
+      full += plan.full();
+      ASSERT_LE(plan.sent(), budget.max_updates);
+      if (epoch % 5 != 0) continue;
+      while (!line.empty()) ASSERT_NO_FATAL_FAILURE(receive());
+      client->arrived(epoch);
+      ASSERT_EQ(client->updates(), plan.sent());
+      ASSERT_EQ(client->front().validate(), std::nullopt);
+      ASSERT_TRUE(client->front().is_part_of(whole));
+      ASSERT_EQ(broken_law(client->mesh(), g, false), "");
+    }
+    EXPECT_GT(forgotten, 0u);
+    EXPECT_GT(full, 0u);
+  }
+}
+
+// What is least goes, and takes no room any more.
+TEST_P(Budgets, GivingUpAllButALittleGivesBackTheRoom) {
+  Front front = extract(volume_, {})->front;
+  const Grid& g = volume_.description().grid;
+  const std::size_t before = front.memory_bytes();
+  const Importance importance = size_on_screen(testing::random_camera(g, random_), g);
+  const std::uint64_t all = front.split_count();
+  const auto some = least_important(front, all / 2, SIZE_MAX, importance);
+  front.forget(some);
+  EXPECT_EQ(front.split_count(), all - all / 2) << "as many as were chosen";
+  EXPECT_EQ(front.validate(), std::nullopt);
+  EXPECT_EQ(broken_law(front.mesh(), g, false), "");
+  front.forget(least_important(front, all, SIZE_MAX, importance));
+  EXPECT_EQ(front.split_count(), 0u);
+  EXPECT_LT(front.memory_bytes(), before / 4 + 4096);
+  EXPECT_EQ(front.validate(), std::nullopt);
 }
 
 // A view that comes back finds the mesh that it had.

@@ -34,6 +34,7 @@ Description some_description() {
 std::vector<ClientMessage> client_messages() {
   return {Open{"buckyball", "test 1", 262144},
           View{1, {}},
+          View{2, {}, 12345, {{0, 0, supercube_key(3, {1, 0, 2}), 5}, {0, 0, supercube_key(0, {7, 8, 9}), 1}}},
           View{std::numeric_limits<std::uint64_t>::max(),
                {.error = 0.5, .error_percent = 10, .roi = Box{{-1, 0, 1}, {2, 0, 3}}, .max_tets = 0, .max_updates = 1ull << 60}},
           View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}},
@@ -44,7 +45,8 @@ std::vector<ClientMessage> client_messages() {
 }
 
 std::vector<ServerMessage> server_messages() {
-  return {Opened{some_description(), {}}, Batch{1, 2, 3, 4.5, 5.5, 6, {7, 8, 9}}, Batch{}, Done{1, 22}, Fault{CloseCode::too_large, "too large"}};
+  return {Opened{some_description(), {}}, Batch{1, 2, 3, 4.5, 5.5, 6, {7, 8, 9}}, Batch{}, Done{1, 22, true},
+          Fault{CloseCode::too_large, "too large"}};
 }
 
 Result<ClientMessage> decode(const ClientMessage&, std::span<const std::uint8_t> bytes) { return decode_client_message(bytes); }

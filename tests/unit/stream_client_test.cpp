@@ -41,7 +41,7 @@ std::string broken(const StreamClient& client) {
 }
 
 StreamClient started(const Description& description, std::optional<std::uint64_t> max_tets = {}) {
-  auto client = StreamClient::start(description, max_tets);
+  auto client = StreamClient::start(description, {.max_tets = max_tets.value_or(UINT64_MAX)});
   EXPECT_TRUE(client) << client.error().message;
   return std::move(*client);
 }
