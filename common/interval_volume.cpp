@@ -45,20 +45,26 @@ std::string where(Vertex c) { return " at (" + std::to_string(c.x) + ", " + std:
 
 namespace {
 
-constexpr int kYieldSteps = 6, kYieldOne = 90;  // steps an octave; the step of a ratio of 1: from 2^-15 to 2^27
+// Steps an octave, and the step of a ratio of 1: near ones go from 2^-12 to 2^20, far ones as well.
+constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
+constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192;
 
 }  // namespace
 
-Yield Yield::at_least(double ratio, double unit) {
+Yield Yield::at_least(double ratio, double unit, bool is_far) {
   if (!(ratio > 0)) return Yield(0);
-  const double step = std::ceil(kYieldSteps * std::log2(ratio / unit) - 1e-9) + kYieldOne;
-  return Yield(step < 255 ? std::uint8_t(std::max(1.0, step)) : std::uint8_t(255));
+  const auto step = [&](int steps, int one) { return std::ceil(steps * std::log2(ratio / unit) - 1e-9) + one; };
+  if (is_far) return Yield(std::uint8_t(std::clamp(step(kFarSteps, kFarOne), double(kFirstFar), 255.0)));
+  return Yield(std::uint8_t(std::clamp(step(kNearSteps, kNearOne), 1.0, double(kNoBound))));
 }
+
+bool Yield::is_far() const { return step_ >= kFirstFar; }
 
 float Yield::ratio(float unit) const {
   if (step_ == 0) return 0;
-  if (step_ == 255) return std::numeric_limits<float>::max();
-  return unit * std::exp2(float(int(step_) - kYieldOne) / kYieldSteps);
+  if (is_far()) return unit * std::exp2(float(int(step_) - kFarOne) / kFarSteps);
+  if (step_ == kNoBound) return std::numeric_limits<float>::max();
+  return unit * std::exp2(float(int(step_) - kNearOne) / kNearSteps);
 }
 
 double yield_unit(const Grid& grid, double max_error) {

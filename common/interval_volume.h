@@ -23,16 +23,18 @@
 
 namespace intervale {
 
-// How far the surfaces can still move, in world units, for each unit of field error: one byte a supercube, in steps of a sixth of an octave, rounded
-// up. 0: nothing moves. The last step: no bound is known.
+// How far the surfaces can still move, in world units, for each unit of field error: one byte a supercube, rounded up. 0: nothing moves. Most are
+// bounded by how wide a diamond is as well, and go in sixths of an octave; the last of those has no other bound. Where a speck has no patch and the
+// next one is far, diamonds' widths do not count: those go in halves of an octave.
 class Yield {
  public:
   Yield() = default;
   explicit Yield(std::uint8_t step) : step_(step) {}
   // The least step for `ratio`, at least 0 or infinite, in units of `unit`.
-  static Yield at_least(double ratio, double unit);
+  static Yield at_least(double ratio, double unit, bool is_far = false);
   [[nodiscard]] std::uint8_t step() const { return step_; }
-  [[nodiscard]] float ratio(float unit) const;  // the largest there is for the last step
+  [[nodiscard]] bool is_far() const;
+  [[nodiscard]] float ratio(float unit) const;  // the largest there is where no bound is known
 
  private:
   std::uint8_t step_ = 0;
@@ -102,7 +104,9 @@ class IntervalVolume {
   // this, and nothing twice as far, as far as is known. By its supercube, that one's scale, and the update's level of error, with which it grows. Not
   // saturated.
   [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned level) const {
-    return std::min(error_levels_[level] * factor_[yields_[supercube].step()], reach_ * float(1 << scale));
+    const Yield yield = yields_[supercube];
+    const float error = error_levels_[level] * factor_[yield.step()];
+    return yield.is_far() ? error : std::min(error, reach_ * float(1 << scale));
   }
   [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
   [[nodiscard]] std::span<const Yield> yields() const { return yields_; }

@@ -314,21 +314,26 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
   }
 }
 
-// What makes object errors, which are half of moves, of errors: supercube by supercube.
+// What makes object errors of errors, supercube by supercube: of moves it is half, but no less than twice what points move in the mean, so that 99 %
+// of them are within it also where all of a surface moves alike, as with labels.
 std::vector<Yield> FieldHierarchy::yields(double max_error, const std::vector<UpdateCode>& codes, const std::vector<float>& levels) const {
-  std::vector<float> moves = surface_moves(volume_, range_, domain_, set_);
+  auto [moves, mean] = surface_moves(volume_, range_, domain_, set_);
   saturate(moves);
   const double unit = yield_unit(volume_.grid, max_error);
   std::vector<Yield> yields(set_.supercubes());
   tbb::parallel_for(std::uint32_t(0), std::uint32_t(set_.bricks().size()), [&](std::uint32_t b) {
-    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey) {
+    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
       const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
-      double most = 0;
+      const double width = diamond_width(volume_.grid) * double(1 << scale_of_key(key));
+      double furthest = 0, ratio = 0;
       for (UpdateIndex i = first; i < end; ++i) {
         const double error = double(levels[codes[i].error_level()]);
-        if (error > 0) most = std::max(most, double(moves[i]) / (2 * error));
+        if (error == 0) continue;
+        furthest = std::max(furthest, double(moves[i]));
+        ratio = std::max(ratio, double(moves[i]) / error);
       }
-      yields[s] = Yield::at_least(most, unit);
+      const double share = furthest > 0 ? std::clamp(2 * double(mean[s]) / furthest, 0.5, 1.0) : 1;
+      yields[s] = Yield::at_least(share * ratio, unit, furthest > width * (1 + 1e-6));
     });
   });
   return yields;

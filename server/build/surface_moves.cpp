@@ -20,6 +20,8 @@ namespace {
 
 constexpr int kTopScale = 4;  // cubes of this scale are gone through one by one; coarser diamonds keep their width
 
+constexpr double kApart = 4;                // of a top cube's width: so far from a surface in it is the next one, if no corner of it tells of one
+constexpr double kFar = 2.01;               // of a diamond's width: a patch that is further than this is far
 constexpr double kLeast = 1e-4;             // of what the finest diamonds measure across: what moves less stays
 constexpr double kNudge = 1.0 / (1 << 16);  // of a sample: so far into the box are points on its far sides taken to be
 
@@ -53,11 +55,26 @@ void raise(float& to, float value) {
   }
 }
 
+// Of shares of a width, each from 0 to 1; the same in whatever order they come.
+class Mean {
+ public:
+  // Fewer than 2^16 times; from any thread.
+  void add(double share) {
+    const double most = share < 1 ? share : 1;
+    std::atomic_ref<std::uint64_t>(bits_).fetch_add(std::uint64_t(most * (1 << 20)) << 16 | 1, std::memory_order_relaxed);
+  }
+  [[nodiscard]] double value() const { return bits_ == 0 ? 0 : double(bits_ >> 16) / double(bits_ & 0xffff) / (1 << 20); }
+
+ private:
+  std::uint64_t bits_ = 0;
+};
+
 template <class T>
 class Cubes {
  public:
-  Cubes(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& moves)
-      : field_(field), grid_(grid), domain_(domain), set_(set), moves_(moves), width_(diamond_width(grid)) {
+  Cubes(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& moves,
+        std::vector<Mean>& means)
+      : field_(field), grid_(grid), domain_(domain), set_(set), moves_(moves), means_(means), width_(diamond_width(grid)) {
     if (std::isfinite(range.alpha)) surface_[surfaces_++] = {range.alpha, false};
     if (std::isfinite(range.beta)) surface_[surfaces_++] = {range.beta, true};
     if (surfaces_ > 0) zero_ = surface_[0].value;
@@ -123,7 +140,8 @@ class Cubes {
         c += flip[axis] ? -side : side;
       }
       crossings = std::move(of_tet[t]);
-      descend(tet, crossings, near);
+      const double unknown = kApart * width_ * double(cube.h);
+      descend(tet, crossings, {unknown, unknown}, near);
     }
   }
 
@@ -213,6 +231,7 @@ class Cubes {
   struct Near {
     Vertex position{-1, -1, -1};
     std::uint64_t occupancy = 0;
+    std::uint32_t supercube = 0;
     UpdateIndex first = 0;
   };
   using NearByScale = std::array<Near, kTopScale + 1>;
@@ -222,7 +241,8 @@ class Cubes {
     const Vertex position{centre.x >> (scale + 2), centre.y >> (scale + 2), centre.z >> (scale + 2)};
     if (here.position != position) {
       const auto found = set_.find_supercube(scale, position);
-      here = found ? Near{position, set_.occupancy()[found->supercube], set_.first(found->brick, found->supercube)} : Near{position, 0, 0};
+      here = found ? Near{position, set_.occupancy()[found->supercube], found->supercube, set_.first(found->brick, found->supercube)}
+                   : Near{position, 0, 0, 0};
     }
     const int slot = kSlotOfType[type_of(centre, scale)];
     if (!(here.occupancy >> slot & 1)) return {};
@@ -242,30 +262,37 @@ class Cubes {
     return false;
   }
 
-  void descend(const Tet& tet, std::span<Crossing> crossings, NearByScale& near) const {
+  // nearest: of each surface, how far the next patch is from any point here at most; what diamonds above could tell.
+  void descend(const Tet& tet, std::span<Crossing> crossings, std::array<double, 2> nearest, NearByScale& near) const {
     const int tail = 3 - tet.cls;
     const Vertex a = tet.corner[0].at, b = tet.corner[tail].at;
     const Vertex centre{(a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2};
     const auto update = find(centre, tet.scale, near);
     if (!update) return;
     std::array<double, 2> off{-1, -1};  // none
+    double sum = 0;
     for (const Crossing& c : crossings) {
       double at = 0;
       for (int i = 0; i < 4; ++i) at += double(c.at[i]) * double(tet.corner[i].value);
-      off[c.surface] = std::max(off[c.surface], std::abs(at - (surface_[c.surface].value - zero_)));
+      const double here = std::abs(at - (surface_[c.surface].value - zero_));
+      off[c.surface] = std::max(off[c.surface], here);
+      sum += here;
     }
     const double most = width_ * double(1 << tet.scale);
+    const bool is_moved = !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Corner& c) { return domain_.contains(c.at); });
+    const double slope = is_moved ? 0 : std::sqrt(steepness(tet));
     double move = 0;
-    if (!std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Corner& c) { return domain_.contains(c.at); })) {
-      move = most;
-    } else {
-      const double slope = std::sqrt(steepness(tet));
-      for (int k = 0; k < surfaces_; ++k) {
-        if (off[k] < 0) continue;
-        move = std::max(move, off[k] < most * slope && has_patch(tet, centre, surface_[k]) ? off[k] / slope : most);
+    for (int k = 0; k < surfaces_; ++k) {
+      if (off[k] < 0) continue;
+      if (is_moved || has_patch(tet, centre, surface_[k])) {
+        nearest[k] = most;
+        move = std::max(move, off[k] < most * slope ? off[k] / slope : most);
+      } else {
+        move = std::max(move, nearest[k] > kFar * most ? nearest[k] : most);
       }
     }
     if (move > kLeast * width_) raise(moves_[*update], round_up(move));
+    if (!is_moved) means_[near[std::size_t(tet.scale)].supercube].add(sum / double(crossings.size()) / (most * slope));
     if (tet.scale == 0 && tet.cls == 2) return;
     const auto nearer_tail = std::partition(crossings.begin(), crossings.end(), [tail](const Crossing& c) { return c.at[0] >= c.at[tail]; });
     const auto split = std::size_t(nearer_tail - crossings.begin());
@@ -278,7 +305,7 @@ class Cubes {
         c.at[0] -= c.at[tail];
         c.at[tail] *= 2;
       }
-      descend(child, crossings.first(split), near);
+      descend(child, crossings.first(split), nearest, near);
     }
     if (split < crossings.size()) {
       Tet child{tet.corner, scale, cls};
@@ -291,7 +318,7 @@ class Cubes {
         c.at[tail - 1] = rest;
         c.at[tail] = 2 * head;
       }
-      descend(child, crossings.subspan(split), near);
+      descend(child, crossings.subspan(split), nearest, near);
     }
   }
 
@@ -299,7 +326,8 @@ class Cubes {
   const Grid& grid_;
   const Domain& domain_;
   const SupercubeSet& set_;
-  std::vector<float>& moves_;
+  std::vector<float>& moves_;  // by update
+  std::vector<Mean>& means_;   // by supercube: of its tetrahedra
   double width_;
   std::array<CutAt, 2> surface_{};
   int surfaces_ = 0;
@@ -308,13 +336,14 @@ class Cubes {
 
 }  // namespace
 
-std::vector<float> surface_moves(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set) {
+SurfaceMoves surface_moves(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set) {
   std::vector<float> moves(set.size(), 0);
+  std::vector<Mean> means(set.supercubes());
   const int top = std::min(kTopScale, domain.levels() - 1);
   const double width = diamond_width(volume.grid);
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain.last()};
-    const Cubes<T> cubes(field, range, volume.grid, domain, set, moves);
+    const Cubes<T> cubes(field, range, volume.grid, domain, set, moves, means);
     std::vector<Diamond> all;  // few, and even fewer bricks
     set.for_each(top, 0, [&](const Place& p) { all.emplace_back(set.centre(p)); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, all.size(), 1), [&](const auto& some) {
@@ -333,7 +362,11 @@ std::vector<float> surface_moves(const Volume& volume, const Range& range, const
     for (std::uint32_t b = begin; b < end; ++b)
       set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) { moves[p.index] = round_up(width * double(1 << scale)); });
   }
-  return moves;
+  std::vector<float> mean(set.supercubes());
+  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) { mean[s] = float(means[s].value() * width * double(1 << scale_of_key(key))); });
+  }
+  return {std::move(moves), std::move(mean)};
 }
 
 }  // namespace intervale

@@ -36,7 +36,7 @@ struct Trial {
 
 Trial made(unsigned seed) {
   Trial trial;
-  switch (seed % 4) {
+  switch (seed % 5) {
     case 0:
       trial = {testing::gyroid({33, 33, 33}), {-0.3, 0.2}, 1500, "gyroid"};
       break;
@@ -46,10 +46,13 @@ Trial made(unsigned seed) {
     case 2:
       trial = {testing::gyroid({40, 28, 30}), {0.2, kInf}, 1500, "gyroid in a box that does not nest"};
       break;
-    default:
+    case 3:
       trial = {testing::digits({21, 21, 21}, seed), {3, 5.5}, 1500, "digits"};
+      break;
+    default:
+      trial = {testing::specks({33, 33, 33}, seed), {5, kInf}, 3000, "specks"};
   }
-  if (seed % 8 >= 4) {
+  if (seed % 2 == 1) {
     trial.volume.grid.spacing = {0.5, 1, 2};
     trial.volume.grid.origin = {-4, 0, 7};
   }
@@ -114,7 +117,9 @@ TEST_P(Pictures, AreOffByNoMoreThanWasAskedFor) {
         if (off.empty()) continue;
         const auto text =
             "camera " + std::to_string(number) + ", " + std::to_string(off.size()) + " points seen" + (back ? ", from it to the full mesh" : "");
-        EXPECT_LE(off[off.size() * 99 / 100], tau) << text << ": 99 % of the points";
+        if (off.size() >= 200) {  // of fewer, the hundredth part is one
+          EXPECT_LE(off[off.size() * 99 / 100], tau) << text << ": 99 % of the points";
+        }
         points += off.size();
         far_off += std::size_t(off.end() - std::upper_bound(off.begin(), off.end(), 2 * tau));
       }
@@ -124,7 +129,7 @@ TEST_P(Pictures, AreOffByNoMoreThanWasAskedFor) {
   EXPECT_LT(updates, sigma->size()) << "nothing was left out";
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, Pictures, ::testing::Range(0u, 8u));
+INSTANTIATE_TEST_SUITE_P(Random, Pictures, ::testing::Range(0u, 10u));
 
 }  // namespace
 }  // namespace intervale

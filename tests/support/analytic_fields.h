@@ -43,6 +43,19 @@ inline Volume digits(const std::array<std::int32_t, 3>& dims, unsigned seed) {
   return volume_of_type(SampleType::u8, dims, f);
 }
 
+// A wall, z < 4, and single samples that stand out far from it.
+inline Volume specks(const std::array<std::int32_t, 3>& dims, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<std::uint8_t> f(std::size_t(dims[0]) * dims[1] * dims[2], 0);
+  std::fill_n(f.begin(), 4 * std::size_t(dims[0]) * dims[1], std::uint8_t(10));
+  const auto within = [&random](std::int32_t from, std::int32_t to) { return from + std::int32_t(random() % unsigned(to - from)); };
+  for (int k = 0; k < 8; ++k) {
+    const std::int32_t x = within(1, dims[0] - 1), y = within(1, dims[1] - 1), z = within(2 * dims[2] / 3, dims[2] - 1);
+    f[std::size_t(x) + std::size_t(dims[0]) * (std::size_t(y) + std::size_t(dims[1]) * std::size_t(z))] = 10;
+  }
+  return volume_of_type(SampleType::u8, dims, f);
+}
+
 // A smooth bump and a little noise: some regions full, some empty.
 inline Volume bump(const std::array<std::int32_t, 3>& dims, unsigned seed) {
   std::mt19937 random(seed);

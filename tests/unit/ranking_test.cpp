@@ -63,9 +63,10 @@ double object_error(const IntervalVolume& v, const Place& p) {
   const std::uint8_t step = v.yields()[p.supercube].step();
   const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) / 2 * h;
   if (step == 0 || v.error(p.index) == 0) return 0;
-  if (step == 255) return widest;
+  if (step == 191) return widest;
   const double unit = std::min({g.spacing[0], g.spacing[1], g.spacing[2]}) / v.description().max_error;
-  return std::min(widest, double(v.error(p.index)) * unit * std::exp2((step - 90) / 6.0));
+  if (step > 191) return double(v.error(p.index)) * unit * std::exp2((step - 216) / 2.0);
+  return std::min(widest, double(v.error(p.index)) * unit * std::exp2((step - 72) / 6.0));
 }
 
 // The box around all diamonds of a cube of supercubes, given by two opposite corners, as far as there are samples.
