@@ -3,6 +3,8 @@
 namespace intervale {
 
 void Surroundings::move_to(SupercubeKey key) {
+  if (key == key_) return;
+  key_ = key;
   scale_ = scale_of_key(key);
   position_ = position_of_key(key);
   links_ = &link_table()[unsigned(position_.x & 1) | unsigned(position_.y & 1) << 1 | unsigned(position_.z & 1) << 2];

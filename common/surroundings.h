@@ -41,7 +41,7 @@ class Surroundings {
   void look(int where);
 
   const SupercubeSet& set_;
-  SupercubeKey brick_ = ~SupercubeKey(0);
+  SupercubeKey key_ = ~SupercubeKey(0), brick_ = key_;
   Vertex brick_position_;                 // in bricks
   std::array<std::uint32_t, 27> same_;    // bricks around that one
   std::array<std::uint32_t, 8> coarser_;  // and of the next coarser scale, from its own half position on

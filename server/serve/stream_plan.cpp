@@ -22,7 +22,8 @@ constexpr std::uint32_t kTurn = 1 << 16;      // updates looked at before others
 
 // The batch being put together.
 struct StreamPlan::Chunk {
-  Surroundings around;  // of the supercube looked into
+  Surroundings around;              // of the supercube looked into
+  std::vector<Surroundings> above;  // of ancestors, by scale
   std::vector<SlotGroup> groups;
   boost::unordered_flat_map<std::uint32_t, std::uint32_t> group_of;  // by supercube
   boost::unordered_flat_set<std::uint32_t> bricks;
@@ -30,7 +31,8 @@ struct StreamPlan::Chunk {
   std::uint32_t updates = 0;
   std::uint32_t seen = 0;  // updates looked at
 
-  Chunk(const SupercubeSet& set, std::size_t most) : around(set), max_bytes(most) {}
+  Chunk(const IntervalVolume& volume, std::size_t most)
+      : around(volume.set()), above(std::size_t(volume.domain().levels()), Surroundings(volume.set())), max_bytes(most) {}
   SlotGroup* find(std::uint32_t supercube) {
     if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
     const auto found = group_of.find(supercube);
@@ -157,29 +159,20 @@ StreamPlan::ToGo StreamPlan::to_go() const {
   return to_go;
 }
 
-// Puts an update into the batch, after the ancestors it lacks. False if the batch is full first; what went in is closed under parents all the same.
-bool StreamPlan::take(const Place& place, Chunk& chunk) {
-  if (sent_.contains(place.index)) return true;
-  const SupercubeSet& set = volume_->set();
-  const Diamond d(set.centre(place));
-  for (int k = 0; k < d.row->parents; ++k) {
-    const Vertex c = d.parent(k);
-    if ((c.x | c.y | c.z) < 0) continue;
-    const auto parent = set.find(c);
-    if (parent && !take(*parent, chunk)) return false;
-  }
-  return put(place, chunk);
-}
-
-// ... in the supercube whose surroundings the batch is in: most have all their parents.
-bool StreamPlan::take_here(const Place& place, Chunk& chunk) {
-  const Links& links = chunk.around.links(int(place.slot));
+// Puts an update into the batch, after the ancestors it lacks. around: of its supercube; those of ancestors are kept too, for the next ones are near
+// by. False if the batch is full first; what went in is closed under parents all the same.
+bool StreamPlan::take(const Place& place, Surroundings& around, Chunk& chunk) {
+  const Links& links = around.links(int(place.slot));
   const int parents = diamond_type(kTypeOfSlot[place.slot]).parents;
   for (int k = 0; k < parents; ++k) {
     const Link link = links.vertex[links.parent[k]];
-    const Surroundings::Seen& seen = chunk.around.at(link.where);
+    around.move_to(place.key);  // an ancestor of the same scale may have moved it
+    const Surroundings::Seen& seen = around.at(link.where);
     if (!seen.has(link.slot) || sent_.contains(seen.number(link.slot))) continue;
-    if (!take(seen.place(link.slot), chunk)) return false;
+    const Place parent = seen.place(link.slot);
+    Surroundings& above = chunk.above[std::size_t(scale_of_key(parent.key))];
+    above.move_to(parent.key);
+    if (!take(parent, above, chunk)) return false;
   }
   return sent_.contains(place.index) || put(place, chunk);
 }
@@ -273,7 +266,7 @@ StreamPlan::Left StreamPlan::look_into(const Ranking::Supercube& ranking, Place 
     importance = std::max(importance, least);
     if (importance > 0 && importance >= in_band) {
       place.index = first + k;
-      if (!take_here(place, chunk)) {
+      if (!take(place, chunk.around, chunk)) {
         left.full = true;
         return left;
       }
@@ -288,7 +281,7 @@ StreamPlan::Left StreamPlan::look_into(const Ranking::Supercube& ranking, Place 
 }
 
 std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
-  Chunk chunk(volume_->set(), max_bytes);
+  Chunk chunk(*volume_, max_bytes);
   while (!done()) {
     if (next_brick_ == 0) {
       if (chunk.bytes >= kSmallBatch) break;

@@ -18,6 +18,7 @@
 #include "common/lod.h"
 #include "common/ranking.h"
 #include "common/split_set.h"
+#include "common/surroundings.h"
 #include "common/update_codec.h"
 
 namespace intervale {
@@ -48,8 +49,8 @@ class StreamPlan {
   // The client keeps no more updates than this.
   void set_room(std::uint64_t updates) { room_ = updates; }
 
-  // Replaces what is wanted. lod: one that check_lod lets pass. What was sent stays sent, but for what forget() took back. O(bricks); with max_updates
-  // O(updates).
+  // Replaces what is wanted. lod: one that check_lod lets pass. What was sent stays sent, but for what forget() took back. O(bricks); with
+  // max_updates O(updates).
   void set_lod(const Lod& lod);
 
   // The next batch. Nothing when all that is wanted has been sent, and when the search for more has taken long enough for one turn: done() tells.
@@ -95,8 +96,7 @@ class StreamPlan {
     unsigned wanted = 0, level = 0;
   };
   Left look_into(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent, Chunk& chunk);
-  bool take(const Place& place, Chunk& chunk);
-  bool take_here(const Place& place, Chunk& chunk);
+  bool take(const Place& place, Surroundings& around, Chunk& chunk);
   bool put(const Place& place, Chunk& chunk);
 
   std::shared_ptr<const IntervalVolume> volume_;
