@@ -317,8 +317,8 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
 // What makes object errors of errors, supercube by supercube: of moves it is half, but no less than twice what points move in the mean, so that 99 %
 // of them are within it also where all of a surface moves alike, as with labels.
 std::vector<Yield> FieldHierarchy::yields(double max_error, const std::vector<UpdateCode>& codes, const std::vector<float>& levels) const {
-  auto [moves, mean] = surface_moves(volume_, range_, domain_, set_);
-  saturate(moves);
+  SurfaceMoves moves = surface_moves(volume_, range_, domain_, set_);
+  saturate(moves.most);
   const double unit = yield_unit(volume_.grid, max_error);
   std::vector<Yield> yields(set_.supercubes());
   tbb::parallel_for(std::uint32_t(0), std::uint32_t(set_.bricks().size()), [&](std::uint32_t b) {
@@ -329,10 +329,10 @@ std::vector<Yield> FieldHierarchy::yields(double max_error, const std::vector<Up
       for (UpdateIndex i = first; i < end; ++i) {
         const double error = double(levels[codes[i].error_level()]);
         if (error == 0) continue;
-        furthest = std::max(furthest, double(moves[i]));
-        ratio = std::max(ratio, double(moves[i]) / error);
+        furthest = std::max(furthest, double(moves.most[i]));
+        ratio = std::max(ratio, double(moves.most[i]) / error);
       }
-      const double share = furthest > 0 ? std::clamp(2 * double(mean[s]) / furthest, 0.5, 1.0) : 1;
+      const double share = furthest > 0 ? std::clamp(2 * double(moves.mean[s]) / furthest, 0.5, 1.0) : 1;
       yields[s] = Yield::at_least(share * ratio, unit, furthest > width * (1 + 1e-6));
     });
   });

@@ -79,8 +79,8 @@ std::vector<Crossing> crossings_of(const Volume& v, const Range& range) {
   for (int z = 0; z <= last.z; z += 2) {
     for (int y = 0; y <= last.y; y += 2) {
       for (int x = 0; x <= last.x; x += 2) {
-        for (auto [p, q] : edges) {
-          p = {p[0] + x, p[1] + y, p[2] + z}, q = {q[0] + x, q[1] + y, q[2] + z};
+        for (const auto& [first, second] : edges) {
+          const Point p{first[0] + x, first[1] + y, first[2] + z}, q{second[0] + x, second[1] + y, second[2] + z};
           const Vertex from{p[0], p[1], p[2]}, to{q[0], q[1], q[2]};
           if (!domain.contains(from) || !domain.contains(to) || !done.insert({p, q}).second) continue;
           const double a = testing::sample(v, p[0], p[1], p[2]), b = testing::sample(v, q[0], q[1], q[2]);
