@@ -47,14 +47,14 @@ namespace {
 
 // Steps an octave, and the step of a ratio of 1: near ones go from 2^-12 to 2^20, far ones as well.
 constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
-constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192;
+constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
 
 }  // namespace
 
 Yield Yield::at_least(double ratio, double unit, bool is_far) {
   if (!(ratio > 0)) return Yield(0);
   const auto step = [&](int steps, int one) { return std::ceil(steps * std::log2(ratio / unit) - 1e-9) + one; };
-  if (is_far) return Yield(std::uint8_t(std::clamp(step(kFarSteps, kFarOne), double(kFirstFar), 255.0)));
+  if (is_far) return Yield(std::uint8_t(std::clamp(step(kFarSteps, kFarOne), double(kFirstFar), double(kNoBoundFar))));
   return Yield(std::uint8_t(std::clamp(step(kNearSteps, kNearOne), 1.0, double(kNoBound))));
 }
 
@@ -62,8 +62,8 @@ bool Yield::is_far() const { return step_ >= kFirstFar; }
 
 float Yield::ratio(float unit) const {
   if (step_ == 0) return 0;
+  if (step_ == kNoBound || step_ == kNoBoundFar) return std::numeric_limits<float>::max();
   if (is_far()) return unit * std::exp2(float(int(step_) - kFarOne) / kFarSteps);
-  if (step_ == kNoBound) return std::numeric_limits<float>::max();
   return unit * std::exp2(float(int(step_) - kNearOne) / kNearSteps);
 }
 
@@ -116,6 +116,10 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   for (std::size_t i = 0; i < parts.error_levels.size(); ++i) {
     if (!std::isfinite(parts.error_levels[i]) || parts.error_levels[i] < (i == 0 ? 0.0f : parts.error_levels[i - 1]))
       return fail("error levels do not ascend");
+  }
+  const int levels = Domain(d.grid.dims).levels();
+  for (const SupercubeSet::Brick& brick : parts.set.bricks()) {
+    if (scale_of_key(brick.key) >= levels) return fail("a brick is coarser than the box");
   }
   std::uint64_t coefficients = 0;
   for (UpdateCode c : parts.codes) {

@@ -25,7 +25,7 @@ namespace intervale {
 
 // How far the surfaces can still move, in world units, for each unit of field error: one byte a supercube, rounded up. 0: nothing moves. Most are
 // bounded by how wide a diamond is as well, and go in sixths of an octave; the last of those has no other bound. Where a speck has no patch and the
-// next one is far, diamonds' widths do not count: those go in halves of an octave.
+// next one is far, diamonds' widths do not count, but kFurthest does: those go in halves of an octave, and the last one has no other bound.
 class Yield {
  public:
   Yield() = default;
@@ -39,6 +39,8 @@ class Yield {
  private:
   std::uint8_t step_ = 0;
 };
+
+inline constexpr float kFurthest = 64;  // of what a diamond with h = 1 measures across: the most that is told of how far anything moves
 
 inline constexpr int kErrorLevels = 512;  // distinct errors at most; each update's is rounded up to one of them
 
@@ -106,7 +108,7 @@ class IntervalVolume {
   [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned level) const {
     const Yield yield = yields_[supercube];
     const float error = error_levels_[level] * factor_[yield.step()];
-    return yield.is_far() ? error : std::min(error, reach_ * float(1 << scale));
+    return std::min(error, reach_ * (yield.is_far() ? kFurthest : float(1 << scale)));
   }
   [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
   [[nodiscard]] std::span<const Yield> yields() const { return yields_; }

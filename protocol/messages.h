@@ -88,7 +88,7 @@ struct Batch {
 struct Done {
   std::uint64_t epoch = 0;
   std::uint64_t updates_sent = 0;  // that the client has
-  bool full = false;               // more was wanted, but there was no room
+  bool full = false;               // there was no room for more, which may be wanted
   friend bool operator==(const Done&, const Done&) = default;
 };
 struct Fault {

@@ -1,5 +1,6 @@
 #include "client/core/stream_client.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "common/base.h"
@@ -20,7 +21,7 @@ Result<StreamClient> StreamClient::start(Description description, const Budget& 
 }
 
 Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch) {
-  arrived(epoch);
+  forget(epoch);
   const auto applied = apply_batch(front_, payload, budget_.max_tets);
   if (!applied) return tl::unexpected(applied.error());
   if (updates() > budget_.max_updates) return fail("more updates than there is room for");
@@ -38,7 +39,7 @@ void StreamClient::rebalance() {
 }
 
 std::vector<SlotGroup> StreamClient::give_up(std::uint64_t epoch, std::size_t max_supercubes) {
-  const std::uint64_t most = budget_.max_updates - budget_.max_updates / 4;
+  const std::uint64_t most = budget_.max_updates - std::max<std::uint64_t>(1, budget_.max_updates / 4);
   if (!importance_ || !forget_.empty() || updates() <= most) return {};
   forget_ = least_important(front_, updates() - most, max_supercubes, importance_);
   forget_epoch_ = epoch;
@@ -46,8 +47,13 @@ std::vector<SlotGroup> StreamClient::give_up(std::uint64_t epoch, std::size_t ma
 }
 
 void StreamClient::arrived(std::uint64_t epoch) {
-  if (forget_.empty() || epoch < forget_epoch_) return;
+  if (forget(epoch)) rebalance();
+}
+
+bool StreamClient::forget(std::uint64_t epoch) {
+  if (forget_.empty() || epoch < forget_epoch_) return false;
   front_.forget(std::exchange(forget_, {}));
+  return true;
 }
 
 bool StreamClient::over_budget() const { return front_.shown_count() < front_.split_count() || front_.tet_count() > budget_.max_tets; }

@@ -38,7 +38,7 @@ class StreamClient {
   // max_supercubes. Nothing while so much is free, or while the answer to an earlier one has not come, or before look(). It is kept until
   // arrived(epoch): what is on its way was made for a client that has it.
   [[nodiscard]] std::vector<SlotGroup> give_up(std::uint64_t epoch, std::size_t max_supercubes);
-  // A Batch or Done of this epoch has come; apply() calls it too.
+  // A Done of this epoch has come, or a Batch: apply() does the same.
   void arrived(std::uint64_t epoch);
 
   [[nodiscard]] bool over_budget() const;       // not all that came is in the mesh
@@ -57,6 +57,7 @@ class StreamClient {
  private:
   explicit StreamClient(Description description, Front front);
   void rebalance();
+  bool forget(std::uint64_t epoch);
   Description description_;
   Front front_;
   Budget budget_;

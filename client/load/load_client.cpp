@@ -126,6 +126,7 @@ class LoadClient {
   bool opened_ = false;
   bool has_mesh_ = false;    // or knows that none will come
   bool done_ = false;        // all of the last view has come
+  bool full_ = false;        // ... that there is room for
   bool views_over_ = false;  // no more views are sent
   bool closing_ = false;     // what comes counts no more
   bool gone_ = false;        // the connection is over
@@ -329,6 +330,7 @@ void LoadClient::take(const protocol::Done& done) {
   ++figures_.done_views;
   has_mesh_ = true;  // if it has none, there is none
   done_ = done.epoch == view_ + 1;
+  full_ = done.full;
   grants_.pause();
   serve(done.epoch);
   if (path_.scenario == Scenario::full) return leave();
@@ -401,7 +403,7 @@ void LoadClient::cut_off() {
 void LoadClient::report_rest() {
   figures_.unanswered_views += pending_.size();
   if (failed_) return;
-  if (done_) ++figures_.complete;
+  if (done_ && !full_) ++figures_.complete;
   now_ = LoadClock::now();
   if (!has_mesh_) figures_.first_mesh_ms.push_back(milliseconds(now_ - start_));
   if (!pending_.empty()) serve(UINT64_MAX);

@@ -114,17 +114,19 @@ void add_load_command(Program& program) {
   app.get_option("--duration")->required();
   add_views(app, load);
   add_line(app, load);
-  app.add_flag("--verify", load.verify,
-               "Apply all that comes, and compare every mesh with one of the whole stream; takes a mesh's memory for each client");
+  const auto verify = app.add_flag(
+      "--verify", load.verify, "Apply all that comes, and compare every mesh with one of the whole stream; takes a mesh's memory for each client");
   within(app.add_option_function<std::uint64_t>(
              "--max-tets", [&load](std::uint64_t tets) { load.budget.max_tets = tets; },
              "With --verify: the most tetrahedra that each mesh may have; it keeps what is largest on the client's screen"),
-         0, 1e15, "N");
+         0, 1e15, "N")
+      ->needs(verify);
   within(app.add_option_function<std::uint64_t>(
              "--max-kept", [&load](std::uint64_t updates) { load.budget.max_updates = updates; },
              "With --verify: the most updates that each client keeps, in its mesh or beside it, at some 30 bytes; what is least is forgotten at both "
              "ends"),
-         0, 1e15, "N");
+         0, 1e15, "N")
+      ->needs(verify);
   add_json_flag(app, options->json);
 }
 

@@ -20,7 +20,8 @@ namespace {
 
 constexpr int kTopScale = 4;  // cubes of this scale are gone through one by one; coarser diamonds keep their width
 
-constexpr double kApart = 4;                // of a top cube's width: so far from a surface in it is the next one, if no corner of it tells of one
+// Of a top cube's width: so far from a surface in it is the next one, if no corner of it tells of one.
+constexpr double kApart = kFurthest / (1 << kTopScale);
 constexpr double kFar = 2.01;               // of a diamond's width: a patch that is further than this is far
 constexpr double kLeast = 1e-4;             // of what the finest diamonds measure across: what moves less stays
 constexpr double kNudge = 1.0 / (1 << 16);  // of a sample: so far into the box are points on its far sides taken to be

@@ -31,8 +31,7 @@ struct StreamPlan::Chunk {
   std::uint32_t updates = 0;
   std::uint32_t seen = 0;  // updates looked at
 
-  Chunk(const IntervalVolume& volume, std::size_t most)
-      : around(volume.set()), above(std::size_t(volume.domain().levels()), Surroundings(volume.set())), max_bytes(most) {}
+  Chunk(const IntervalVolume& volume, std::size_t most) : around(volume.set()), above(kMaxLevels, Surroundings(volume.set())), max_bytes(most) {}
   SlotGroup* find(std::uint32_t supercube) {
     if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
     const auto found = group_of.find(supercube);

@@ -29,7 +29,7 @@ class Turnstile {
   Turnstile& operator=(const Turnstile&) = delete;
 
   // Completes with void() once it is the session's turn, by way of the handler's executor. The session computes and calls leave(), without waiting
-  // for anything in between. A session waits once at a time.
+  // for anything in between. A session waits for more once at a time.
   template <class Token>
   auto enter(Id session, Turn turn, Token&& token) {
     return boost::asio::async_initiate<Token, void()>(

@@ -137,15 +137,33 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         if (ws_.got_text()) co_return end({CloseCode::text_frame, "text frames are not spoken here"});
         if (buffer.size() > protocol::kMaxClientMessage) co_return end({CloseCode::too_large, "the message is too large"});
       } while (!ws_.is_message_done());
-      if (!why_) receive({static_cast<const std::uint8_t*>(buffer.data().data()), buffer.size()});
+      if (why_) co_return;
+      const std::span bytes(static_cast<const std::uint8_t*>(buffer.data().data()), buffer.size());
+      const auto message = protocol::decode_client_message(bytes);
+      if (!message) co_return end({CloseCode::malformed, message.error().message});
+      if (const auto* view = std::get_if<protocol::View>(&*message); view != nullptr && !view->forget.empty()) {
+        // That takes time, like a batch.
+        co_await context_.turnstile.enter(id_, Turnstile::Turn::answer, asio::use_awaitable);
+        const Inside inside{context_.turnstile, Turnstile::Turn::answer};
+        receive(*message);
+      } else {
+        receive(*message);
+      }
     }
   }
 
-  void receive(std::span<const std::uint8_t> bytes) {
-    const auto message = protocol::decode_client_message(bytes);
-    if (!message) return end({CloseCode::malformed, message.error().message});
+  // Between enter() and leave().
+  struct Inside {
+    Turnstile& turnstile;
+    Turnstile::Turn turn;
+    Clock::time_point since = Clock::now();
+    ~Inside() { turnstile.leave(turn, Clock::now() - since); }
+  };
+
+  void receive(const protocol::ClientMessage& message) {
+    if (why_ || gone_) return;
     if (!state_.starved()) stalled_since_ = Clock::now();  // in case this message makes it so
-    if (auto fault = state_.receive(*message)) return end(std::move(*fault));
+    if (auto fault = state_.receive(message)) return end(std::move(*fault));
     if (state_.fresh()) context_.turnstile.hurry(id_);
     wake_.cancel();
   }
@@ -185,12 +203,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   // What the session has next. Leaves the turnstile.
   std::optional<protocol::ServerMessage> compute() {
-    struct Inside {
-      Turnstile& turnstile;
-      Turnstile::Turn turn;
-      Clock::time_point since = Clock::now();
-      ~Inside() { turnstile.leave(turn, Clock::now() - since); }
-    } const inside{context_.turnstile, turn()};
+    const Inside inside{context_.turnstile, turn()};
     if (gone_ || why_) return {};
     const bool crowded = context_.turnstile.crowded();
     return state_.next(!crowded ? protocol::kMaxBatchPayload : state_.fresh() ? kCrowdedAnswer : kCrowdedPayload);

@@ -145,6 +145,27 @@ TEST_P(Budgets, WhatIsForgottenIsForgottenAtBothEnds) {
   }
 }
 
+// Where the answer brings nothing, what was hidden takes the room of what was given up.
+TEST_P(Budgets, WhatIsGivenUpMakesRoomInTheMesh) {
+  const auto volume = std::make_shared<const IntervalVolume>(volume_);
+  const Budget budget{.max_tets = volume->description().full.tets * 3 / 4, .max_updates = volume->size()};
+  auto client = StreamClient::start(volume->description(), budget);
+  ASSERT_TRUE(client);
+  StreamPlan plan(volume);
+  plan.set_lod({});
+  while (const auto batch = plan.next(1 << 16)) ASSERT_TRUE(client->apply(batch->payload, 1));
+  const Camera camera = testing::random_camera(volume->description().grid, random_);
+  client->look(camera);
+  ASSERT_FALSE(client->give_up(2, SIZE_MAX).empty());
+  client->arrived(1);
+  EXPECT_EQ(client->updates(), volume->size()) << "not yet";
+  client->arrived(2);
+  EXPECT_LT(client->updates(), volume->size());
+  const std::uint64_t shown = client->updates_in_mesh();
+  client->look(camera);
+  EXPECT_EQ(client->updates_in_mesh(), shown);
+}
+
 // What is least goes, and takes no room any more.
 TEST_P(Budgets, GivingUpAllButALittleGivesBackTheRoom) {
   Front front = extract(volume_, {})->front;

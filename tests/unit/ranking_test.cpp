@@ -65,7 +65,9 @@ double object_error(const IntervalVolume& v, const Place& p) {
   if (step == 0 || v.error(p.index) == 0) return 0;
   if (step == 191) return widest;
   const double unit = std::min({g.spacing[0], g.spacing[1], g.spacing[2]}) / v.description().max_error;
-  if (step > 191) return double(v.error(p.index)) * unit * std::exp2((step - 216) / 2.0);
+  const double furthest = 64 * diamond_width(g) / 2;
+  if (step == 255) return furthest;
+  if (step > 191) return std::min(furthest, double(v.error(p.index)) * unit * std::exp2((step - 216) / 2.0));
   return std::min(widest, double(v.error(p.index)) * unit * std::exp2((step - 72) / 6.0));
 }
 
