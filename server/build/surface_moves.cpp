@@ -37,11 +37,17 @@ struct Corner {
   float value;
 };
 
+using Vector = std::array<double, 3>;
+
 // One tetrahedron of the bisection. Its spine goes from corner 0 to corner 3 - cls.
 struct Tet {
   std::array<Corner, 4> corner;
   int scale, cls;
+  std::array<Vector, 4> weight;  // the gradients of the barycentric coordinates, in world units, which a step changes as it does those
+  Vector gradient;               // of the interpolant
 };
+
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 float round_up(double value) {
   const float f = float(std::min(value, double(std::numeric_limits<float>::max())));
@@ -79,12 +85,14 @@ class Cubes {
     if (std::isfinite(range.alpha)) surface_[surfaces_++] = {range.alpha, false};
     if (std::isfinite(range.beta)) surface_[surfaces_++] = {range.beta, true};
     if (surfaces_ > 0) zero_ = surface_[0].value;
+    for (int k = 0; k < surfaces_; ++k) kappa_[k] = float(surface_[k].value - zero_);
   }
 
   // All that is inside one diamond of class 0. crossings: room to work in.
   void measure(const Diamond& cube, std::vector<Crossing>& crossings) const {
     std::array<std::vector<Crossing>, 6> of_tet;
     NearByScale near;
+    near.inside = domain_.is_interior(cube);
     const Vertex from{cube.centre.x - cube.h, cube.centre.y - cube.h, cube.centre.z - cube.h};
     const Vertex last = field_.last;
     const std::int32_t side = 2 * cube.h;
@@ -131,14 +139,20 @@ class Cubes {
     }
     for (int t = 0; t < 6; ++t) {
       if (of_tet[t].empty()) continue;
-      Tet tet{{}, cube.scale, 0};
+      Tet tet{{}, cube.scale, 0, {}, {}};
       Vertex v = start;
-      for (int i = 0; i < 4; ++i) {
-        tet.corner[i] = {v, float(value(v))};
-        if (i == 3) break;
+      tet.corner[0] = {v, float(value(v))};
+      tet.weight[0] = {};
+      for (int i = 0; i < 3; ++i) {
         const int axis = kPaths[t][i];
         std::int32_t& c = axis == 0 ? v.x : axis == 1 ? v.y : v.z;
         c += flip[axis] ? -side : side;
+        tet.corner[i + 1] = {v, float(value(v))};
+        const double inverse = (flip[axis] ? -1 : 1) / (side * grid_.spacing[axis]);
+        tet.weight[i][axis] -= inverse;
+        tet.weight[i + 1] = {};
+        tet.weight[i + 1][axis] = inverse;
+        tet.gradient[axis] = (double(tet.corner[i + 1].value) - double(tet.corner[i].value)) * inverse;
       }
       crossings = std::move(of_tet[t]);
       const double unknown = kApart * width_ * double(cube.h);
@@ -206,28 +220,6 @@ class Cubes {
 
   [[nodiscard]] double value(Vertex v) const { return field_.at(domain_.clamp(v)) - zero_; }
 
-  // The square of the length of the interpolant's gradient.
-  [[nodiscard]] double steepness(const Tet& tet) const {
-    std::array<std::array<double, 3>, 3> e;
-    std::array<double, 3> f;
-    for (int i = 0; i < 3; ++i) {
-      const Vertex a = tet.corner[i].at, b = tet.corner[i + 1].at;
-      e[i] = {grid_.spacing[0] * (b.x - a.x), grid_.spacing[1] * (b.y - a.y), grid_.spacing[2] * (b.z - a.z)};
-      f[i] = double(tet.corner[i + 1].value) - double(tet.corner[i].value);
-    }
-    const auto cross = [](const std::array<double, 3>& a, const std::array<double, 3>& b) {
-      return std::array<double, 3>{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    };
-    const auto c0 = cross(e[1], e[2]), c1 = cross(e[2], e[0]), c2 = cross(e[0], e[1]);
-    const double det = e[0][0] * c0[0] + e[0][1] * c0[1] + e[0][2] * c0[2];
-    double square = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double g = f[0] * c0[k] + f[1] * c1[k] + f[2] * c2[k];
-      square += g * g;
-    }
-    return square / (det * det);
-  }
-
   // The supercube of each scale that was looked into last: the next diamond is mostly in it too.
   struct Near {
     Vertex position{-1, -1, -1};
@@ -235,7 +227,9 @@ class Cubes {
     std::uint32_t supercube = 0;
     UpdateIndex first = 0;
   };
-  using NearByScale = std::array<Near, kTopScale + 1>;
+  struct NearByScale : std::array<Near, kTopScale + 1> {
+    bool inside = false;  // the cube that is gone through is in the box
+  };
 
   [[nodiscard]] std::optional<UpdateIndex> find(Vertex centre, int scale, NearByScale& near) const {
     Near& here = near[std::size_t(scale)];
@@ -270,18 +264,20 @@ class Cubes {
     const Vertex centre{(a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2};
     const auto update = find(centre, tet.scale, near);
     if (!update) return;
-    std::array<double, 2> off{-1, -1};  // none
-    double sum = 0;
+    const std::array<float, 4> values{tet.corner[0].value, tet.corner[1].value, tet.corner[2].value, tet.corner[3].value};
+    double alpha_off = -1, beta_off = -1, sum = 0;  // -1: none
     for (const Crossing& c : crossings) {
-      double at = 0;
-      for (int i = 0; i < 4; ++i) at += double(c.at[i]) * double(tet.corner[i].value);
-      const double here = std::abs(at - (surface_[c.surface].value - zero_));
-      off[c.surface] = std::max(off[c.surface], here);
+      float at = 0;
+      for (int i = 0; i < 4; ++i) at += c.at[i] * values[i];
+      const double here = std::abs(at - kappa_[c.surface]);
+      alpha_off = std::max(alpha_off, c.surface == 0 ? here : -1.0);
+      beta_off = std::max(beta_off, c.surface == 0 ? -1.0 : here);
       sum += here;
     }
     const double most = width_ * double(1 << tet.scale);
-    const bool is_moved = !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Corner& c) { return domain_.contains(c.at); });
-    const double slope = is_moved ? 0 : std::sqrt(steepness(tet));
+    const bool is_moved = !near.inside && !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Corner& c) { return domain_.contains(c.at); });
+    const double slope = is_moved ? 0 : std::sqrt(dot(tet.gradient, tet.gradient));
+    const std::array<double, 2> off{alpha_off, beta_off};
     double move = 0;
     for (int k = 0; k < surfaces_; ++k) {
       if (off[k] < 0) continue;
@@ -299,9 +295,17 @@ class Cubes {
     const auto split = std::size_t(nearer_tail - crossings.begin());
     const Corner middle{centre, float(value(centre))};
     const int scale = tet.cls == 2 ? tet.scale - 1 : tet.scale, cls = tet.cls == 2 ? 0 : tet.cls + 1;
+    const double bend = double(middle.value) - 0.5 * (double(tet.corner[0].value) + double(tet.corner[tail].value));
     if (split > 0) {
-      Tet child{tet.corner, scale, cls};
+      Tet child = tet;
+      child.scale = scale;
+      child.cls = cls;
       child.corner[tail] = middle;
+      for (int k = 0; k < 3; ++k) {
+        child.weight[0][k] -= tet.weight[tail][k];
+        child.weight[tail][k] *= 2;
+        child.gradient[k] += bend * child.weight[tail][k];
+      }
       for (Crossing& c : crossings.first(split)) {
         c.at[0] -= c.at[tail];
         c.at[tail] *= 2;
@@ -309,9 +313,19 @@ class Cubes {
       descend(child, crossings.first(split), nearest, near);
     }
     if (split < crossings.size()) {
-      Tet child{tet.corner, scale, cls};
-      for (int i = 0; i < tail; ++i) child.corner[i] = tet.corner[i + 1];
+      Tet child = tet;
+      child.scale = scale;
+      child.cls = cls;
+      for (int i = 0; i < tail; ++i) {
+        child.corner[i] = tet.corner[i + 1];
+        child.weight[i] = tet.weight[i + 1];
+      }
       child.corner[tail] = middle;
+      for (int k = 0; k < 3; ++k) {
+        child.weight[tail - 1][k] -= tet.weight[0][k];
+        child.weight[tail][k] = 2 * tet.weight[0][k];
+        child.gradient[k] += bend * child.weight[tail][k];
+      }
       for (Crossing& c : crossings.subspan(split)) {
         const float head = c.at[0];
         const float rest = c.at[tail] - head;
@@ -331,6 +345,7 @@ class Cubes {
   std::vector<Mean>& means_;   // by supercube: of its tetrahedra
   double width_;
   std::array<CutAt, 2> surface_{};
+  std::array<float, 2> kappa_{};  // counted from zero_
   int surfaces_ = 0;
   double zero_ = 0;
 };
@@ -353,7 +368,7 @@ SurfaceMoves surface_moves(const Volume& volume, const Range& range, const Domai
     });
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(set.bricks().size()), [&](std::uint32_t b) {
       set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
-        const double tip = cubes.measure_tip(Diamond(SupercubeSet::centre(p)));
+        const double tip = cubes.measure_tip(Diamond(SupercubeSet::centre(p), scale_of_key(p.key), kTypeOfSlot[p.slot]));
         if (tip > kLeast * width) moves[p.index] = std::max(moves[p.index], round_up(tip));
       });
     });
