@@ -17,7 +17,7 @@ struct ServerUrl {
   [[nodiscard]] std::string server() const { return "ws://" + authority(); }
 };
 
-// "ws://host:port" or "ws://host:port/name"; an IPv6 address in brackets; port 80 if there is none. Misuse: anything else, wss:// for now too.
+// "ws://host:port" or "ws://host:port/name"; an IPv6 address in brackets; port 80 if there is none. Misuse: anything else, wss:// too, for there is no TLS.
 [[nodiscard]] Result<ServerUrl> parse_url(std::string_view text);
 
 }  // namespace intervale

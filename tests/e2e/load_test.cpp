@@ -95,9 +95,9 @@ TEST(Load, ABudgetIsKeptWhereverClientsLook) {
 // The same for what it keeps at all: a client that is sent more fails, and so does one that forgets other updates than its server.
 TEST(Load, ClientsThatKeepLittleForgetWhatTheServerForgets) {
   ServerProgram server;
-  const auto figures = load(server.url("buckyball"), {"--clients", "4", "--duration", "1.5", "--ramp", "0.2", "--scenario", "jump", "--pixel-error",
-                                                      "0.5", "--views-per-second", "8", "--threads", "2", "--verify", "--max-tets", "20000",
-                                                      "--max-kept", "3000"});
+  const auto figures =
+      load(server.url("buckyball"), {"--clients", "4", "--duration", "1.5", "--ramp", "0.2", "--scenario", "jump", "--pixel-error", "0.5",
+                                     "--views-per-second", "8", "--threads", "2", "--verify", "--max-tets", "20000", "--max-kept", "3000"});
   EXPECT_EQ(figures.at("connected"), 4);
   EXPECT_EQ(figures.at("failed"), 0);
   EXPECT_EQ(figures.at("verified"), 4);
