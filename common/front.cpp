@@ -191,6 +191,7 @@ void Front::pack() {
   blocks_ = std::move(blocks);
   q.shrink_to_fit();
   q_ = std::move(q);
+  ++renamed_;
 }
 
 std::vector<SlotGroup> Front::splits() const {

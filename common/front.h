@@ -75,6 +75,7 @@ class Front {
   [[nodiscard]] std::uint64_t split_count() const { return split_count_; }  // diamonds that are split, hidden ones too
   [[nodiscard]] std::uint64_t shown_count() const { return shown_count_; }  // of those, the mesh's
   [[nodiscard]] std::size_t memory_bytes() const;
+  [[nodiscard]] std::uint64_t renamed() const { return renamed_; }  // how often the names of points changed; see FrontPatches
 
   // The diamonds that are split, hidden ones too, by supercube, keys ascending; only keys and slots mean something.
   [[nodiscard]] std::vector<SlotGroup> splits() const;
@@ -107,7 +108,7 @@ class Front {
                                   const ParallelFor& parallel = in_turn, const OnProgress& progress = {});
 
  private:
-  friend class FrontMesh;
+  friend class FrontPatches;
 
   // A split, as bits: 2 v for a cut of alpha on the edge from the centre to local vertex v, 2 v + 1 for one of beta; above them the centre's side.
   static constexpr int kSideBit = 2 * kMaxVertices;
@@ -163,7 +164,7 @@ class Front {
   boost::unordered_flat_map<std::uint64_t, std::uint32_t> index_;  // of blocks, by scale and position
   Block corner_;                                                   // vertex (0, 0, 0): slot 0
   std::vector<std::uint8_t> q_;                                    // of every cut; one more for a centre inside
-  std::uint64_t tet_count_ = 0, split_count_ = 0, shown_count_ = 0;
+  std::uint64_t tet_count_ = 0, split_count_ = 0, shown_count_ = 0, renamed_ = 0;
 };
 
 class Front::Cursor {
@@ -194,7 +195,7 @@ class Front::Cursor {
 
  private:
   friend class Front;
-  friend class FrontMesh;
+  friend class FrontPatches;
   struct Found {
     const Block* block;
     int slot;
