@@ -13,6 +13,10 @@ std::uint64_t index_key(int scale, Vertex p) {
   return std::uint64_t(scale) << 57 | std::uint64_t(std::uint32_t(p.z)) << 38 | std::uint64_t(std::uint32_t(p.y)) << 19 | std::uint32_t(p.x);
 }
 
+// As std::atomic_ref, relaxed, which Emscripten's library lacks.
+std::uint32_t load(const std::uint32_t& word) { return __atomic_load_n(&word, __ATOMIC_RELAXED); }
+void store(std::uint32_t& word, std::uint32_t value) { __atomic_store_n(&word, value, __ATOMIC_RELAXED); }
+
 }  // namespace
 
 // The corners of the domain are no diamonds, but seven of them have the offsets of diamonds of scale N whose centres lie there, and the root's edges
@@ -315,15 +319,14 @@ const Front::Block* Front::Cursor::resolve(std::uint8_t where) {
   } else if (where < kCorner) {
     const Block* const here = where == kHere || near_[kHere] == &nothing ? nullptr : near_[kHere] != nullptr ? near_[kHere] : resolve(kHere);
     if (here != nullptr && here != &nothing) {
-      if (const std::uint32_t number = std::atomic_ref(here->near[where]).load(std::memory_order_relaxed); number != 0)
-        return near_[where] = &front_.blocks_[number - 1];
+      if (const std::uint32_t number = load(here->near[where]); number != 0) return near_[where] = &front_.blocks_[number - 1];
     }
     const SupercubePlace there = supercube_at(where, scale_, p);
     if ((there.position.x | there.position.y | there.position.z) >= 0) {
       const std::uint32_t number = front_.find_number(there.scale, there.position);
       if (number != kNone) {
         found = &front_.blocks_[number];
-        if (here != nullptr && here != &nothing) std::atomic_ref(here->near[where]).store(number + 1, std::memory_order_relaxed);
+        if (here != nullptr && here != &nothing) store(here->near[where], number + 1);
       }
     }
   } else {

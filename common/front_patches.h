@@ -39,7 +39,7 @@ class FrontPatches {
   [[nodiscard]] const Domain& domain() const { return front_.domain_; }
   [[nodiscard]] const Grid& grid() const { return front_.grid_; }
   [[nodiscard]] std::size_t names() const { return front_.q_.size(); }  // all names of points are below
-  // Whether diamonds of this supercube reach the border.
+  // Whether diamonds of this supercube reach the far faces of the box, where clamping moves vertices.
   [[nodiscard]] bool is_at_border(std::size_t number) const { return is_at_border(front_.blocks_[number]); }
 
   // Calls visit(name, position, surface, on the border) for the points that a supercube's splits brought; of the first one, also for the domain's

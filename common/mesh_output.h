@@ -3,7 +3,6 @@
 
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "common/atomic_file.h"
+#include "common/decimal.h"
 #include "common/mesh.h"
 
 namespace intervale {
@@ -44,12 +44,11 @@ class MeshOutput {
 
   void text(std::string_view text) { append(std::as_bytes(std::span(text.data(), text.size()))); }
 
-  // The shortest decimal that reads back as the same value.
+  // As of decimal.h.
   template <class T>
   void decimal(T value) {
     std::array<char, 32> digits;
-    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-    text({digits.data(), static_cast<std::size_t>(end - digits.data())});
+    text(intervale::decimal(value, digits));
   }
 
   Result<void> commit() { return result_ ? file_.commit() : result_; }

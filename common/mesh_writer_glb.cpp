@@ -22,8 +22,7 @@ std::string json(const Position& v) {
   std::string text = "[";
   for (const float coordinate : v) {
     std::array<char, 32> digits;
-    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), static_cast<double>(coordinate)).ptr;
-    text.append(text.size() > 1 ? "," : "").append(digits.data(), end);
+    text.append(text.size() > 1 ? "," : "").append(decimal(static_cast<double>(coordinate), digits));
   }
   return text + "]";
 }

@@ -7,6 +7,11 @@ namespace intervale {
 void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> plane, int compression) {
   append_varint(out, plane.size());
   if (plane.empty()) return;
+#ifdef INTERVALE_STORED_PLANES  // the browser has no compressor: a client names what it has, and that takes little as it is
+  (void)compression;
+  append_varint(out, plane.size());
+  out.insert(out.end(), plane.begin(), plane.end());
+#else
   std::vector<std::uint8_t> stored(ZSTD_compressBound(plane.size()));
   const std::size_t n = ZSTD_compress(stored.data(), stored.size(), plane.data(), plane.size(), compression);
   if (ZSTD_isError(n) || n >= plane.size()) {
@@ -16,6 +21,7 @@ void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> 
   }
   append_varint(out, n);
   out.insert(out.end(), stored.begin(), stored.begin() + std::ptrdiff_t(n));
+#endif
 }
 
 std::optional<std::vector<std::uint8_t>> take_plane(std::span<const std::uint8_t>& bytes, std::size_t most) {

@@ -21,10 +21,12 @@ Result<StreamClient> StreamClient::start(Description description, const Budget& 
 }
 
 Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch) {
+  keep_to_budget(epoch);
   forget(epoch);
+  const std::uint64_t before = updates();
   const auto applied = apply_batch(front_, payload, budget_.max_tets);
   if (!applied) return tl::unexpected(applied.error());
-  if (updates() > budget_.max_updates) return fail("more updates than there is room for");
+  if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than there is room for");
   rebalance();
   return {};
 }
@@ -34,12 +36,30 @@ void StreamClient::look(const Camera& camera) {
   rebalance();
 }
 
+void StreamClient::set_budget(const Budget& budget, std::uint64_t epoch) {
+  budget_.max_tets = budget.max_tets;
+  less_room_.reset();
+  if (budget.max_updates < budget_.max_updates) {
+    less_room_ = {epoch, budget.max_updates};
+  } else {
+    budget_.max_updates = budget.max_updates;
+  }
+  rebalance();
+}
+
+void StreamClient::keep_to_budget(std::uint64_t epoch) {
+  if (!less_room_ || epoch < less_room_->epoch) return;
+  budget_.max_updates = less_room_->max_updates;
+  less_room_.reset();
+}
+
 void StreamClient::rebalance() {
   if (importance_ && over_budget()) balance(front_, budget_.max_tets, importance_);
 }
 
 std::vector<SlotGroup> StreamClient::give_up(std::uint64_t epoch, std::size_t max_supercubes) {
-  const std::uint64_t most = budget_.max_updates - std::max<std::uint64_t>(1, budget_.max_updates / 4);
+  const std::uint64_t room = less_room_ ? less_room_->max_updates : budget_.max_updates;
+  const std::uint64_t most = room - std::max<std::uint64_t>(1, room / 4);
   if (!importance_ || !forget_.empty() || updates() <= most) return {};
   forget_ = least_important(front_, updates() - most, max_supercubes, importance_);
   forget_epoch_ = epoch;
@@ -47,6 +67,7 @@ std::vector<SlotGroup> StreamClient::give_up(std::uint64_t epoch, std::size_t ma
 }
 
 void StreamClient::arrived(std::uint64_t epoch) {
+  keep_to_budget(epoch);
   if (forget(epoch)) rebalance();
 }
 

@@ -34,6 +34,9 @@ class StreamClient {
   // Where the mesh is seen from, from now on. camera: one that check_lod lets pass.
   void look(const Camera& camera);
 
+  // From now on, max_tets; from the first answer to the view of this epoch on, max_updates too if that is fewer than before.
+  void set_budget(const Budget& budget, std::uint64_t epoch);
+
   // What the View of this epoch is to forget, so that a quarter of max_updates is free for what it wants: what matters least, of no more than
   // max_supercubes. Nothing while so much is free, or while the answer to an earlier one has not come, or before look(). It is kept until
   // arrived(epoch): what is on its way was made for a client that has it.
@@ -58,9 +61,14 @@ class StreamClient {
   explicit StreamClient(Description description, Front front);
   void rebalance();
   bool forget(std::uint64_t epoch);
+  void keep_to_budget(std::uint64_t epoch);
   Description description_;
   Front front_;
   Budget budget_;
+  struct LessRoom {
+    std::uint64_t epoch = 0, max_updates = 0;
+  };
+  std::optional<LessRoom> less_room_;
   Importance importance_;          // of what is looked at; none before
   std::vector<SlotGroup> forget_;  // with the first answer to the view of this epoch
   std::uint64_t forget_epoch_ = 0;

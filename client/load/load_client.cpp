@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "client/net/connection.h"
-#include "client/net/grants.h"
+#include "client/core/grants.h"
 #include "protocol/codec.h"
 
 namespace intervale {

@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "client/net/connection.h"
-#include "client/net/grants.h"
+#include "client/core/grants.h"
 
 namespace intervale {
 namespace {

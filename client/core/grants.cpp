@@ -1,4 +1,4 @@
-#include "client/net/grants.h"
+#include "client/core/grants.h"
 
 namespace intervale {
 

@@ -1,0 +1,30 @@
+// What a plane cuts out of a mesh: the cut through each tetrahedron, so that a mesh cut open shows what it is made of.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "client/view/skin.h"
+
+namespace intervale {
+
+// What lies on the normal's side, dot(normal, p) > offset, is cut away. World coordinates; normal: of length 1.
+struct CutPlane {
+  std::array<double, 3> normal{};
+  double offset = 0;
+};
+
+// side[k]: the distance from the triangle's side opposite to corner k, 255 there and 0 on that side; 255 at all three corners where that side is not
+// one of the cut tetrahedron's. So a shader can draw the cut tetrahedra's outlines.
+struct CutVertex {
+  float x = 0, y = 0, z = 0;  // samples
+  std::array<std::uint8_t, 3> side{};
+  std::uint8_t level = 0;  // as of SkinVertex
+};
+static_assert(sizeof(CutVertex) == 16);
+
+// Triangles, three vertices each, that face the normal's side. By the skin's last update.
+[[nodiscard]] std::vector<CutVertex> plane_cut(const Skin& skin, const CutPlane& plane);
+
+}  // namespace intervale

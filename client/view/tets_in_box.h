@@ -1,0 +1,33 @@
+// The tetrahedra of a part of a mesh, to be drawn one by one (paper, figure 7).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "client/view/skin.h"
+#include "common/lod.h"
+
+namespace intervale {
+
+// A corner of a tetrahedron, and the middle of that: positions in samples.
+struct TetVertex {
+  float x = 0, y = 0, z = 0;
+  float middle_x = 0, middle_y = 0, middle_z = 0;
+  Surface surface = Surface::inside;
+  std::uint8_t level = 0;  // as of SkinVertex
+  std::array<std::uint8_t, 2> padding{};
+};
+static_assert(sizeof(TetVertex) == 28);
+
+struct TetsInBox {
+  std::vector<TetVertex> vertices;     // four a tetrahedron
+  std::vector<std::uint32_t> indices;  // of its faces, seen from outside counterclockwise: twelve a tetrahedron
+  std::uint64_t count = 0;
+  std::uint64_t out_of = 0;  // that lie there
+};
+
+// Those whose middles lie in the box (world coordinates), `most` of them at most. By the skin's last update.
+[[nodiscard]] TetsInBox tets_in_box(const Skin& skin, const Box& box, std::uint64_t most);
+
+}  // namespace intervale

@@ -1,0 +1,225 @@
+// The client core as the browser's worker sees it: bytes of messages in, bytes of messages and buffers to draw from out. No I/O but for the meshes
+// that are to be saved, which are written to files in memory.
+//
+// Texts that are returned say what went wrong; empty ones, that nothing did. Buffers that are returned are the caller's.
+#include <emscripten/bind.h>
+#include <emscripten/val.h>
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "client/view/plane_cut.h"
+#include "client/view/skin.h"
+#include "client/view/tets_in_box.h"
+#include "client/view/viewing_session.h"
+#include "common/mesh_digest.h"
+#include "common/mesh_writer.h"
+
+namespace intervale {
+namespace {
+
+using emscripten::val;
+
+constexpr std::uint64_t kMostTets = 200'000;  // drawn one by one
+
+ViewingSession::Clock::time_point time_of(double milliseconds) {
+  return ViewingSession::Clock::time_point(
+      std::chrono::duration_cast<ViewingSession::Clock::duration>(std::chrono::duration<double, std::milli>(milliseconds)));
+}
+
+template <class T>
+val buffer_of(const std::vector<T>& items) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(items.data());
+  return val(emscripten::typed_memory_view(items.size() * sizeof(T), bytes)).call<val>("slice")["buffer"];
+}
+
+template <class Array>
+val array_of(const Array& items) {
+  val array = val::array();
+  for (std::size_t i = 0; i < items.size(); ++i) array.set(i, double(items[i]));
+  return array;
+}
+
+std::array<double, 3> three(const val& array) { return {array[0].as<double>(), array[1].as<double>(), array[2].as<double>()}; }
+Box box_of(const val& box) { return {three(box["min"]), three(box["max"])}; }
+
+// null: as much as there is.
+std::uint64_t limit_of(const val& number) {
+  return number.isNull() || number.isUndefined() ? UINT64_MAX : std::uint64_t(std::max(0.0, number.as<double>()));
+}
+
+class Viewer {
+ public:
+  explicit Viewer(const std::string& dataset) : session_(dataset, "intervale-viewer " INTERVALE_VERSION) {}
+
+  // A View of messages.ts.
+  std::string look(const val& view) {
+    const val camera = view["camera"];
+    WantedView wanted;
+    wanted.camera = {.eye = three(camera["eye"]),
+                     .look_at = three(camera["lookAt"]),
+                     .up = three(camera["up"]),
+                     .fov = camera["fov"].as<double>(),
+                     .viewport = {camera["viewport"][0].as<int>(), camera["viewport"][1].as<int>()},
+                     .pixel_error = view["pixelError"].as<double>()};
+    if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
+    wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
+    stale_ = true;  // a budget hides and shows at once
+    return text_of(session_.look(wanted));
+  }
+  void opened_line(double now) { session_.opened_line(time_of(now)); }
+  void lost_line() { session_.lost_line(); }
+
+  // Room for one message; valid until the next call.
+  val inbox(std::size_t size) {
+    inbox_.resize(size);
+    return val(emscripten::typed_memory_view(inbox_.size(), inbox_.data()));
+  }
+  std::string receive(double now) {
+    stale_ = true;
+    const auto received = session_.receive(inbox_, time_of(now));
+    if (received && session_.is_fresh()) skin_.emplace(session_.client()->front());
+    return text_of(received);
+  }
+  val take_messages() {
+    val messages = val::array();
+    std::size_t n = 0;
+    for (const auto& message : session_.take_messages()) messages.set(n++, buffer_of(message));
+    return messages;
+  }
+
+  // Of the last receive().
+  [[nodiscard]] bool was_opened() const { return session_.was_opened(); }
+  [[nodiscard]] bool is_fresh() const { return session_.is_fresh(); }
+  [[nodiscard]] int fault_code() const { return int(session_.fault_code()); }
+
+  [[nodiscard]] double updates() const { return session_.client() ? double(session_.client()->updates()) : 0.0; }
+  [[nodiscard]] bool done() const { return session_.figures().done; }
+
+  // A Dataset of messages.ts; undefined before the first description.
+  [[nodiscard]] val dataset() const {
+    if (session_.client() == nullptr) return val::undefined();
+    const Description& d = session_.client()->description();
+    val dataset = val::object();
+    dataset.set("name", d.name);
+    dataset.set("dims", array_of(d.grid.dims));
+    dataset.set("spacing", array_of(d.grid.spacing));
+    dataset.set("origin", array_of(d.grid.origin));
+    dataset.set("range", array_of(std::array{d.range.alpha, d.range.beta}));
+    dataset.set("maxError", d.max_error);
+    dataset.set("updates", double(d.updates));
+    dataset.set("fullTets", double(d.full.tets));
+    dataset.set("fullVertices", double(d.full.vertices));
+    return dataset;
+  }
+
+  // What a Progress of messages.ts has of the core.
+  [[nodiscard]] val progress() const {
+    const ViewingSession::Figures& f = session_.figures();
+    const StreamClient* client = session_.client();
+    val progress = val::object();
+    progress.set("bytes", double(f.bytes));
+    progress.set("updates", updates());
+    progress.set("updatesShown", client ? double(client->updates_in_mesh()) : 0.0);
+    progress.set("tets", client ? double(client->tet_count()) : 0.0);
+    progress.set("triangles", skin_ ? double(skin_->triangles()) : 0.0);
+    progress.set("updatesToGo", double(f.updates_to_go));
+    progress.set("remainingError", f.remaining_error);
+    progress.set("remainingPixels", f.remaining_pixels);
+    progress.set("done", done());
+    progress.set("full", f.full);
+    progress.set("volume", skin_ ? skin_->volume() : 0.0);
+    progress.set("volumeBound", skin_ ? skin_->volume_bound() : 0.0);
+    progress.set("reconnects", double(f.sessions > 0 ? f.sessions - 1 : 0));
+    progress.set("repeated", client && f.received > client->updates() ? double(f.received - client->updates()) : 0.0);
+    return progress;
+  }
+
+  // A Skin of messages.ts without its version: what changed since the last one, or all of it.
+  val skin(bool edges, bool all) {
+    stale_ = false;
+    const Skin::Change change = all ? skin_->all(edges) : skin_->update(edges);
+    val skin = val::object(), pieces = val::array(), removed = val::array();
+    std::size_t n = 0;
+    for (const SkinPiece& p : change.pieces) {
+      val piece = val::object();
+      piece.set("id", p.id);
+      piece.set("vertices", buffer_of(p.vertices));
+      piece.set("indices", buffer_of(p.indices));
+      piece.set("edges", edges ? buffer_of(p.edges) : val::null());
+      piece.set("triangles", array_of(p.triangles));
+      piece.set("edgeCounts", array_of(p.edge_counts));
+      piece.set("min", array_of(p.min));
+      piece.set("max", array_of(p.max));
+      pieces.set(n++, piece);
+    }
+    n = 0;
+    for (const std::uint32_t id : change.removed) removed.set(n++, id);
+    skin.set("reset", change.reset);
+    skin.set("pieces", pieces);
+    skin.set("removed", removed);
+    return skin;
+  }
+
+  // What is cut and shown one by one fits the last skin: is_stale() must be false.
+  [[nodiscard]] bool is_stale() const { return stale_ || !skin_; }
+  // Of a Cap, and of Tets, in messages.ts.
+  val cap(const val& plane) const {
+    const auto vertices = plane_cut(*skin_, {three(plane["normal"]), plane["offset"].as<double>()});
+    val cap = val::object();
+    cap.set("vertices", buffer_of(vertices));
+    cap.set("triangles", double(vertices.size() / 3));
+    return cap;
+  }
+  val tets(const val& box) const {
+    const TetsInBox found = tets_in_box(*skin_, box_of(box), kMostTets);
+    val tets = val::object();
+    tets.set("vertices", buffer_of(found.vertices));
+    tets.set("indices", buffer_of(found.indices));
+    tets.set("count", double(found.count));
+    tets.set("outOf", double(found.out_of));
+    return tets;
+  }
+
+  // Writes the mesh to a file in memory.
+  std::string save(const std::string& path) const { return text_of(write_mesh(path, session_.client()->mesh())); }
+  std::string digest() const { return mesh_digest(session_.client()->mesh()); }
+
+ private:
+  static std::string text_of(const Result<void>& result) { return result ? std::string() : result.error().message; }
+
+  ViewingSession session_;
+  std::optional<Skin> skin_;
+  std::vector<std::uint8_t> inbox_;
+  bool stale_ = true;  // the mesh may have changed since the last skin
+};
+
+}  // namespace
+
+EMSCRIPTEN_BINDINGS(intervale) {
+  emscripten::class_<Viewer>("Viewer")
+      .constructor<const std::string&>()
+      .function("look", &Viewer::look)
+      .function("openedLine", &Viewer::opened_line)
+      .function("lostLine", &Viewer::lost_line)
+      .function("inbox", &Viewer::inbox)
+      .function("receive", &Viewer::receive)
+      .function("takeMessages", &Viewer::take_messages)
+      .function("wasOpened", &Viewer::was_opened)
+      .function("isFresh", &Viewer::is_fresh)
+      .function("updates", &Viewer::updates)
+      .function("done", &Viewer::done)
+      .function("isStale", &Viewer::is_stale)
+      .function("faultCode", &Viewer::fault_code)
+      .function("dataset", &Viewer::dataset)
+      .function("progress", &Viewer::progress)
+      .function("skin", &Viewer::skin)
+      .function("cap", &Viewer::cap)
+      .function("tets", &Viewer::tets)
+      .function("save", &Viewer::save)
+      .function("digest", &Viewer::digest);
+}
+
+}  // namespace intervale
