@@ -8,15 +8,17 @@
 #include "server/serve/connections.h"
 #include "server/serve/metrics.h"
 #include "server/serve/options.h"
+#include "server/serve/static_files.h"
 #include "server/serve/turnstile.h"
 
 namespace intervale {
 
-// Outlives every session. The catalogue and the options do not change while serving.
+// Outlives every session. The catalogue, the viewer and the options do not change while serving.
 struct ServerContext {
   explicit ServerContext(unsigned threads) : turnstile(threads) {}
   ServeOptions options;
   Catalogue catalogue;
+  StaticFiles viewer;
   Metrics metrics;
   Connections connections;
   Turnstile turnstile;

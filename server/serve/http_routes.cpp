@@ -1,5 +1,7 @@
 #include "server/serve/http_routes.h"
 
+#include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
 
 #include "common/program/describe.h"
@@ -51,21 +53,63 @@ std::string front_page(const Catalogue& catalogue) {
             std::to_string(d.grid.dims[2]) + " samples, " + std::to_string(d.updates) + " updates, " + std::to_string(d.full.tets) +
             " tetrahedra in full</li>\n";
   }
-  return page + "</ul>\n<p><a href=\"/api/datasets\">As JSON</a></p>\n</html>\n";
+  return page + "</ul>\n<p><a href=\"/api/datasets\">As JSON</a>. There is no viewer here: see <code>--viewer</code>.</p>\n</html>\n";
+}
+
+HttpAnswer with_body(const char* content_type, std::string body) {
+  return {.content_type = content_type, .body = std::make_shared<const std::string>(std::move(body))};
+}
+
+// Where a page may open WebSockets. 'self' does not cover them in every browser, so the host that was asked is named; hosts of other characters
+// than a policy can hold (addresses in brackets) leave every host.
+std::string websockets_of(std::string_view host) {
+  const bool plain = !host.empty() &&
+                     std::all_of(host.begin(), host.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '-' || c == ':'; });
+  if (!plain) return "ws: wss:";
+  return "ws://" + std::string(host) + " wss://" + std::string(host);
+}
+
+std::string viewer_policy(std::string_view host) {
+  return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self' " +
+         websockets_of(host) +
+         "; worker-src 'self'; manifest-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
+}
+
+HttpAnswer file_answer(const HttpRequest& request, const StaticFile& file) {
+  const bool packed = file.gzip && accepts_gzip(request.accept_encoding);
+  const StaticContent& content = packed ? *file.gzip : file.plain;
+  HttpAnswer answer{.content_type = file.content_type, .body = content.bytes, .content_security_policy = viewer_policy(request.host)};
+  answer.cache_control = file.immutable ? "public, max-age=31536000, immutable" : "no-cache";
+  answer.headers = {{"ETag", content.etag}};
+  if (file.gzip) answer.headers.emplace_back("Vary", "Accept-Encoding");
+  if (names_etag(request.if_none_match, content.etag)) {
+    answer.status = 304;
+    answer.body = nullptr;
+  } else if (packed) {
+    answer.headers.emplace_back("Content-Encoding", "gzip");
+  }
+  return answer;
 }
 
 }  // namespace
 
-HttpAnswer answer(std::string_view method, std::string_view target, const HttpState& state) {
-  const std::string_view path = target.substr(0, target.find('?'));
-  const bool known = path == "/" || path == "/api/datasets" || path == "/healthz" || path == "/readyz" || path == "/metrics";
-  if (!known) return {.status = 404, .body = "nothing here\n"};
-  if (method != "GET" && method != "HEAD") return {.status = 405, .body = "only GET and HEAD\n"};
-  if (path == "/") return {.content_type = kHtml, .body = front_page(state.catalogue)};
-  if (path == "/api/datasets") return {.content_type = kJson, .body = datasets_json(state.catalogue)};
-  if (path == "/metrics") return {.content_type = kPrometheus, .body = state.metrics.text()};
-  if (path == "/readyz" && !state.ready) return {.status = 503, .body = "draining\n"};
-  return {.body = "ok\n"};
+HttpAnswer short_answer(unsigned status, std::string line) {
+  return {.status = status, .body = std::make_shared<const std::string>(std::move(line) + "\n")};
+}
+
+HttpAnswer answer(const HttpRequest& request, const HttpState& state) {
+  const auto path = decode_path(request.target);
+  if (!path) return short_answer(400, "not a target this server can read");
+  const StaticFile* const file = state.viewer.find(*path);
+  const bool known = *path == "/" || *path == "/api/datasets" || *path == "/healthz" || *path == "/readyz" || *path == "/metrics";
+  if (!known && file == nullptr) return short_answer(404, "nothing here");
+  if (request.method != "GET" && request.method != "HEAD") return short_answer(405, "only GET and HEAD");
+  if (*path == "/api/datasets") return with_body(kJson, datasets_json(state.catalogue));
+  if (*path == "/metrics") return with_body(kPrometheus, state.metrics.text());
+  if (*path == "/healthz") return short_answer(200, "ok");
+  if (*path == "/readyz") return state.ready ? short_answer(200, "ok") : short_answer(503, "draining");
+  if (file != nullptr) return file_answer(request, *file);
+  return with_body(kHtml, front_page(state.catalogue));
 }
 
 }  // namespace intervale

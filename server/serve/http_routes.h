@@ -1,28 +1,49 @@
 // What the server answers over HTTP: a pure function of the request. No I/O.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "server/serve/catalogue.h"
 #include "server/serve/metrics.h"
+#include "server/serve/static_files.h"
 
 namespace intervale {
+
+struct HttpRequest {
+  std::string_view method;
+  std::string_view target;
+  // Headers; empty: not there.
+  std::string_view host;
+  std::string_view accept_encoding;
+  std::string_view if_none_match;
+};
 
 struct HttpAnswer {
   unsigned status = 200;
   std::string content_type = "text/plain; charset=utf-8";
-  std::string body;
+  std::shared_ptr<const std::string> body = {};  // nullptr: none, in a 304
+  std::string content_security_policy = "default-src 'none'";
+  std::string cache_control = "no-store";
+  std::vector<std::pair<std::string, std::string>> headers = {};  // besides those and those of every answer
 };
+
+// An answer of one line.
+[[nodiscard]] HttpAnswer short_answer(unsigned status, std::string line);
 
 struct HttpState {
   const Catalogue& catalogue;
   const Metrics& metrics;
+  const StaticFiles& viewer;
   bool ready;  // false while draining
 };
 
-// GET and HEAD of /, /api/datasets, /healthz, /readyz, /metrics; a query is ignored. 405 for other methods, 404 for other targets. HEAD is
-// answered like GET; whoever sends it leaves the body out.
-[[nodiscard]] HttpAnswer answer(std::string_view method, std::string_view target, const HttpState& state);
+// GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists
+// the data sets. A query is ignored. 405 for other methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET;
+// whoever sends it leaves the body out.
+[[nodiscard]] HttpAnswer answer(const HttpRequest& request, const HttpState& state);
 
 }  // namespace intervale

@@ -8,6 +8,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/http/span_body.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <chrono>
 #include <memory>
@@ -32,7 +33,7 @@ constexpr std::chrono::seconds kAnswerTime{30};
 constexpr std::uint32_t kMaxHeader = 4096;
 
 using Request = http::request<http::empty_body>;
-using Response = http::response<http::string_body>;
+using Response = http::response<http::span_body<const char>>;
 
 bool offers_our_subprotocol(const Request& request) {
   for (const auto& name : http::token_list(request[http::field::sec_websocket_protocol])) {
@@ -41,19 +42,23 @@ bool offers_our_subprotocol(const Request& request) {
   return false;
 }
 
-Response response_to(const Request& request, HttpAnswer answer, bool keep_alive) {
+// Refers to the answer's body, which must live until the response is sent.
+Response response_to(const Request& request, const HttpAnswer& answer, bool keep_alive) {
   Response response(http::status(answer.status), request.version());
   response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
-  response.set(http::field::content_type, answer.content_type);
   response.set("X-Content-Type-Options", "nosniff");
-  response.set("Content-Security-Policy", "default-src 'none'");
-  response.set(http::field::cache_control, "no-store");
+  response.set("Referrer-Policy", "no-referrer");
+  response.set("Cross-Origin-Opener-Policy", "same-origin");
+  response.set("Content-Security-Policy", answer.content_security_policy);
+  response.set(http::field::cache_control, answer.cache_control);
+  for (const auto& [name, value] : answer.headers) response.set(name, value);
   if (answer.status == 405) response.set(http::field::allow, "GET, HEAD");
   if (answer.status == 426) response.set(http::field::upgrade, "websocket");
   response.keep_alive(keep_alive);
-  response.body() = std::move(answer.body);
-  response.prepare_payload();
-  if (request.method() == http::verb::head) response.body().clear();  // Content-Length stays that of GET
+  if (!answer.body) return response;  // a 304 has no length either
+  response.set(http::field::content_type, answer.content_type);
+  response.content_length(answer.body->size());
+  if (request.method() != http::verb::head) response.body() = {answer.body->data(), answer.body->size()};
   return response;
 }
 
@@ -104,7 +109,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
       const Request request = parser.get();
       if (beast::websocket::is_upgrade(request) && request.target() == protocol::kPath) {
         if (auto complaint = unfit_for_session(request)) {
-          Response response = response_to(request, std::move(*complaint), false);
+          Response response = response_to(request, *complaint, false);
           co_await send(response);
           break;
         }
@@ -115,7 +120,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
       // A body is not read, so what follows it cannot be told from it: the connection ends with this answer.
       const bool has_body = parser.chunked() || parser.content_length().value_or(0) > 0;
       const bool keep_alive = request.keep_alive() && !has_body && !leaving_;
-      Response response = response_to(request, answer_to(request), keep_alive);
+      const HttpAnswer answer = answer_to(request);
+      Response response = response_to(request, answer, keep_alive);
       if (!co_await send(response) || !keep_alive) break;
     }
     beast::error_code ignored;
@@ -123,14 +129,18 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   }
 
   HttpAnswer answer_to(const Request& request) const {
-    if (request.target() == protocol::kPath) return {.status = 426, .body = "this is where WebSocket sessions are opened\n"};
-    const HttpState state{context_.catalogue, context_.metrics, !leaving_};
-    return answer({request.method_string().data(), request.method_string().size()}, {request.target().data(), request.target().size()}, state);
+    if (request.target() == protocol::kPath) return short_answer(426, "this is where WebSocket sessions are opened");
+    const HttpRequest asked{.method = request.method_string(),
+                            .target = request.target(),
+                            .host = request[http::field::host],
+                            .accept_encoding = request[http::field::accept_encoding],
+                            .if_none_match = request[http::field::if_none_match]};
+    return intervale::answer(asked, {context_.catalogue, context_.metrics, context_.viewer, !leaving_});
   }
 
   std::optional<HttpAnswer> unfit_for_session(const Request& request) const {
-    if (leaving_) return HttpAnswer{.status = 503, .body = "draining\n"};
-    if (!offers_our_subprotocol(request)) return HttpAnswer{.status = 400, .body = "the subprotocol intervale.v1 is not offered\n"};
+    if (leaving_) return short_answer(503, "draining");
+    if (!offers_our_subprotocol(request)) return short_answer(400, "the subprotocol intervale.v1 is not offered");
     return {};
   }
 
@@ -139,12 +149,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     if (error.category() != http::make_error_code(http::error::bad_target).category()) co_return;
     if (error == http::error::end_of_stream || error == http::error::partial_message) co_return;
     const bool too_long = error == http::error::header_limit || error == http::error::buffer_overflow;
-    Response response = refusal(too_long ? 431 : 400);
+    const HttpAnswer answer = short_answer(too_long ? 431 : 400, "not a request this server can read");
+    Response response = response_to(Request(http::verb::get, "/", 11), answer, false);
     co_await send(response);
-  }
-
-  static Response refusal(unsigned status) {
-    return response_to(Request(http::verb::get, "/", 11), {.status = status, .body = "not a request this server can read\n"}, false);
   }
 
   // By reference, and never from a temporary: g++ 12 destroys some temporaries of a co_await expression twice.

@@ -36,6 +36,11 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catal
   auto running = std::make_unique<Running>(count);
   running->context.options = options;
   running->context.catalogue = std::move(catalogue);
+  if (options.viewer) {
+    auto viewer = StaticFiles::load(*options.viewer);
+    if (!viewer) return fail("no viewer: " + viewer.error().message);
+    running->context.viewer = std::move(*viewer);
+  }
   auto listener = Listener::open(running->io, options.listen, running->context);
   if (!listener) return tl::unexpected(listener.error());
   running->listener = std::move(*listener);

@@ -13,7 +13,8 @@ namespace intervale {
 
 class Server {
  public:
-  // Listens, and serves on threads of its own from then on. Failures: an address that cannot be read, or cannot be had.
+  // Listens, and serves on threads of its own from then on. Failures: an address that cannot be read, or cannot be
+  // had; a viewer that cannot be read.
   static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);
   ~Server();  // stops
   Server(const Server&) = delete;
