@@ -91,6 +91,12 @@ HttpAnswer file_answer(const HttpRequest& request, const StaticFile& file) {
   return answer;
 }
 
+bool is_known(std::string_view path, const HttpState& state) {
+  if (path == "/healthz" || path == "/readyz") return true;
+  if (path == "/metrics") return state.door == Door::metrics || !state.has_metrics_door;
+  return state.door == Door::all && (path == "/" || path == "/api/datasets");
+}
+
 }  // namespace
 
 HttpAnswer short_answer(unsigned status, std::string line) {
@@ -100,12 +106,11 @@ HttpAnswer short_answer(unsigned status, std::string line) {
 HttpAnswer answer(const HttpRequest& request, const HttpState& state) {
   const auto path = decode_path(request.target);
   if (!path) return short_answer(400, "not a target this server can read");
-  const StaticFile* const file = state.viewer.find(*path);
-  const bool known = *path == "/" || *path == "/api/datasets" || *path == "/healthz" || *path == "/readyz" || *path == "/metrics";
-  if (!known && file == nullptr) return short_answer(404, "nothing here");
+  const StaticFile* const file = state.door == Door::all ? state.viewer.find(*path) : nullptr;
+  if (!is_known(*path, state) && file == nullptr) return short_answer(404, "nothing here");
   if (request.method != "GET" && request.method != "HEAD") return short_answer(405, "only GET and HEAD");
   if (*path == "/api/datasets") return with_body(kJson, datasets_json(state.catalogue));
-  if (*path == "/metrics") return with_body(kPrometheus, state.metrics.text());
+  if (*path == "/metrics") return with_body(kPrometheus, state.metrics.text(state.catalogue));
   if (*path == "/healthz") return short_answer(200, "ok");
   if (*path == "/readyz") return state.ready ? short_answer(200, "ok") : short_answer(503, "draining");
   if (file != nullptr) return file_answer(request, *file);

@@ -34,11 +34,16 @@ struct HttpAnswer {
 // An answer of one line.
 [[nodiscard]] HttpAnswer short_answer(unsigned status, std::string line);
 
+// What a port is for: everything, or nothing but /metrics, /healthz and /readyz.
+enum class Door { all, metrics };
+
 struct HttpState {
   const Catalogue& catalogue;
   const Metrics& metrics;
   const StaticFiles& viewer;
-  bool ready;  // false while draining
+  Door door = Door::all;
+  bool has_metrics_door = false;  // then /metrics is answered there only
+  bool ready = true;              // false while draining
 };
 
 // GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists

@@ -64,14 +64,14 @@ Response response_to(const Request& request, const HttpAnswer& answer, bool keep
 
 class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(asio::ip::tcp::socket socket, ServerContext& context)
-      : stream_(std::move(socket)), strand_(stream_.get_executor()), context_(context) {}
+  HttpSession(asio::ip::tcp::socket socket, ServerContext& context, Door door)
+      : stream_(std::move(socket)), strand_(stream_.get_executor()), context_(context), door_(door) {}
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
-  ~HttpSession() override { --context_.metrics.connections; }
+  ~HttpSession() override { context_.metrics.connections.Decrement(); }
 
   void start() {
-    ++context_.metrics.connections;
+    context_.metrics.connections.Increment();
     membership_ = context_.connections.join(shared_from_this());
     asio::co_spawn(strand_, run(shared_from_this()), [](const std::exception_ptr& failure) { report(failure); });
   }
@@ -107,7 +107,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
         break;
       }
       const Request request = parser.get();
-      if (beast::websocket::is_upgrade(request) && request.target() == protocol::kPath) {
+      if (beast::websocket::is_upgrade(request) && door_ == Door::all && request.target() == protocol::kPath) {
         if (auto complaint = unfit_for_session(request)) {
           Response response = response_to(request, *complaint, false);
           co_await send(response);
@@ -129,13 +129,18 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   }
 
   HttpAnswer answer_to(const Request& request) const {
-    if (request.target() == protocol::kPath) return short_answer(426, "this is where WebSocket sessions are opened");
+    if (door_ == Door::all && request.target() == protocol::kPath) return short_answer(426, "this is where WebSocket sessions are opened");
     const HttpRequest asked{.method = request.method_string(),
                             .target = request.target(),
                             .host = request[http::field::host],
                             .accept_encoding = request[http::field::accept_encoding],
                             .if_none_match = request[http::field::if_none_match]};
-    return intervale::answer(asked, {context_.catalogue, context_.metrics, context_.viewer, !leaving_});
+    return intervale::answer(asked, {.catalogue = context_.catalogue,
+                                     .metrics = context_.metrics,
+                                     .viewer = context_.viewer,
+                                     .door = door_,
+                                     .has_metrics_door = context_.options.metrics_listen.has_value(),
+                                     .ready = !leaving_});
   }
 
   std::optional<HttpAnswer> unfit_for_session(const Request& request) const {
@@ -164,6 +169,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   beast::tcp_stream stream_;
   asio::any_io_executor strand_;  // apart, for go_away comes from other threads and an upgrade moves the stream away
   ServerContext& context_;
+  Door door_;
   beast::flat_buffer buffer_{2 * kMaxHeader};
   bool waiting_ = false;  // for a request
   bool leaving_ = false;
@@ -172,6 +178,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
 }  // namespace
 
-void start_http_session(asio::ip::tcp::socket socket, ServerContext& context) { std::make_shared<HttpSession>(std::move(socket), context)->start(); }
+void start_http_session(asio::ip::tcp::socket socket, ServerContext& context, Door door) {
+  std::make_shared<HttpSession>(std::move(socket), context, door)->start();
+}
 
 }  // namespace intervale

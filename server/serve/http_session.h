@@ -4,10 +4,11 @@
 #include <boost/asio/ip/tcp.hpp>
 
 #include "server/serve/context.h"
+#include "server/serve/http_routes.h"
 
 namespace intervale {
 
 // Serves requests on a socket whose executor is a strand of its own. Returns at once; the connection keeps itself alive.
-void start_http_session(boost::asio::ip::tcp::socket socket, ServerContext& context);
+void start_http_session(boost::asio::ip::tcp::socket socket, ServerContext& context, Door door);
 
 }  // namespace intervale

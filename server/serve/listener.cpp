@@ -43,12 +43,13 @@ Result<tcp::endpoint> parse_endpoint(const std::string& text) {
   return tcp::endpoint(address, port);
 }
 
-Listener::Listener(asio::io_context& io, ServerContext& context) : io_(io), acceptor_(asio::make_strand(io)), context_(context) {}
+Listener::Listener(asio::io_context& io, ServerContext& context, Door door)
+    : io_(io), acceptor_(asio::make_strand(io)), context_(context), door_(door) {}
 
-Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std::string& address, ServerContext& context) {
+Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std::string& address, ServerContext& context, Door door) {
   const auto endpoint = parse_endpoint(address);
   if (!endpoint) return tl::unexpected(endpoint.error());
-  std::unique_ptr<Listener> listener(new Listener(io, context));
+  std::unique_ptr<Listener> listener(new Listener(io, context, door));
   tcp::acceptor& acceptor = listener->acceptor_;
   boost::system::error_code error;
   const auto step = [&](auto&& action) {
@@ -83,11 +84,12 @@ asio::awaitable<void> Listener::accept_all() {
       co_await pause.async_wait(kAwait);
       continue;
     }
-    if (context_.connections.size() >= context_.options.max_connections) {
-      ++context_.metrics.refused_total;  // and the socket closes
+    // Whoever watches is let in, when it matters most.
+    if (door_ == Door::all && context_.connections.size() >= context_.options.max_connections) {
+      context_.metrics.refused_total.Increment();  // and the socket closes
       continue;
     }
-    start_http_session(std::move(socket), context_);
+    start_http_session(std::move(socket), context_, door_);
   }
 }
 

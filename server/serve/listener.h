@@ -9,6 +9,7 @@
 
 #include "common/result.h"
 #include "server/serve/context.h"
+#include "server/serve/http_routes.h"
 
 namespace intervale {
 
@@ -18,20 +19,21 @@ Result<boost::asio::ip::tcp::endpoint> parse_endpoint(const std::string& text);
 // One port. Created and destroyed on any thread; close() may be called from any.
 class Listener {
  public:
-  static Result<std::unique_ptr<Listener>> open(boost::asio::io_context& io, const std::string& address, ServerContext& context);
+  static Result<std::unique_ptr<Listener>> open(boost::asio::io_context& io, const std::string& address, ServerContext& context, Door door);
 
   void start();  // accepts from now on, until close()
   void close();  // nobody new; takes effect soon
   [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
  private:
-  Listener(boost::asio::io_context& io, ServerContext& context);
+  Listener(boost::asio::io_context& io, ServerContext& context, Door door);
   boost::asio::awaitable<void> accept_all();
 
   boost::asio::io_context& io_;
   boost::asio::ip::tcp::acceptor acceptor_;  // on a strand of its own
   boost::asio::ip::tcp::endpoint endpoint_;
   ServerContext& context_;
+  Door door_;
 };
 
 }  // namespace intervale

@@ -1,23 +1,55 @@
-// What a server counts. Any thread.
+// What a server counts and measures, for Prometheus. Any thread.
 #pragma once
 
-#include <atomic>
+#include <prometheus/counter.h>
+#include <prometheus/family.h>
+#include <prometheus/gauge.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+
+#include <chrono>
 #include <cstdint>
 #include <string>
 
+#include "server/serve/catalogue.h"
+
 namespace intervale {
 
-struct Metrics {
-  std::atomic<std::uint64_t> connections{0};  // now
-  std::atomic<std::uint64_t> sessions{0};     // WebSocket sessions now
-  std::atomic<std::uint64_t> sessions_total{0};
-  std::atomic<std::uint64_t> refused_total{0};  // connections over the limit
-  std::atomic<std::uint64_t> updates_sent_total{0};
-  std::atomic<std::uint64_t> bytes_sent_total{0};  // of WebSocket messages
-  std::atomic<std::uint64_t> faults_total{0};      // sessions ended for what the client did
+class Metrics {
+  // Before the references below, which are made of it.
+  prometheus::Registry registry_;
+  prometheus::Family<prometheus::Counter>& closes_;
 
-  // In Prometheus' text format, version 0.0.4.
-  [[nodiscard]] std::string text() const;
+ public:
+  using Duration = std::chrono::steady_clock::duration;
+
+  Metrics();
+  Metrics(const Metrics&) = delete;
+  Metrics& operator=(const Metrics&) = delete;
+
+  prometheus::Gauge& connections;
+  prometheus::Gauge& sessions;  // WebSocket sessions
+  prometheus::Counter& sessions_total;
+  prometheus::Counter& refused_total;  // connections over the limit
+  prometheus::Counter& updates_sent_total;
+  prometheus::Counter& bytes_sent_total;  // of WebSocket messages
+  prometheus::Counter& faults_total;      // sessions ended for what the client did
+  prometheus::Gauge& queued_bytes;        // of WebSocket messages that are leaving
+
+  void chose(Duration time) { observe(selection_, time); }            // choosing and packing one message
+  void first_answer(Duration time) { observe(first_mesh_, time); }    // from a session's first View to its first message, sent
+  void answered_view(Duration time) { observe(view_change_, time); }  // the same of a later View
+  void closed(unsigned code);                                         // a session has ended so; 0: its connection broke
+
+  // In Prometheus' text format, version 0.0.4. What is served is told as of now.
+  [[nodiscard]] std::string text(const Catalogue& catalogue) const;
+
+ private:
+  static void observe(prometheus::Histogram& histogram, Duration time) { histogram.Observe(std::chrono::duration<double>(time).count()); }
+
+  prometheus::Histogram& selection_;
+  prometheus::Histogram& first_mesh_;
+  prometheus::Histogram& view_change_;
 };
 
 }  // namespace intervale

@@ -1,13 +1,14 @@
 #include "server/serve/serve.h"
 
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -26,20 +27,52 @@ std::optional<std::filesystem::path> viewer_beside_the_program() {
   return folder;
 }
 
+class LevelSwitch {
+ public:
+  explicit LevelSwitch(const LogOptions& log) : log_(log), level_(log.level) {}
+  void next() {
+    if (const auto configured = log_.configured_level()) {
+      if (!is_log_level(*configured)) return spdlog::warn("the log level '{}' of the configuration is none; it stays at {}", *configured, level_);
+      level_ = *configured;
+    } else {
+      level_ = level_ == "debug" ? (log_.level == "debug" ? "info" : log_.level) : "debug";
+    }
+    set_log_level("info");  // for the next line
+    spdlog::info("SIGHUP: the log level is {}", level_);
+    set_log_level(level_);
+  }
+
+ private:
+  const LogOptions& log_;
+  std::string level_;
+};
+
+// As long as the io_context runs.
+void await_each(boost::asio::signal_set& signals, const std::function<void()>& act) {
+  signals.async_wait([&signals, act](const boost::system::error_code& error, int) {
+    if (error) return;
+    act();
+    await_each(signals, act);
+  });
+}
+
 }  // namespace
 
-Result<void> serve(const ServeOptions& wanted, const std::vector<std::filesystem::path>& inputs) {
-  if (!spdlog::get("intervale")) spdlog::set_default_logger(spdlog::stderr_color_mt("intervale"));  // stdout is for results
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %v");
+Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std::vector<std::filesystem::path>& inputs) {
+  start_log(log);
   std::signal(SIGPIPE, SIG_IGN);  // a client that left is an error code, not an end
 
   // Taken over before anything else, so that a signal during the start is not lost.
   boost::asio::io_context signals;
   boost::asio::signal_set ending(signals, SIGINT, SIGTERM);
   int signal = 0;
-  ending.async_wait([&signal](const boost::system::error_code& error, int number) {
+  ending.async_wait([&](const boost::system::error_code& error, int number) {
     if (!error) signal = number;
+    signals.stop();
   });
+  boost::asio::signal_set hang_up(signals, SIGHUP);
+  LevelSwitch level(log);
+  await_each(hang_up, [&level] { level.next(); });
 
   ServeOptions options = wanted;
   if (!options.viewer) options.viewer = viewer_beside_the_program();

@@ -22,7 +22,7 @@ struct Server::Running {
   explicit Running(unsigned count) : context(count) {}
   ServerContext context;
   asio::io_context io;
-  std::unique_ptr<Listener> listener;
+  std::unique_ptr<Listener> listener, metrics_listener;
   std::vector<std::thread> threads;
   bool stopped = false;
 };
@@ -41,9 +41,15 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catal
     if (!viewer) return fail("no viewer: " + viewer.error().message);
     running->context.viewer = std::move(*viewer);
   }
-  auto listener = Listener::open(running->io, options.listen, running->context);
+  auto listener = Listener::open(running->io, options.listen, running->context, Door::all);
   if (!listener) return tl::unexpected(listener.error());
   running->listener = std::move(*listener);
+  if (options.metrics_listen) {
+    auto metrics_listener = Listener::open(running->io, *options.metrics_listen, running->context, Door::metrics);
+    if (!metrics_listener) return tl::unexpected(metrics_listener.error());
+    running->metrics_listener = std::move(*metrics_listener);
+    running->metrics_listener->start();
+  }
   running->listener->start();
   for (unsigned i = 0; i < count; ++i) {
     running->threads.emplace_back([&io = running->io, work = asio::make_work_guard(running->io)] { io.run(); });
@@ -52,6 +58,10 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catal
 }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
+
+std::uint16_t Server::metrics_port() const {
+  return (running_->metrics_listener ? running_->metrics_listener : running_->listener)->endpoint().port();
+}
 
 std::string Server::url() const {
   std::ostringstream text;
@@ -62,6 +72,7 @@ std::string Server::url() const {
 void Server::stop() {
   if (std::exchange(running_->stopped, true)) return;
   running_->listener->close();
+  if (running_->metrics_listener) running_->metrics_listener->close();
   running_->context.connections.go_away();
   if (!running_->context.connections.wait_until_empty(running_->context.options.drain_time)) {
     spdlog::warn("{} connections did not take their leave in time and are cut off", running_->context.connections.size());

@@ -21,7 +21,8 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   [[nodiscard]] std::uint16_t port() const;
-  [[nodiscard]] std::string url() const;  // "http://127.0.0.1:8080/"
+  [[nodiscard]] std::uint16_t metrics_port() const;  // port() if it has none of its own
+  [[nodiscard]] std::string url() const;             // "http://127.0.0.1:8080/"
 
   // Drains: not ready, nobody new, WebSocket sessions closed with 1001; returns once all are gone, after options.drain_time at the latest, when
   // what is left is cut off. A second call does nothing. Not from a thread of the server's own.

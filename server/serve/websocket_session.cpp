@@ -2,8 +2,6 @@
 // A message is selected only once the one before has left, so a slow client costs one message of memory and no one else's time.
 #include "server/serve/websocket_session.h"
 
-#include <spdlog/spdlog.h>
-
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
@@ -17,6 +15,7 @@
 #include <utility>
 
 #include "protocol/codec.h"
+#include "server/serve/log.h"
 #include "server/serve/session_state.h"
 
 namespace intervale {
@@ -48,19 +47,20 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   WebSocketSession& operator=(const WebSocketSession&) = delete;
 
   ~WebSocketSession() override {
-    --context_.metrics.sessions;
-    --context_.metrics.connections;
-    spdlog::info("session {} closed: dataset '{}', {} updates, {} bytes, code {}{}", id_, state_.dataset(), state_.updates_sent(), bytes_sent_,
-                 close_code_, note_.empty() ? "" : " (" + note_ + ")");
+    context_.metrics.sessions.Decrement();
+    context_.metrics.connections.Decrement();
+    context_.metrics.closed(close_code_);
+    log_session(id_, spdlog::level::info, "closed: dataset '{}', {} updates, {} bytes, code {}{}", state_.dataset(), state_.updates_sent(),
+                bytes_sent_, close_code_, note_.empty() ? "" : " (" + note_ + ")");
   }
 
   void start(const Request& request) {
-    ++context_.metrics.connections;
-    ++context_.metrics.sessions;
-    ++context_.metrics.sessions_total;
+    context_.metrics.connections.Increment();
+    context_.metrics.sessions.Increment();
+    context_.metrics.sessions_total.Increment();
     beast::error_code ignored;
     const auto peer = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
-    spdlog::info("session {} from {}:{}", id_, peer.address().to_string(), peer.port());
+    log_session(id_, spdlog::level::info, "from {}:{}", peer.address().to_string(), peer.port());
     membership_ = context_.connections.join(shared_from_this());
     spawn(run(shared_from_this(), request));
   }
@@ -163,9 +163,33 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   void receive(const protocol::ClientMessage& message) {
     if (why_ || gone_) return;
     if (!state_.starved()) stalled_since_ = Clock::now();  // in case this message makes it so
+    tell(message);
     if (auto fault = state_.receive(message)) return end(std::move(*fault));
+    if (const auto* view = std::get_if<protocol::View>(&message)) viewed(view->epoch);
     if (state_.fresh()) context_.turnstile.hurry(id_);
     wake_.cancel();
+  }
+
+  void tell(const protocol::ClientMessage& message) const {
+    if (const auto* open = std::get_if<protocol::Open>(&message)) {
+      log_session(id_, spdlog::level::debug, "opens '{}'{}, for '{}'", open->dataset, open->resume ? " again" : "", open->client);
+    } else if (const auto* view = std::get_if<protocol::View>(&message)) {
+      log_session(id_, spdlog::level::debug, "asks for view {}", view->epoch);
+    }
+  }
+
+  void viewed(std::uint64_t epoch) {
+    newest_view_ = {epoch, Clock::now()};
+    if (!oldest_view_) oldest_view_ = newest_view_;
+  }
+
+  // A message that serves the view of that epoch has left.
+  void answered(std::uint64_t epoch) {
+    if (!oldest_view_ || epoch < oldest_view_->epoch) return;
+    const auto time = Clock::now() - oldest_view_->since;
+    std::exchange(has_answered_, true) ? context_.metrics.answered_view(time) : context_.metrics.first_answer(time);
+    oldest_view_.reset();
+    if (newest_view_.epoch > epoch) oldest_view_ = newest_view_;
   }
 
   // The connection is over, by the client's close or by what happened to it.
@@ -192,7 +216,12 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       if (message) {
         if (!co_await send(*message)) co_return cut_off();
         stalled_since_ = Clock::now();
-        if (const auto* batch = std::get_if<protocol::Batch>(&*message)) context_.metrics.updates_sent_total += batch->updates;
+        if (const auto* batch = std::get_if<protocol::Batch>(&*message)) {
+          context_.metrics.updates_sent_total.Increment(batch->updates);
+          answered(batch->epoch);
+        } else if (const auto* done = std::get_if<protocol::Done>(&*message)) {
+          answered(done->epoch);
+        }
         continue;
       }
       if (!why_ && !state_.working()) co_await wait();
@@ -206,7 +235,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     const Inside inside{context_.turnstile, turn()};
     if (gone_ || why_) return {};
     const bool crowded = context_.turnstile.crowded();
-    return state_.next(!crowded ? protocol::kMaxBatchPayload : state_.fresh() ? kCrowdedAnswer : kCrowdedPayload);
+    auto message = state_.next(!crowded ? protocol::kMaxBatchPayload : state_.fresh() ? kCrowdedAnswer : kCrowdedPayload);
+    context_.metrics.chose(Clock::now() - inside.since);
+    return message;
   }
 
   // Until something changes, or the client has kept us waiting too long.
@@ -225,21 +256,23 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     write_deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
       if (const auto self = weak.lock(); self && !error) self->cut_off();
     });
+    context_.metrics.queued_bytes.Increment(double(bytes.size()));
     const auto [error, size] = co_await ws_.async_write(asio::buffer(bytes), kAwait);
+    context_.metrics.queued_bytes.Decrement(double(bytes.size()));
     write_deadline_.cancel();
     if (error) {
       if (note_.empty()) note_ = error.message();
       co_return false;
     }
     bytes_sent_ += bytes.size();
-    context_.metrics.bytes_sent_total += bytes.size();
+    context_.metrics.bytes_sent_total.Increment(double(bytes.size()));
     co_return true;
   }
 
   asio::awaitable<void> take_leave() {
     close_code_ = static_cast<unsigned>(why_->code);
     note_ = why_->text;
-    if (why_->code != CloseCode::going_away) ++context_.metrics.faults_total;
+    if (why_->code != CloseCode::going_away) context_.metrics.faults_total.Increment();
     const protocol::ServerMessage fault = *why_;
     if (!co_await send(fault)) co_return cut_off();
     const auto code = static_cast<websocket::close_code>(why_->code);
@@ -258,6 +291,14 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   bool gone_ = false;         // nothing can be sent any more
   Clock::time_point open_deadline_{};
   Clock::time_point stalled_since_{};  // when credit was last enough
+  // Views that nothing was sent for yet: the first of them, and the last.
+  struct Viewed {
+    std::uint64_t epoch = 0;
+    Clock::time_point since;
+  };
+  std::optional<Viewed> oldest_view_;
+  Viewed newest_view_;
+  bool has_answered_ = false;
   std::uint64_t bytes_sent_ = 0;
   unsigned close_code_ = 0;
   std::string note_;

@@ -19,6 +19,7 @@ namespace intervale {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 const std::string& client() {
@@ -277,6 +278,30 @@ TEST(Programs, AServerThatIsKilledAndStartedAgainIsFoundAgain) {
   const auto got = fetch_json({}, relay.url("buckyball"));
   EXPECT_GE(got.at("reconnects"), 1);
   for (const char* key : {"updates", "vertices", "tets", "volume"}) EXPECT_EQ(got.at(key), whole.at(key)) << key;
+}
+
+TEST(Programs, SighupChangesWhatTheServerSays) {
+  ServerProgram server;
+  const auto fetch = [&server] { return run({program("intervale-client"), "fetch", server.url("buckyball"), "--error-percent", "50"}).status; };
+  EXPECT_EQ(fetch(), 0);
+  server.process().signal(SIGHUP);
+  EXPECT_TRUE(server.process().wait_for("SIGHUP: the log level is debug"));
+  EXPECT_EQ(fetch(), 0);
+  EXPECT_THAT(server.process().wait_for("debug session 2 opens 'buckyball'").value_or(""), Not(HasSubstr("debug session 1 ")));
+  server.process().signal(SIGHUP);
+  EXPECT_TRUE(server.process().wait_for("SIGHUP: the log level is info"));
+}
+
+TEST(Programs, SighupReadsTheLogLevelOfTheConfigurationAgain) {
+  const TempDir folder;
+  const auto config = folder.file("intervale.toml", "[serve]\nlog-level = \"info\"\n");
+  ServerProgram server(buckyball().string(), {"--config", config.string()});
+  folder.file("intervale.toml", "[serve]\nlog-level = \"warn\"\n");
+  server.process().signal(SIGHUP);
+  EXPECT_TRUE(server.process().wait_for("SIGHUP: the log level is warn"));
+  folder.file("intervale.toml", "[serve]\nlog-level = \"loud\"\n");
+  server.process().signal(SIGHUP);
+  EXPECT_TRUE(server.process().wait_for("the log level 'loud' of the configuration is none; it stays at warn"));
 }
 
 TEST(Programs, SigtermEndsTheServerInOrderWhileAClientStreams) {

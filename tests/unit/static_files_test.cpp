@@ -35,7 +35,7 @@ HttpAnswer get(const StaticFiles& viewer, HttpRequest request) {
   const Catalogue catalogue;
   const Metrics metrics;
   if (request.method.empty()) request.method = "GET";
-  return answer(request, {catalogue, metrics, viewer, true});
+  return answer(request, {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
 }
 
 std::string body_of(const HttpAnswer& answer) { return answer.body ? *answer.body : "none"; }

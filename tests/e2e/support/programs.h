@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "tests/support/process.h"
 
@@ -18,7 +19,7 @@ namespace intervale {
 // `intervale serve` on a free port, ready.
 class ServerProgram {
  public:
-  explicit ServerProgram(const std::string& input = buckyball().string());
+  explicit ServerProgram(const std::string& input = buckyball().string(), const std::vector<std::string>& more = {});
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] std::string url(const std::string& name = {}) const;
   [[nodiscard]] Process& process() { return process_; }

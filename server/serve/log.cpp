@@ -1,0 +1,67 @@
+#include "server/serve/log.h"
+
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+namespace intervale {
+namespace {
+
+constexpr std::array<std::string_view, 6> kLevels{"trace", "debug", "info", "warn", "error", "off"};
+
+void append(spdlog::memory_buf_t& line, std::string_view text) { line.append(text.data(), text.data() + text.size()); }
+
+std::string_view said_by(const spdlog::details::log_msg& message) { return {message.payload.data(), message.payload.size()}; }
+
+class TextMessage : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/, spdlog::memory_buf_t& line) override {
+    if (log_detail::session) append(line, "session " + std::to_string(*log_detail::session) + " ");
+    for (const char c : said_by(message)) line.push_back(static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c);
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<TextMessage>(); }
+};
+
+class JsonMessage : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/, spdlog::memory_buf_t& line) override {
+    if (log_detail::session) append(line, "\"session\":" + std::to_string(*log_detail::session) + ",");
+    // A name may be no UTF-8, which JSON has to be.
+    const nlohmann::json text = std::string(said_by(message));
+    append(line, "\"message\":" + text.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<JsonMessage>(); }
+};
+
+std::unique_ptr<spdlog::formatter> formatter_of(LogFormat format) {
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  if (format == LogFormat::json) {
+    formatter->add_flag<JsonMessage>('*').set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%*})");
+  } else {
+    formatter->add_flag<TextMessage>('*').set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %*");
+  }
+  return formatter;
+}
+
+}  // namespace
+
+bool is_log_level(const std::string& name) { return std::find(kLevels.begin(), kLevels.end(), name) != kLevels.end(); }
+
+void set_log_level(const std::string& name) { spdlog::set_level(spdlog::level::from_str(name)); }
+
+void start_log(const LogOptions& options) {
+  if (!spdlog::get("intervale")) spdlog::set_default_logger(spdlog::stderr_color_mt("intervale"));  // stdout is for results
+  shape_log(options);
+}
+
+void shape_log(const LogOptions& options) {
+  spdlog::set_formatter(formatter_of(options.format));
+  set_log_level(options.level);
+}
+
+}  // namespace intervale

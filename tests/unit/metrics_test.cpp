@@ -1,0 +1,57 @@
+#include "server/serve/metrics.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+namespace intervale {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using namespace std::chrono_literals;
+
+TEST(Metrics, SayWhatWasCounted) {
+  Metrics metrics;
+  metrics.sessions.Increment();
+  metrics.sessions.Increment();
+  metrics.sessions.Decrement();
+  metrics.updates_sent_total.Increment(1e9);
+  metrics.queued_bytes.Increment(100);
+  metrics.chose(2ms);
+  metrics.chose(20s);
+  metrics.first_answer(30ms);
+  metrics.answered_view(30ms);
+  const std::string text = metrics.text({});
+  for (const char* line :
+       {"# TYPE intervale_sessions gauge", "intervale_sessions 1", "intervale_updates_sent_total 1000000000", "intervale_queued_bytes 100",
+        "# TYPE intervale_selection_seconds histogram", "intervale_selection_seconds_bucket{le=\"0.0025\"} 1",
+        "intervale_selection_seconds_bucket{le=\"+Inf\"} 2", "intervale_selection_seconds_count 2",
+        "intervale_first_mesh_seconds_bucket{le=\"0.05\"} 1", "intervale_view_change_seconds_sum 0.03", "intervale_datasets 0"}) {
+    EXPECT_THAT(text, HasSubstr(std::string(line) + "\n"));
+  }
+  EXPECT_THAT(text, HasSubstr("intervale_resident_memory_bytes "));
+  EXPECT_THAT(text, Not(HasSubstr("intervale_resident_memory_bytes 0\n")));
+}
+
+// A client chooses the code it closes with, and may not make the list of series grow.
+TEST(Metrics, CountClosesByCodesThatAreKnown) {
+  Metrics metrics;
+  EXPECT_THAT(metrics.text({}), HasSubstr("intervale_session_closes_total{code=\"4404\"} 0\n"));
+  const auto lines = [&metrics] {
+    const std::string text = metrics.text({});
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  metrics.closed(3000);
+  metrics.closed(0);
+  const auto before = lines();
+  for (unsigned code = 0; code <= 5000; ++code) metrics.closed(code);
+  EXPECT_EQ(lines(), before);
+  EXPECT_THAT(metrics.text({}), HasSubstr("{code=\"1000\"} 1\n"));
+  EXPECT_THAT(metrics.text({}), HasSubstr("{code=\"none\"} 2\n"));
+}
+
+}  // namespace
+}  // namespace intervale
