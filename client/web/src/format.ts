@@ -1,0 +1,53 @@
+// Numbers for people. Pure.
+
+const kGrouped = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
+
+// 12,345 and, from a million on, 1.23 million.
+export function count(n: number): string {
+  return n < 1e6 ? kGrouped.format(n) : n < 1e9 ? `${short(n / 1e6)} million` : `${short(n / 1e9)} billion`;
+}
+
+export function bytes(n: number): string {
+  if (n < 1000) return `${Math.round(n)} B`;
+  const power = Math.min(3, Math.floor(Math.log10(n) / 3));
+  return `${short(n / 10 ** (3 * power))} ${['', 'kB', 'MB', 'GB'][power]}`;
+}
+
+// Three digits, no more than are of use; infinities as signs.
+export function short(x: number): string {
+  if (!Number.isFinite(x)) return x > 0 ? '∞' : x < 0 ? '−∞' : '?';
+  const size = Math.abs(x);
+  if (size !== 0 && (size < 1e-3 || size >= 1e7)) return signed(x.toExponential(2));
+  return signed(size >= 1000 ? kGrouped.format(Math.round(x)) : String(Number(x.toPrecision(3))));
+}
+
+const signed = (text: string): string => text.replace(/^-/, '−');
+
+// A value and how far it may be off, with as many digits as that leaves meaningful: "123,400 ± 300".
+export function bounded(value: number, bound: number): string {
+  if (!(bound > 0)) return digits(value, 6);
+  const meaningful = value === 0 ? 1 : Math.ceil(Math.log10(Math.abs(value) / bound)) + 1;
+  return `${digits(value, Math.min(7, Math.max(1, meaningful)))} ± ${digits(bound, 1)}`;
+}
+
+function digits(x: number, n: number): string {
+  const size = Math.abs(x);
+  if (size !== 0 && (size < 1e-3 || size >= 1e7)) {
+    const [mantissa, exponent] = x.toExponential(n - 1).split('e');
+    return `${signed(mantissa!)} × 10${superscript(Number(exponent))}`;
+  }
+  const rounded = Number(x.toPrecision(n));
+  return signed(Math.abs(rounded) >= 1000 ? kGrouped.format(rounded) : String(rounded));
+}
+
+function superscript(n: number): string {
+  return [...String(n)].map((c) => (c === '-' ? '⁻' : '⁰¹²³⁴⁵⁶⁷⁸⁹'[Number(c)]!)).join('');
+}
+
+// 1, 2 or 5 times a power of ten, no less than x.
+export function roundAbove(x: number): number {
+  const power = 10 ** Math.floor(Math.log10(x));
+  return power * (x <= power ? 1 : x <= 2 * power ? 2 : x <= 5 * power ? 5 : 10);
+}
+
+export const sameJson = (a: unknown, b: unknown): boolean => JSON.stringify(a) === JSON.stringify(b);

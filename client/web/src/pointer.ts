@@ -1,0 +1,77 @@
+// Mouse, pen and fingers on the picture: turn, move, zoom, roll.
+import { orbited, panned, type Pose, rolled, zoomed } from './camera';
+
+export interface Movable {
+  pose(): Pose | null;
+  move(pose: Pose): void;
+  centre(x: number, y: number): void; // turn about what is drawn at this pixel from now on
+}
+
+const kTurn = Math.PI; // for a drag across the shorter side
+const kWheel = 0.0016; // a pixel of the wheel, as a logarithm
+
+export function watchPointers(canvas: HTMLCanvasElement, movable: Movable): void {
+  const down = new Map<number, { x: number; y: number }>();
+
+  const change = (make: (pose: Pose, width: number, height: number) => Pose) => {
+    const pose = movable.pose();
+    if (pose) movable.move(make(pose, canvas.clientWidth, canvas.clientHeight));
+  };
+  const fromMiddle = (x: number, y: number): [number, number] => {
+    const box = canvas.getBoundingClientRect();
+    return [x - box.left - box.width / 2, y - box.top - box.height / 2];
+  };
+
+  canvas.addEventListener('pointerdown', (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    canvas.classList.add('moving');
+  });
+
+  canvas.addEventListener('pointermove', (event) => {
+    const last = down.get(event.pointerId);
+    if (!last) return;
+    const now = { x: event.clientX, y: event.clientY };
+    const [dx, dy] = [now.x - last.x, now.y - last.y];
+    if (down.size === 1) {
+      const moves = event.shiftKey || (event.buttons & 6) !== 0;
+      change((pose, width, height) => {
+        const angle = kTurn / Math.min(width, height);
+        return moves ? panned(pose, dx, dy, height) : orbited(pose, dx * angle, dy * angle);
+      });
+    } else if (down.size === 2) {
+      const other = [...down].find(([id]) => id !== event.pointerId)![1];
+      const before = [last.x - other.x, last.y - other.y] as const;
+      const after = [now.x - other.x, now.y - other.y] as const;
+      const factor = Math.hypot(...before) / Math.max(1, Math.hypot(...after));
+      const angle = Math.atan2(after[1], after[0]) - Math.atan2(before[1], before[0]);
+      const at = fromMiddle((now.x + other.x) / 2, (now.y + other.y) / 2);
+      change((pose, _, height) => rolled(zoomed(panned(pose, dx / 2, dy / 2, height), factor, at, height), Math.atan2(Math.sin(angle), Math.cos(angle))));
+    }
+    down.set(event.pointerId, now);
+  });
+
+  const up = (event: PointerEvent) => {
+    down.delete(event.pointerId);
+    if (down.size === 0) canvas.classList.remove('moving');
+  };
+  canvas.addEventListener('pointerup', up);
+  canvas.addEventListener('pointercancel', up);
+  canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+
+  canvas.addEventListener(
+    'wheel',
+    (event) => {
+      event.preventDefault();
+      const pixels = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 33 : 1) * (event.ctrlKey ? 5 : 1);
+      const at = fromMiddle(event.clientX, event.clientY);
+      change((pose, _, height) => zoomed(pose, Math.exp(Math.max(-300, Math.min(300, pixels)) * kWheel), at, height));
+    },
+    { passive: false },
+  );
+
+  canvas.addEventListener('dblclick', (event) => {
+    const box = canvas.getBoundingClientRect();
+    movable.centre(event.clientX - box.left, event.clientY - box.top);
+  });
+}

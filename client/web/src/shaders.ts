@@ -1,0 +1,260 @@
+// The shaders of what is drawn, in GLSL ES 3.0. Vertices come packed, as the worker sends them: see messages.ts; positions in samples.
+
+// Where a vertex is in drawing space, and what one needs to know of it.
+const kPlace = `
+uniform mat4 viewMatrix, projectionMatrix;
+uniform vec3 spacing, shift;
+out vec3 place;
+vec3 unpacked(uvec3 bits) { return spacing * uintBitsToFloat(bits) + shift; }
+void put(vec3 p) {
+  place = p;
+  gl_Position = projectionMatrix * viewMatrix * vec4(p, 1.0);
+}
+`;
+
+const kPrecision = `
+precision highp float;
+precision highp int;
+`;
+
+export const kSkinVertex = `${kPrecision}
+in uvec4 position; // three floats' bits; the normal and the level
+out vec3 normal;
+flat out float level;
+${kPlace}
+void main() {
+  put(unpacked(position.xyz));
+  ivec3 n = ivec3(uvec3(position.w << 24, position.w << 16, position.w << 8)) >> 24;
+  normal = vec3(n) / 127.0;
+  level = float(position.w >> 24);
+}`;
+
+// A light at the head, a little to the upper left of it; sky and ground; a soft highlight. From sRGB, to sRGB.
+const kLight = `
+uniform mat4 viewMatrix;
+uniform vec3 cameraPosition;
+vec3 linear(vec3 c) { return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878); }
+vec3 srgb(vec3 c) { return max(1.055 * pow(max(c, 0.0), vec3(0.41666)) - 0.055, 0.0); }
+vec3 lit(vec3 color, vec3 n, vec3 p) {
+  vec3 to_eye = normalize(cameraPosition - p);
+  if (dot(n, to_eye) < 0.0) n = -n;
+  vec3 right = vec3(viewMatrix[0][0], viewMatrix[1][0], viewMatrix[2][0]);
+  vec3 up = vec3(viewMatrix[0][1], viewMatrix[1][1], viewMatrix[2][1]);
+  vec3 to_light = normalize(to_eye - 0.35 * right + 0.45 * up);
+  float sky = 0.5 + 0.5 * dot(n, up);
+  float diffuse = max(dot(n, to_light), 0.0);
+  float highlight = pow(max(dot(n, normalize(to_light + to_eye)), 0.0), 40.0);
+  float rim = 1.0 - max(dot(n, to_eye), 0.0);
+  vec3 base = linear(color);
+  vec3 ambient = mix(vec3(0.16, 0.15, 0.15), vec3(0.30, 0.32, 0.36), sky);
+  return srgb(base * (ambient + 0.78 * diffuse) + 0.10 * highlight + 0.05 * rim * rim * rim * (0.4 + base));
+}
+`;
+
+// Levels of detail: from fine and dark to coarse and light, even in lightness, told apart without red and green (after cividis).
+export const kRamp: readonly [number, number, number][] = [
+  [0.0, 0.18, 0.42],
+  [0.29, 0.33, 0.45],
+  [0.48, 0.48, 0.47],
+  [0.7, 0.65, 0.42],
+  [0.99, 0.9, 0.27],
+];
+const kLevels = `
+uniform float byLevel, levels; // 1 where colours are the levels'; the coarsest level
+vec3 ramp(float t) {
+  vec3 c[5] = vec3[5](${kRamp.map((c) => `vec3(${c.map((x) => x.toFixed(3)).join(',')})`).join(',')});
+  float x = clamp(t, 0.0, 1.0) * 4.0;
+  int i = min(int(x), 3);
+  return mix(c[i], c[i + 1], x - float(i));
+}
+vec3 colored(vec3 color, float level) { return mix(color, ramp(level / max(levels, 1.0)), byLevel); }
+`;
+
+// What is not drawn: beyond the plane, and in the box that shows tetrahedra.
+const kCut = `
+uniform vec4 clip; // normal and offset; normal 0: none
+uniform vec3 hiddenMin, hiddenMax;
+in vec3 place;
+void cut() {
+  if (dot(clip.xyz, place) > clip.w) discard;
+  if (all(greaterThan(place, hiddenMin)) && all(lessThan(place, hiddenMax))) discard;
+}
+`;
+
+const kSkinColor = `
+in vec3 normal;
+flat in float level;
+uniform vec3 color;
+${kCut}${kLevels}${kLight}
+vec3 skin_color() { return lit(colored(color, level), normalize(normal + 1e-6), place); }
+`;
+
+export const kSkinFragment = `${kPrecision}${kSkinColor}
+out vec4 picture;
+void main() {
+  cut();
+  picture = vec4(skin_color(), 1.0);
+}`;
+
+// Weighted blended transparency: McGuire and Bavoil 2013. Colours are added, each with a weight that falls with the depth; what shines through is
+// multiplied. One blend function serves both targets: colours are added, alphas multiplied.
+export const kVeilFragment = `${kPrecision}${kSkinColor}
+uniform float opacity;
+uniform vec2 depths; // nearest and farthest of the data
+layout(location = 0) out vec4 sum;
+layout(location = 1) out vec4 weight;
+void main() {
+  cut();
+  float depth = -(viewMatrix * vec4(place, 1.0)).z;
+  float w = exp2(6.0 - 16.0 * clamp((depth - depths.x) / (depths.y - depths.x), 0.0, 1.0)) * opacity;
+  sum = vec4(skin_color() * w, opacity);
+  weight = vec4(w, 0.0, 0.0, 1.0);
+}`;
+
+export const kEdgeFragment = `${kPrecision}
+in vec3 normal;
+flat in float level;
+uniform vec4 ink;
+${kCut}
+out vec4 picture;
+void main() {
+  cut();
+  picture = ink;
+}`;
+
+export const kCapVertex = `${kPrecision}
+in uvec4 position; // three floats' bits; distances from three sides, and the level
+out vec3 sides;
+flat out float level;
+${kPlace}
+void main() {
+  put(unpacked(position.xyz));
+  sides = vec3(uvec3(position.w, position.w >> 8, position.w >> 16) & 255u) / 255.0;
+  level = float(position.w >> 24);
+}`;
+
+export const kCapFragment = `${kPrecision}
+in vec3 place;
+in vec3 sides;
+flat in float level;
+uniform vec3 color;
+uniform vec4 clip;
+uniform vec3 hiddenMin, hiddenMax;
+uniform float outline; // pixels
+${kLevels}${kLight}
+out vec4 picture;
+void main() {
+  if (all(greaterThan(place, hiddenMin)) && all(lessThan(place, hiddenMax))) discard;
+  vec3 shade = lit(colored(color, level), clip.xyz, place);
+  vec3 slope = fwidth(sides);
+  vec3 pixels = sides / max(slope, 1e-6);
+  float near = min(min(pixels.x, pixels.y), pixels.z);
+  float line = 1.0 - smoothstep(outline - 0.5, outline + 0.5, near);
+  float small = clamp(0.25 / max(max(max(slope.x, slope.y), slope.z), 1e-6), 0.0, 1.0); // fades where triangles are but a few pixels
+  picture = vec4(mix(shade, shade * 0.42, line * small), 1.0);
+}`;
+
+export const kTetsVertex = `${kPrecision}
+in uvec3 corner;
+in uvec3 center;
+in uint kind; // surface and level
+uniform float shrink;
+out vec3 whole; // the place before shrinking
+flat out float level;
+out vec2 share; // how many corners are on alpha and on beta, over the triangle
+${kPlace}
+void main() {
+  vec3 c = unpacked(center);
+  whole = unpacked(corner);
+  put(c + (whole - c) * shrink);
+  uint surface = kind & 255u;
+  share = vec2(surface == 1u, surface == 2u);
+  level = float((kind >> 8) & 255u);
+}`;
+
+export const kTetsFragment = `${kPrecision}
+in vec3 place;
+in vec3 whole;
+flat in float level;
+in vec2 share;
+uniform vec3 alpha, beta, box;
+uniform vec4 clip;
+${kLevels}${kLight}
+out vec4 picture;
+void main() {
+  vec3 n = normalize(cross(dFdx(place), dFdy(place)));
+  if (dot(clip.xyz, whole) > clip.w) discard;
+  vec3 color = share.x > 0.999 ? alpha : share.y > 0.999 ? beta : box;
+  picture = vec4(lit(colored(color, level), n, place), 1.0);
+}`;
+
+// Adds what is behind to, and takes what is in front from, the way of each ray: the sum is its length within the solid.
+export const kThicknessFragment = `${kPrecision}
+in vec3 place;
+uniform vec3 cameraPosition;
+uniform vec4 clip;
+uniform float capFacing; // 0: the skin; otherwise a cap, 1 where it is seen from outside, -1 from inside
+out vec4 sum;
+void main() {
+  if (capFacing == 0.0 && dot(clip.xyz, place) > clip.w) discard;
+  bool front = capFacing == 0.0 ? gl_FrontFacing : capFacing > 0.0;
+  float way = distance(cameraPosition, place);
+  sum = vec4(front ? -way : way, 1.0, 0.0, 0.0);
+}`;
+
+export const kFullScreenVertex = `${kPrecision}
+out vec2 at;
+void main() {
+  at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0;
+  gl_Position = vec4(at * 2.0 - 1.0, 0.0, 1.0);
+}`;
+
+export const kVeilOverFragment = `${kPrecision}
+in vec2 at;
+uniform sampler2D sums, weights;
+out vec4 picture;
+void main() {
+  vec4 sum = texture(sums, at);
+  picture = vec4(sum.rgb / max(texture(weights, at).r, 1e-6), 1.0 - sum.a);
+}`;
+
+// Thin is dark and thick is bright: inferno, by a polynomial of degree 6 (Matt Zucker's fit, public domain).
+export const kThicknessOverFragment = `${kPrecision}
+in vec2 at;
+uniform sampler2D sums;
+uniform float most; // what the end of the ramp stands for
+out vec4 picture;
+vec3 inferno(float t) {
+  const vec3 c0 = vec3(0.0002189403691192265, 0.001651004631001012, -0.01948089843709184);
+  const vec3 c1 = vec3(0.1065134194856116, 0.5639564367884091, 3.932712388889277);
+  const vec3 c2 = vec3(11.60249308247187, -3.972853965665698, -15.9423941062914);
+  const vec3 c3 = vec3(-41.70399613139459, 17.43639888205313, 44.35414519872813);
+  const vec3 c4 = vec3(77.162935699427, -33.40235894210092, -81.80730925738993);
+  const vec3 c5 = vec3(-71.31942824499214, 32.62606426397723, 73.20951985803202);
+  const vec3 c6 = vec3(25.13112622477341, -12.24266895238567, -23.07032500287172);
+  return clamp(c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6))))), 0.0, 1.0);
+}
+void main() {
+  float way = texture(sums, at).r;
+  float t = clamp(way / most, 0.0, 1.0);
+  picture = vec4(inferno(0.12 + 0.86 * t), smoothstep(0.0, 0.004, t));
+}`;
+
+export const kLineVertex = `${kPrecision}
+in vec3 position; // in drawing space
+uniform mat4 viewMatrix, projectionMatrix;
+void main() { gl_Position = projectionMatrix * viewMatrix * vec4(position, 1.0); }`;
+
+export const kLineFragment = `${kPrecision}
+uniform vec4 ink;
+out vec4 picture;
+void main() { picture = ink; }`;
+
+// Draws nothing; but what is given to it to draw is uploaded.
+export const kStagingVertex = `${kPrecision}
+in uvec4 position;
+void main() { gl_Position = vec4(uintBitsToFloat(position.xyz), 0.0); }`;
+
+export const kStagingFragment = `${kPrecision}
+out vec4 picture;
+void main() { picture = vec4(0.0); }`;

@@ -1,0 +1,28 @@
+// Values that others watch. Watchers are called at once, in the order they came, with the names of what changed.
+export class Store<T extends object> {
+  private watchers: ((value: Readonly<T>, changed: ReadonlySet<keyof T>) => void)[] = [];
+
+  constructor(private current: T) {}
+
+  get value(): Readonly<T> {
+    return this.current;
+  }
+
+  set(change: Partial<T>): void {
+    const changed = new Set<keyof T>();
+    for (const key of Object.keys(change) as (keyof T)[]) {
+      if (!Object.is(this.current[key], change[key])) changed.add(key);
+    }
+    if (changed.size === 0) return;
+    this.current = { ...this.current, ...change };
+    for (const watcher of this.watchers) watcher(this.current, changed);
+  }
+
+  // names: those that matter; all if there are none. Called once right away, too.
+  watch(names: (keyof T)[], watcher: (value: Readonly<T>) => void): void {
+    this.watchers.push((value, changed) => {
+      if (names.length === 0 || names.some((name) => changed.has(name))) watcher(value);
+    });
+    watcher(this.current);
+  }
+}

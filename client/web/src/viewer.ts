@@ -1,0 +1,175 @@
+// The picture and what comes from the worker for it: uploads between frames, draws when something has changed, and tells the worker what is shown.
+import { fitted, type Pose } from './camera';
+import { type Frame, frameOf } from './frame';
+import type { Listed } from './live';
+import type { Cap, Skin, Tets } from './messages';
+import { Picture } from './picture';
+import type { ViewState } from './state';
+import type { Store } from './store';
+
+export interface Stats {
+  frames: number; // drawn
+  lastFrameMs: number; // what the last took on this thread
+  longestBlock: number; // ms of this thread that taking, uploading or swapping a skin took at a stretch, drawing apart; since it was last set to 0
+  skinVersion: number; // on screen
+  skinTriangles: number;
+  skinBytes: number; // of buffers on the graphics card
+  capTriangles: number; // on screen
+  tets: number; // shrunken, on screen
+  firstMeshMs: number; // from navigation to the first picture with triangles; 0: none yet
+}
+
+export class Viewer {
+  readonly picture: Picture;
+  readonly stats: Stats = {
+    frames: 0,
+    lastFrameMs: 0,
+    longestBlock: 0,
+    skinVersion: 0,
+    skinTriangles: 0,
+    skinBytes: 0,
+    capTriangles: 0,
+    tets: 0,
+    firstMeshMs: 0,
+  };
+  frame: Frame | null = null;
+  onShown: (version: number) => void = () => {};
+  onDrawn: () => void = () => {};
+  onResize: () => void = () => {};
+  private coarsest = 1;
+  private cap: Cap | null = null; // that waits for its skin
+  private dirty = true;
+  private asked = false;
+  private lost = false;
+
+  // Throws if there is no WebGL 2.
+  constructor(canvas: HTMLCanvasElement, private view: Store<ViewState>) {
+    this.picture = new Picture(canvas);
+    new ResizeObserver(() => {
+      if (!this.picture.resize()) return;
+      this.onResize();
+      this.draw(); // at once: the canvas has just been emptied
+    }).observe(canvas);
+    canvas.addEventListener('webglcontextlost', () => (this.lost = true));
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.lost = false;
+      this.changed(); // buffers come again from what the pieces keep
+    });
+    view.watch([], () => {
+      this.applyLooks();
+      this.changed();
+    });
+  }
+
+  open(dataset: Listed): void {
+    this.picture.skin.clear();
+    this.cap = null;
+    this.frame = frameOf(dataset);
+    this.picture.setFrame(this.frame);
+    this.picture.setCap(this.frame, null);
+    this.picture.setTets(this.frame, null);
+    this.coarsest = Math.max(1, Math.ceil(Math.log2(Math.max(...dataset.dims) - 1)) - 1);
+    this.picture.resize();
+    this.applyLooks();
+    this.changed();
+  }
+
+  // Where one looks from: as chosen, or else at everything.
+  pose(): Pose | null {
+    const { canvas } = this.picture;
+    return this.view.value.pose ?? (this.frame ? fitted(this.frame.box, canvas.clientWidth / Math.max(1, canvas.clientHeight)) : null);
+  }
+
+  takeSkin(skin: Skin): void {
+    this.timed(() => this.picture.skin.take(skin));
+    this.ask();
+  }
+
+  // A cap of a skin that is still to be shown waits for it.
+  takeCap(cap: Cap): void {
+    if (cap.version > this.picture.skin.version && this.picture.skin.busy) this.cap = cap;
+    else this.timed(() => this.showCap(cap));
+    this.changed();
+  }
+
+  takeTets(tets: Tets): void {
+    if (!this.frame) return;
+    const frame = this.frame;
+    this.timed(() => this.picture.setTets(frame, tets.box ? tets : null));
+    this.stats.tets = tets.box ? tets.count : 0;
+    this.changed();
+  }
+
+  changed(): void {
+    this.dirty = true;
+    this.ask();
+  }
+
+  // What is seen without handles and guides.
+  photograph(): Promise<Blob | null> {
+    this.draw(false);
+    return new Promise((resolve) => {
+      this.picture.canvas.toBlob(resolve, 'image/png');
+      this.changed();
+    });
+  }
+
+  private ask(): void {
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => this.step());
+  }
+
+  private step(): void {
+    this.asked = false;
+    if (this.lost) return;
+    const { skin } = this.picture;
+    let shown = 0;
+    if (skin.busy && this.frame) {
+      const frame = this.frame;
+      this.timed(() => {
+        if (!skin.upload(frame)) return;
+        skin.swap();
+        shown = skin.version;
+        if (this.cap && this.cap.version <= shown) this.showCap(this.cap);
+      });
+      if (shown > 0) this.dirty = true;
+    }
+    if (this.dirty) this.draw();
+    if (shown > 0) {
+      Object.assign(this.stats, { skinVersion: shown, skinTriangles: skin.triangles, skinBytes: skin.bytes });
+      if (this.stats.firstMeshMs === 0 && skin.triangles > 0) this.stats.firstMeshMs = performance.now();
+      this.onShown(shown);
+    }
+    if (skin.busy || this.dirty) this.ask();
+  }
+
+  private draw(withGuides = true): void {
+    const pose = this.pose();
+    if (!this.frame || !pose || this.lost) return;
+    const start = performance.now();
+    this.dirty = false;
+    const { clip, region } = this.view.value;
+    this.picture.guides.set(this.frame, { region, plane: clip });
+    this.picture.draw(this.frame, pose, this.view.value, withGuides);
+    this.stats.frames++;
+    this.stats.lastFrameMs = performance.now() - start;
+    this.onDrawn();
+  }
+
+  private showCap(cap: Cap): void {
+    this.cap = null;
+    if (this.frame) this.picture.setCap(this.frame, cap);
+    this.stats.capTriangles = cap.plane ? cap.triangles : 0;
+  }
+
+  private applyLooks(): void {
+    this.picture.setLooks(this.view.value, this.coarsest);
+  }
+
+  private timed(work: () => void): void {
+    const start = performance.now();
+    work();
+    this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
+  }
+}

@@ -1,0 +1,252 @@
+// Stands in for the worker where the page is looked at without a server: a thick gyroid, meshed on ever finer grids by clipping tetrahedra. Speaks
+// src/messages.ts. The data set's name chooses what goes wrong: "lost" loses its connection, "broken" fails.
+
+const kSide = 48; // samples from end to end
+const kRange = [-0.45, 0.75];
+const kGrids = [6, 12, 24];
+const kPiece = 16;
+
+const field = (x, y, z) => {
+  const [a, b, c] = [x, y, z].map((v) => (v / kSide) * 2 * Math.PI * 1.25);
+  return Math.sin(a) * Math.cos(b) + Math.sin(b) * Math.cos(c) + Math.sin(c) * Math.cos(a);
+};
+const gradient = ([x, y, z]) => {
+  const h = 0.01;
+  const g = [field(x + h, y, z) - field(x - h, y, z), field(x, y + h, z) - field(x, y - h, z), field(x, y, z + h) - field(x, y, z - h)];
+  const l = Math.hypot(...g) || 1;
+  return g.map((v) => v / l);
+};
+
+class Mesh {
+  constructor(n) {
+    this.vertices = []; // {p, f, surface}
+    this.tets = [];
+    const cuts = new Map();
+    const step = kSide / n;
+    const at = (i, j, k) => (i * (n + 1) + j) * (n + 1) + k;
+    for (let i = 0; i <= n; ++i) for (let j = 0; j <= n; ++j) for (let k = 0; k <= n; ++k) {
+      const p = [i * step, j * step, k * step];
+      this.vertices.push({ p, f: field(...p), surface: 0 });
+    }
+    const cut = (a, b, value, surface) => {
+      const key = `${Math.min(a, b)} ${Math.max(a, b)} ${surface}`;
+      if (!cuts.has(key)) {
+        const [u, v] = a < b ? [this.vertices[a], this.vertices[b]] : [this.vertices[b], this.vertices[a]];
+        const t = (value - u.f) / (v.f - u.f);
+        cuts.set(key, this.vertices.push({ p: u.p.map((x, d) => x + t * (v.p[d] - x)), f: value, surface }) - 1);
+      }
+      return cuts.get(key);
+    };
+    // What of a tetrahedron is inside; faces between neighbours stay the same because vertices are taken in the order of their numbers.
+    const clip = (tet, value, sign, surface) => {
+      const sorted = [...tet].sort((a, b) => a - b);
+      const inside = sorted.filter((v) => sign * (this.vertices[v].f - value) >= 0);
+      const outside = sorted.filter((v) => !inside.includes(v));
+      const c = (a, b) => cut(a, b, value, surface);
+      const prism = ([a0, a1, a2], [b0, b1, b2]) => [[a0, a1, a2, b0], [a1, a2, b0, b1], [a2, b0, b1, b2]];
+      const [o, q] = outside;
+      if (inside.length === 4) return [tet];
+      if (inside.length === 0) return [];
+      if (inside.length === 1) return [[inside[0], ...outside.map((v) => c(inside[0], v))]];
+      if (inside.length === 3) return prism(inside, inside.map((v) => c(v, o)));
+      return prism([inside[0], c(inside[0], o), c(inside[0], q)], [inside[1], c(inside[1], o), c(inside[1], q)]);
+    };
+    const orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+    for (let i = 0; i < n; ++i) for (let j = 0; j < n; ++j) for (let k = 0; k < n; ++k) {
+      for (const order of orders) {
+        const corner = [i, j, k];
+        const tet = [at(...corner)];
+        for (const axis of order) {
+          corner[axis]++;
+          tet.push(at(...corner));
+        }
+        for (const part of clip(tet, kRange[0], 1, 1)) this.tets.push(...clip(part, kRange[1], -1, 2));
+      }
+    }
+    this.tets = this.tets.filter((tet) => Math.abs(this.volume(tet)) > 1e-9).map((tet) => (this.volume(tet) > 0 ? tet : [tet[1], tet[0], tet[2], tet[3]]));
+    this.level = Math.round(Math.log2(step));
+  }
+  volume(tet) {
+    const [a, b, c, d] = tet.map((v) => this.vertices[v].p);
+    const [u, v, w] = [b, c, d].map((p) => p.map((x, i) => x - a[i]));
+    return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
+  }
+  middle(tet) {
+    return [0, 1, 2].map((d) => tet.reduce((sum, v) => sum + this.vertices[v].p[d] / 4, 0));
+  }
+  static faces([a, b, c, d]) {
+    return [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
+  }
+  skin() {
+    const seen = new Map();
+    for (const tet of this.tets) for (const face of Mesh.faces(tet)) {
+      const key = [...face].sort((a, b) => a - b).join(' ');
+      if (seen.has(key)) seen.delete(key);
+      else seen.set(key, { face, at: this.middle(tet) });
+    }
+    const pieces = new Map();
+    for (const { face, at } of seen.values()) {
+      const id = at.reduce((sum, x) => sum * 8 + Math.floor(Math.min(x, kSide - 1) / kPiece), 0);
+      if (!pieces.has(id)) pieces.set(id, [[], [], []]);
+      const surfaces = face.map((v) => this.vertices[v].surface);
+      const group = surfaces.every((s) => s === 1) ? 0 : surfaces.every((s) => s === 2) ? 1 : 2;
+      pieces.get(id)[group].push(face);
+    }
+    return [...pieces].map(([id, groups]) => this.piece(id, groups));
+  }
+  piece(id, groups) {
+    const numbers = new Map();
+    const list = [];
+    const indices = [];
+    const edges = [];
+    const edgeCounts = [0, 0, 0];
+    groups.forEach((faces, group) => {
+      const known = new Set();
+      for (const face of faces) {
+        const ps = face.map((v) => this.vertices[v].p);
+        const axis = [0, 1, 2].find((d) => ps.every((p) => p[d] === ps[0][d] && (p[d] === 0 || p[d] === kSide)));
+        const side = axis === undefined ? 'i' : `${axis}${ps[0][axis]}`;
+        const own = face.map((v) => {
+          const key = `${v} ${group} ${group === 2 ? side : ''}`;
+          if (!numbers.has(key)) {
+            numbers.set(key, list.length);
+            const { p } = this.vertices[v];
+            const n = group === 2 ? [0, 1, 2].map((d) => (d === axis ? (p[d] === 0 ? -1 : 1) : 0)) : gradient(p).map((x) => (group === 0 ? -x : x));
+            list.push({ p, n });
+          }
+          return numbers.get(key);
+        });
+        indices.push(...own);
+        for (const [a, b] of [[0, 1], [1, 2], [2, 0]]) {
+          const key = [own[a], own[b]].sort((x, y) => x - y).join(' ');
+          if (known.has(key)) continue;
+          known.add(key);
+          edges.push(own[a], own[b]);
+          edgeCounts[group]++;
+        }
+      }
+    });
+    const vertices = new ArrayBuffer(16 * list.length);
+    const view = new DataView(vertices);
+    list.forEach(({ p, n }, i) => {
+      p.forEach((x, d) => view.setFloat32(16 * i + 4 * d, x, true));
+      n.forEach((x, d) => view.setInt8(16 * i + 12 + d, Math.round(127 * x)));
+      view.setUint8(16 * i + 15, this.level + (p[0] > kSide / 2 ? 1 : 0));
+    });
+    const bound = (pick) => [0, 1, 2].map((d) => pick(...list.map(({ p }) => p[d])));
+    return {
+      id, vertices, indices: new Uint32Array(indices).buffer, edges: wantsEdges ? new Uint32Array(edges).buffer : null,
+      triangles: groups.map((faces) => faces.length), edgeCounts, min: bound(Math.min), max: bound(Math.max),
+    };
+  }
+  cap(plane) {
+    const out = [];
+    for (const tet of this.tets) {
+      const d = tet.map((v) => this.vertices[v].p.reduce((sum, x, i) => sum + x * plane.normal[i], -plane.offset));
+      const pos = [0, 1, 2, 3].filter((i) => d[i] > 0);
+      if (pos.length === 0 || pos.length === 4) continue;
+      const neg = [0, 1, 2, 3].filter((i) => d[i] <= 0);
+      const point = (i, j) => this.vertices[tet[i]].p.map((x, k) => x + (d[i] / (d[i] - d[j])) * (this.vertices[tet[j]].p[k] - x));
+      const ring = pos.length === 2 ? [[pos[0], neg[0]], [pos[0], neg[1]], [pos[1], neg[1]], [pos[1], neg[0]]] : pos.length === 1 ? neg.map((n) => [pos[0], n]) : pos.map((p) => [p, neg[0]]);
+      const points = ring.map(([i, j]) => point(i, j));
+      const all = [[255, 0, 0], [0, 255, 0], [0, 0, 255]];
+      if (points.length === 3) out.push(...points.map((p, i) => ({ p, sides: all[i] })));
+      // The side opposite to the middle corner is a diagonal, and none of the tetrahedron's.
+      else for (const [a, b, c] of [[0, 1, 2], [2, 3, 0]]) out.push({ p: points[a], sides: [255, 255, 0] }, { p: points[b], sides: [0, 255, 0] }, { p: points[c], sides: [0, 255, 255] });
+    }
+    const vertices = new ArrayBuffer(16 * out.length);
+    const view = new DataView(vertices);
+    out.forEach(({ p, sides }, i) => {
+      p.forEach((x, d) => view.setFloat32(16 * i + 4 * d, x, true));
+      sides.forEach((s, d) => view.setUint8(16 * i + 12 + d, s));
+      view.setUint8(16 * i + 15, this.level);
+    });
+    return { vertices, triangles: out.length / 3 };
+  }
+  inBox(box) {
+    const tets = this.tets.filter((tet) => this.middle(tet).every((x, d) => x >= box.min[d] && x <= box.max[d]));
+    const vertices = new ArrayBuffer(28 * 4 * tets.length);
+    const view = new DataView(vertices);
+    const indices = new Uint32Array(12 * tets.length);
+    tets.forEach((tet, t) => {
+      tet.forEach((v, i) => {
+        const at = 28 * (4 * t + i);
+        this.vertices[v].p.forEach((x, d) => view.setFloat32(at + 4 * d, x, true));
+        this.middle(tet).forEach((x, d) => view.setFloat32(at + 12 + 4 * d, x, true));
+        view.setUint8(at + 24, this.vertices[v].surface);
+        view.setUint8(at + 25, this.level);
+      });
+      indices.set(Mesh.faces([0, 1, 2, 3]).flat().map((i) => 4 * t + i), 12 * t);
+    });
+    return { vertices, indices: indices.buffer, count: tets.length, outOf: tets.length };
+  }
+}
+
+let mesh = null;
+let step = -1;
+let version = 0;
+let plane = null;
+let box = null;
+let wantsEdges = false;
+let name = '';
+let timer = 0;
+
+const say = (report) => self.postMessage(report);
+const samples = (p) => p.map((x) => x + kSide / 2); // the world's origin is in the middle
+
+function progress(done) {
+  const updates = [0, 900, 6200, 48000][step + 1];
+  say({ type: 'progress', progress: {
+    bytes: updates * 2.1 + 900, updates, updatesShown: updates, tets: mesh?.tets.length ?? 0, triangles: 0, updatesToGo: done ? 0 : 48000 - updates,
+    remainingError: done ? 0.0123 : 0.4 / (step + 2), remainingPixels: done ? 0.92 : 60 / (step + 2), done, full: name === 'full',
+    volume: mesh ? mesh.tets.reduce((sum, tet) => sum + mesh.volume(tet), 0) : 0, volumeBound: 900 / 4 ** (step + 1), memory: 12.4e6,
+    busy: { updates, seconds: updates / 2.1e6 }, reconnects: 0, repeated: 0,
+  } });
+}
+function cap() {
+  const own = plane && { normal: plane.normal, offset: plane.offset + plane.normal.reduce((sum, n) => sum + (n * kSide) / 2, 0) };
+  say({ type: 'cap', cap: { plane, version, ...(own && mesh ? mesh.cap(own) : { vertices: new ArrayBuffer(0), triangles: 0 }) } });
+}
+function tets() {
+  const none = { vertices: new ArrayBuffer(0), indices: new ArrayBuffer(0), count: 0, outOf: 0 };
+  say({ type: 'tets', tets: { box, ...(box && mesh ? mesh.inBox({ min: samples(box.min), max: samples(box.max) }) : none) } });
+}
+function skin(reset) {
+  version++;
+  const pieces = mesh.skin();
+  say({ type: 'skin', skin: { version, reset, pieces, removed: [] } });
+  if (plane) cap();
+  if (box) tets();
+}
+function refine() {
+  if (step + 1 >= kGrids.length) return progress(true);
+  mesh = new Mesh(kGrids[++step]);
+  skin(step === 0);
+  progress(false);
+}
+
+self.onmessage = ({ data }) => {
+  if (data.type === 'open') {
+    clearTimeout(timer);
+    [mesh, step, name] = [null, -1, data.dataset];
+    if (name === 'broken') return say({ type: 'error', text: 'broken: the server has no such data set; see the list.' });
+    say({ type: 'connection', state: { state: 'open' } });
+    say({ type: 'opened', dataset: null, resumed: false });
+    refine();
+    if (name === 'lost') say({ type: 'connection', state: { state: 'waiting', seconds: 8, attempt: 2, reason: 'the server went away' } });
+  } else if (data.type === 'shown' && name !== 'lost') {
+    timer = setTimeout(refine, 30);
+  } else if (data.type === 'clip') {
+    plane = data.plane;
+    cap();
+  } else if (data.type === 'tets') {
+    box = data.box;
+    tets();
+  } else if (data.type === 'edges') {
+    wantsEdges = data.wanted;
+    if (mesh) skin(false);
+  } else if (data.type === 'save') {
+    say({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
+  }
+};
+say({ type: 'ready' });
