@@ -1,6 +1,7 @@
 #include "common/lod.h"
 
 #include <cmath>
+#include <cstddef>
 
 namespace intervale {
 namespace {
@@ -26,6 +27,15 @@ Result<void> check_camera(const Camera& c) {
 }
 
 }  // namespace
+
+Box box_of(const Grid& grid) {
+  Box box;
+  for (std::size_t i = 0; i < 3; ++i) {
+    box.min[i] = grid.origin[i];
+    box.max[i] = grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1);
+  }
+  return box;
+}
 
 Result<void> check_lod(const Lod& lod) {
   // Written so that NaN fails each test.

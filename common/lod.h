@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "common/grid.h"
 #include "common/result.h"
 
 namespace intervale {
@@ -15,6 +16,9 @@ struct Box {
   std::array<double, 3> max{};
   friend bool operator==(const Box&, const Box&) = default;
 };
+
+// The box that the samples span.
+[[nodiscard]] Box box_of(const Grid& grid);
 
 // A perspective camera and the screen it fills. World coordinates.
 struct Camera {

@@ -96,15 +96,6 @@ double random_fraction(std::uint64_t seed, std::uint64_t number) {
   return double((x ^ x >> 31) >> 11) * 0x1p-53;
 }
 
-Box box_of(const Grid& grid) {
-  Box box;
-  for (std::size_t i = 0; i < 3; ++i) {
-    box.min[i] = grid.origin[i];
-    box.max[i] = grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1);
-  }
-  return box;
-}
-
 Lod view_of(const CameraPath& path, std::uint64_t number) {
   if (path.scenario == Scenario::full) return {};
   const Ball ball(path.box);

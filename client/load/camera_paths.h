@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string_view>
 
-#include "common/grid.h"
 #include "common/lod.h"
 
 namespace intervale {
@@ -16,9 +15,6 @@ enum class Scenario : std::uint8_t {
   zoom,   // from where the whole box is in sight to a seeded point on its surface and back, in 10 s
   jump,   // from anywhere outside, far or close, at any point of the box, anew with each view
 };
-
-// The box that the samples span.
-[[nodiscard]] Box box_of(const Grid& grid);
 
 struct CameraPath {
   Scenario scenario = Scenario::orbit;
