@@ -10,6 +10,8 @@
 #include "client/cli/commands.h"
 #include "client/net/fetch.h"
 #include "common/mesh_writer.h"
+#include "common/picture/picture.h"
+#include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
 
@@ -20,6 +22,7 @@ struct FetchCommand {
   std::string url;
   FetchOptions fetch;
   std::optional<std::filesystem::path> output;
+  std::optional<PictureOptions> picture;
   bool json = false;
 };
 
@@ -74,6 +77,7 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
   text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(figures.bytes_received),
                       figures.messages, 1000 * figures.seconds_first_mesh, figures.complete ? "all" : "budget reached", 1000 * figures.seconds);
   if (options.output) text += "wrote " + options.output->string() + "\n";
+  if (options.picture) text += "drew " + options.picture->file.string() + "\n";
   return print(text);
 }
 
@@ -84,11 +88,18 @@ Result<void> run(const FetchCommand& options) {
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
+  if (options.picture) {
+    if (auto possible = check_picture(*options.picture, options.fetch.lod.camera); !possible) return possible;
+  }
   const auto fetched = fetch_with_progress(*url, options.fetch);
   if (!fetched) return tl::unexpected(fetched.error());
   const Mesh mesh = fetched->client.mesh();
   if (options.output) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
+  }
+  if (options.picture) {
+    const Box box = box_of(fetched->client.description().grid);
+    if (auto drawn = write_picture(*options.picture, mesh, box, options.fetch.lod.camera); !drawn) return drawn;
   }
   return report(options, *fetched, mesh);
 }
@@ -97,13 +108,14 @@ Result<void> run(const FetchCommand& options) {
 
 void add_fetch_command(Program& program) {
   const auto options = std::make_shared<FetchCommand>();
-  CLI::App& command = program.add_command("fetch", "Receives a mesh", [options] { return run(*options); });
+  CLI::App& command = program.add_command("fetch", "Receives a mesh, and writes it or draws it", [options] { return run(*options); });
   command.add_option("URL", options->url, "ws://host:port/NAME")->required();
   command
       .add_option_function<std::string>(
           "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
       ->type_name("MESH");
   add_lod_options(command, options->fetch.lod);
+  add_picture_options(command, options->picture);
   add_max_bytes_option(command, options->fetch.max_bytes);
   command
       .add_option_function<unsigned>(

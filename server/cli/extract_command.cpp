@@ -10,6 +10,8 @@
 #include "common/extraction.h"
 #include "common/ivm_file.h"
 #include "common/mesh_writer.h"
+#include "common/picture/picture.h"
+#include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
 #include "server/build/all_cores.h"
@@ -21,6 +23,7 @@ namespace {
 struct ExtractCommand {
   std::string file;
   std::optional<std::filesystem::path> output;
+  std::optional<PictureOptions> picture;
   Lod lod;
   unsigned threads = 0;
   bool json = false;
@@ -36,6 +39,9 @@ Result<void> run(const ExtractCommand& options) {
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
+  if (options.picture) {
+    if (auto possible = check_picture(*options.picture, options.lod.camera); !possible) return possible;
+  }
   const auto volume = load_ivm(options.file);
   if (!volume) return tl::unexpected(volume.error());
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
@@ -48,6 +54,10 @@ Result<void> run(const ExtractCommand& options) {
   if (options.output) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
   }
+  if (options.picture) {
+    const Box box = box_of((*volume)->description().grid);
+    if (auto drawn = write_picture(*options.picture, mesh, box, options.lod.camera); !drawn) return drawn;
+  }
   const double enclosed = volume_of(mesh);
   if (options.json) {
     return print_json(
@@ -56,6 +66,7 @@ Result<void> run(const ExtractCommand& options) {
   std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", (*volume)->description().name,
                                  extracted->updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
   if (options.output) text += "wrote " + options.output->string() + "\n";
+  if (options.picture) text += "drew " + options.picture->file.string() + "\n";
   return print(text);
 }
 
@@ -70,6 +81,7 @@ void add_extract_command(Program& program) {
           "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
       ->type_name("MESH");
   add_lod_options(command, options->lod);
+  add_picture_options(command, options->picture);
   command.add_option("--threads", options->threads, "0: one for each core")->capture_default_str();
   add_json_flag(command, options->json);
 }

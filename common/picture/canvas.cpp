@@ -1,0 +1,181 @@
+#include "common/picture/canvas.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "common/picture/gl.h"
+#include "common/picture/shaders.h"
+
+namespace intervale {
+namespace {
+
+constexpr GLsizei kSamples = 4;
+constexpr GLfloat kBackFaceOffset = 1;  // depths by which back faces give way to front faces that they coincide with
+
+Result<GLuint> compiled(const Gl& gl, GLenum kind, const std::vector<const char*>& source) {
+  const GLuint shader = gl.CreateShader(kind);
+  gl.ShaderSource(shader, GLsizei(source.size()), source.data(), nullptr);
+  gl.CompileShader(shader);
+  GLint done = GL_FALSE;
+  gl.GetShaderiv(shader, GL_COMPILE_STATUS, &done);
+  if (done == GL_TRUE) return shader;
+  std::array<char, 1024> log{};
+  gl.GetShaderInfoLog(shader, GLsizei(log.size()), nullptr, log.data());
+  return fail(std::string("cannot draw a picture: this machine's OpenGL ES refuses a shader: ") + log.data());
+}
+
+Result<GLuint> linked(const Gl& gl, const char* vertex, const char* fragment) {
+  const GLuint program = gl.CreateProgram();
+  const auto vertex_shader = compiled(gl, GL_VERTEX_SHADER, {vertex});
+  if (!vertex_shader) return vertex_shader;
+  const auto fragment_shader = compiled(gl, GL_FRAGMENT_SHADER, {kFragmentPreamble, fragment});
+  if (!fragment_shader) return fragment_shader;
+  gl.AttachShader(program, *vertex_shader);
+  gl.AttachShader(program, *fragment_shader);
+  gl.LinkProgram(program);
+  GLint done = GL_FALSE;
+  gl.GetProgramiv(program, GL_LINK_STATUS, &done);
+  if (done != GL_TRUE) return fail("cannot draw a picture: this machine's OpenGL ES cannot link the shaders");
+  return program;
+}
+
+void attach(const Gl& gl, GLenum attachment, GLenum format, const std::array<int, 2>& size, GLsizei samples) {
+  GLuint buffer = 0;
+  gl.GenRenderbuffers(1, &buffer);
+  gl.BindRenderbuffer(GL_RENDERBUFFER, buffer);
+  gl.RenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, size[0], size[1]);
+  gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, attachment, GL_RENDERBUFFER, buffer);
+}
+
+// A framebuffer, bound. With as many samples as there can be, up to kSamples: where multisampling fails, edges are rough, but there they are.
+Result<GLuint> framebuffer(const Gl& gl, const std::array<int, 2>& size, bool is_drawn_into) {
+  GLint most = 0;
+  gl.GetIntegerv(GL_MAX_SAMPLES, &most);
+  for (GLsizei samples = is_drawn_into ? std::min<GLsizei>(kSamples, most) : 0;; samples = 0) {
+    GLuint made = 0;
+    gl.GenFramebuffers(1, &made);
+    gl.BindFramebuffer(GL_FRAMEBUFFER, made);
+    attach(gl, GL_COLOR_ATTACHMENT0, GL_RGBA8, size, samples);
+    if (is_drawn_into) attach(gl, GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT32F, size, samples);
+    if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE && gl.GetError() == GL_NO_ERROR) return made;
+    if (samples == 0)
+      return fail(fmt::format("cannot draw a picture of {} x {} pixels: no memory for it; take a smaller viewport", size[0], size[1]));
+    while (gl.GetError() != GL_NO_ERROR) {
+    }
+  }
+}
+
+}  // namespace
+
+struct Canvas::State {
+  GlContext context;
+  std::array<int, 2> size;
+  GLuint drawn = 0;  // framebuffer
+
+  explicit State(GlContext made, const std::array<int, 2>& wanted) : context(std::move(made)), size(wanted) {}
+
+  [[nodiscard]] Result<void> begin(const Viewpoint& viewpoint) {
+    const Gl& gl = context.gl();
+    GLint longest = 0;
+    gl.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &longest);
+    if (std::max(size[0], size[1]) > longest)
+      return misuse(fmt::format("a picture has at most {} pixels each way on this machine, not {} x {}", longest, size[0], size[1]));
+    const auto buffer = framebuffer(gl, size, true);
+    if (!buffer) return tl::unexpected(buffer.error());
+    drawn = *buffer;
+    gl.Viewport(0, 0, size[0], size[1]);
+    gl.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    if (auto done = background(gl); !done) return done;
+    return prepare(gl, viewpoint);
+  }
+
+  [[nodiscard]] Result<void> background(const Gl& gl) const {
+    const auto program = linked(gl, kBackgroundVertexShader, kBackgroundFragmentShader);
+    if (!program) return tl::unexpected(program.error());
+    GLuint no_attributes = 0;
+    gl.GenVertexArrays(1, &no_attributes);
+    gl.BindVertexArray(no_attributes);
+    gl.UseProgram(*program);
+    gl.Uniform1f(gl.GetUniformLocation(*program, "height"), GLfloat(size[1]));
+    gl.DrawArrays(GL_TRIANGLES, 0, 3);
+    return {};
+  }
+
+  // Everything as draw() needs it.
+  [[nodiscard]] Result<void> prepare(const Gl& gl, const Viewpoint& viewpoint) const {
+    const auto program = linked(gl, kMeshVertexShader, kMeshFragmentShader);
+    if (!program) return tl::unexpected(program.error());
+    gl.UseProgram(*program);
+    const auto at = [&](const char* name) { return gl.GetUniformLocation(*program, name); };
+    gl.UniformMatrix4fv(at("projection"), 1, GL_FALSE, viewpoint.projection.data());
+    gl.UniformMatrix3fv(at("rotation"), 1, GL_FALSE, viewpoint.rotation.data());
+    gl.Uniform3fv(at("eye"), 1, viewpoint.eye.data());
+    gl.Uniform2fv(at("nearest_to_far"), 1, viewpoint.nearest_to_far.data());
+    gl.Uniform1f(at("height"), GLfloat(size[1]));
+    GLuint array = 0, buffer = 0;
+    gl.GenVertexArrays(1, &array);
+    gl.BindVertexArray(array);
+    gl.GenBuffers(1, &buffer);
+    gl.BindBuffer(GL_ARRAY_BUFFER, buffer);
+    const auto offset = [](std::size_t bytes) { return reinterpret_cast<const void*>(bytes); };
+    gl.VertexAttribPointer(kPositionAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, position)));
+    gl.VertexAttribPointer(kNormalAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, normal)));
+    gl.VertexAttribIPointer(kLookAttribute, 1, GL_UNSIGNED_INT, sizeof(Corner), offset(offsetof(Corner, look)));
+    for (const GLuint attribute : {kPositionAttribute, kNormalAttribute, kLookAttribute}) gl.EnableVertexAttribArray(attribute);
+    gl.Enable(GL_DEPTH_TEST);
+    gl.Enable(GL_CULL_FACE);
+    gl.PolygonOffset(kBackFaceOffset, kBackFaceOffset);
+    return {};
+  }
+};
+
+Canvas::Canvas(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Canvas::Canvas(Canvas&&) noexcept = default;
+Canvas::~Canvas() = default;
+
+Result<Canvas> Canvas::create(const std::array<int, 2>& size, const Viewpoint& viewpoint) {
+  auto context = GlContext::create();
+  if (!context) return tl::unexpected(context.error());
+  auto state = std::make_unique<State>(std::move(*context), size);
+  if (auto begun = state->begin(viewpoint); !begun) return tl::unexpected(begun.error());
+  return Canvas(std::move(state));
+}
+
+void Canvas::draw(std::span<const Corner> corners) {
+  const Gl& gl = state_->context.gl();
+  gl.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(corners.size_bytes()), corners.data(), GL_STREAM_DRAW);
+  for (const GLenum hidden : {GL_BACK, GL_FRONT}) {
+    gl.CullFace(hidden);
+    if (hidden == GL_FRONT) gl.Enable(GL_POLYGON_OFFSET_FILL);
+    gl.DrawArrays(GL_TRIANGLES, 0, GLsizei(corners.size()));
+  }
+  gl.Disable(GL_POLYGON_OFFSET_FILL);
+}
+
+Result<Pixels> Canvas::finish() {
+  const Gl& gl = state_->context.gl();
+  const int width = state_->size[0], height = state_->size[1];
+  const auto resolved = framebuffer(gl, state_->size, false);
+  if (!resolved) return tl::unexpected(resolved.error());
+  gl.BindFramebuffer(GL_READ_FRAMEBUFFER, state_->drawn);
+  gl.BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  gl.BindFramebuffer(GL_READ_FRAMEBUFFER, *resolved);
+  std::vector<std::uint8_t> rgba(std::size_t(width) * std::size_t(height) * 4);
+  gl.ReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, rgba.data());
+  if (const GLenum error = gl.GetError(); error != GL_NO_ERROR)
+    return fail(fmt::format("cannot draw a picture of {} x {} pixels: OpenGL ES error {:#x}", width, height, error));
+
+  Pixels pixels{width, height, {}};
+  pixels.rgb.reserve(rgba.size() / 4 * 3);
+  for (int row = height - 1; row >= 0; --row) {  // the library's rows begin at the bottom
+    const std::uint8_t* from = rgba.data() + std::size_t(row) * std::size_t(width) * 4;
+    for (int column = 0; column < width; ++column, from += 4) pixels.rgb.insert(pixels.rgb.end(), from, from + 3);
+  }
+  return pixels;
+}
+
+}  // namespace intervale

@@ -1,0 +1,48 @@
+// OpenGL ES 3 without a display: Mesa's EGL, found when the first picture is drawn, so that machines that draw none need none of it.
+#pragma once
+
+#include <EGL/egl.h>
+#include <GLES3/gl3.h>
+
+#include "common/result.h"
+
+namespace intervale {
+
+// The functions that a Canvas calls, by the library's own names without "gl".
+#define INTERVALE_GL_FUNCTIONS(F)                                                                                                                  \
+  F(AttachShader)                                                                                                                                  \
+  F(BindBuffer)                                                                                                                                    \
+  F(BindFramebuffer)                                                                                                                               \
+  F(BindRenderbuffer) F(BindVertexArray) F(BlitFramebuffer) F(BufferData) F(CheckFramebufferStatus) F(Clear) F(CompileShader) F(CreateProgram)     \
+      F(CreateShader) F(CullFace) F(DepthMask) F(Disable) F(DrawArrays) F(Enable) F(EnableVertexAttribArray) F(FramebufferRenderbuffer)            \
+          F(GenBuffers) F(GenFramebuffers) F(GenRenderbuffers) F(GenVertexArrays) F(GetError) F(GetIntegerv) F(GetProgramiv) F(GetShaderInfoLog)   \
+              F(GetShaderiv) F(GetUniformLocation) F(LinkProgram) F(PolygonOffset) F(ReadPixels) F(RenderbufferStorageMultisample) F(ShaderSource) \
+                  F(Uniform1f) F(Uniform2fv) F(Uniform3fv) F(UniformMatrix3fv) F(UniformMatrix4fv) F(UseProgram) F(VertexAttribIPointer)           \
+                      F(VertexAttribPointer) F(Viewport)
+
+struct Gl {
+#define INTERVALE_GL_MEMBER(name) decltype(&::gl##name) name = nullptr;
+  INTERVALE_GL_FUNCTIONS(INTERVALE_GL_MEMBER)
+#undef INTERVALE_GL_MEMBER
+};
+
+// A context that is current in the thread that made it, as long as it lives; what is made in it goes with it. One thread.
+class GlContext {
+ public:
+  // Fails, with what to install, where there is no EGL or it has no OpenGL ES 3 without a display.
+  static Result<GlContext> create();
+  GlContext(GlContext&& other) noexcept;
+  GlContext& operator=(GlContext&&) = delete;
+  ~GlContext();
+
+  [[nodiscard]] const Gl& gl() const { return gl_; }
+
+ private:
+  GlContext() = default;
+  struct Egl;
+  const Egl* egl_ = nullptr;
+  EGLContext context_ = EGL_NO_CONTEXT;
+  Gl gl_;
+};
+
+}  // namespace intervale

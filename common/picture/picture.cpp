@@ -1,0 +1,46 @@
+#include "common/picture/picture.h"
+
+#include <fmt/core.h>
+
+#include <cstdint>
+#include <string>
+
+#include "common/picture/canvas.h"
+#include "common/picture/png_file.h"
+#include "common/picture/triangles.h"
+#include "common/picture/viewpoint.h"
+
+namespace intervale {
+namespace {
+
+// Four samples a pixel with depths are 32 bytes: about a gigabyte. The screens called 8K have a few less.
+constexpr std::int64_t kMostPixels = std::int64_t{1} << 25;
+
+}  // namespace
+
+Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera) {
+  const std::string ending = options.file.extension().string();
+  if (!ending.empty() && ending != ".png" && ending != ".PNG")
+    return misuse("cannot draw '" + options.file.string() + "': pictures are PNG files; name it .png");
+  if (options.clip) {
+    if (auto checked = check_plane(*options.clip); !checked) return checked;
+  }
+  if (!camera) return {};
+  const auto [width, height] = camera->viewport;
+  if (std::int64_t{width} * height > kMostPixels)
+    return misuse(fmt::format("a picture has at most {} pixels, not {} x {}; take a smaller viewport", kMostPixels, width, height));
+  return {};
+}
+
+Result<void> write_picture(const PictureOptions& options, const Mesh& mesh, const Box& box, const std::optional<Camera>& camera) {
+  const Camera seen_from = camera ? *camera : three_quarter_view(box, options.clip);
+  const Viewpoint viewpoint(seen_from, box);
+  auto canvas = Canvas::create(seen_from.viewport, viewpoint);
+  if (!canvas) return tl::unexpected(canvas.error());
+  for_each_triangle(mesh, {options.clip, options.edges}, viewpoint, [&canvas](std::span<const Corner> corners) { canvas->draw(corners); });
+  const auto pixels = canvas->finish();
+  if (!pixels) return tl::unexpected(pixels.error());
+  return write_png(options.file, *pixels);
+}
+
+}  // namespace intervale

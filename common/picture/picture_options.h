@@ -1,0 +1,15 @@
+// The options of a picture, the same for every program that draws one.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+
+#include "common/picture/picture.h"
+
+namespace intervale {
+
+// Adds --image, --clip and --edges, which fill picture when the arguments are read; without --image it stays empty, and the others are wrong usage.
+// What they say is for check_picture to check. picture must outlive app.
+void add_picture_options(CLI::App& app, std::optional<PictureOptions>& picture);
+
+}  // namespace intervale

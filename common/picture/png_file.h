@@ -1,0 +1,13 @@
+// PNG files.
+#pragma once
+
+#include <filesystem>
+
+#include "common/picture/canvas.h"
+
+namespace intervale {
+
+// Writes aside and renames. At least one pixel.
+Result<void> write_png(const std::filesystem::path& path, const Pixels& pixels);
+
+}  // namespace intervale

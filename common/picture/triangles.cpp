@@ -1,0 +1,150 @@
+#include "common/picture/triangles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "common/mesh_writer.h"
+
+namespace intervale {
+namespace {
+
+using Vector = std::array<double, 3>;
+using Triangle = std::array<std::uint32_t, 3>;
+
+constexpr std::size_t kAtOnce = 3 * 16384;
+
+Vector minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+Vector mixed(const Vector& a, const Vector& b, double t) { return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])}; }
+
+// 0 stays 0.
+Vector unit_of(const Vector& v) {
+  const double length = std::hypot(v[0], v[1], v[2]);
+  return length > 0 ? Vector{v[0] / length, v[1] / length, v[2] / length} : Vector{};
+}
+
+Vector normal_of(const Vector& a, const Vector& b, const Vector& c) { return unit_of(cross(minus(b, a), minus(c, a))); }
+
+// The surfaces' triangles have all their points on one of them; every other one is part of a side of the box, where a surface leaves lines only.
+Part part_of(const Mesh& mesh, const Triangle& t) {
+  const Surface surface = mesh.surface[t[0]];
+  if (surface == Surface::inside || mesh.surface[t[1]] != surface || mesh.surface[t[2]] != surface) return Part::box;
+  return surface == Surface::alpha ? Part::alpha : Part::beta;
+}
+
+std::vector<std::array<float, 3>> smooth_normals(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+  std::vector<std::array<float, 3>> normals(mesh.points.size());
+  for (const Triangle& t : triangles) {
+    if (part_of(mesh, t) == Part::box) continue;
+    const Vector normal = normal_of(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector& at = mesh.points[t[i]];
+      const Vector u = unit_of(minus(mesh.points[t[(i + 1) % 3]], at)), v = unit_of(minus(mesh.points[t[(i + 2) % 3]], at));
+      const double angle = std::acos(std::clamp(dot(u, v), -1.0, 1.0));
+      for (std::size_t axis = 0; axis < 3; ++axis) normals[t[i]][axis] += float(angle * normal[axis]);
+    }
+  }
+  return normals;
+}
+
+// Convex, counterclockwise; `count` of the corners. Side i leads from corner i to the next.
+struct Polygon {
+  unsigned count = 0;
+  std::array<Vector, 4> corners{}, normals{};
+  std::array<bool, 4> drawn{};
+
+  void add(const Vector& corner, const Vector& normal, bool side_drawn) {
+    corners[count] = corner;
+    normals[count] = normal;
+    drawn[count++] = side_drawn;
+  }
+};
+
+// What is left of a triangle behind the plane. The side along the plane is not drawn: it is the cut's.
+Polygon clipped(const Polygon& triangle, const std::array<double, 3>& distances) {
+  Polygon kept;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    const double here = distances[i], there = distances[j];
+    if (here < 0) kept.add(triangle.corners[i], triangle.normals[i], triangle.drawn[i]);
+    if ((here < 0) == (there < 0)) continue;
+    const bool leaves = here < 0;
+    const std::size_t in = leaves ? i : j, out = leaves ? j : i;
+    const Vector point = crossing(triangle.corners[in], distances[in], triangle.corners[out], distances[out]);
+    const double t = distances[in] / (distances[in] - distances[out]);
+    kept.add(point, unit_of(mixed(triangle.normals[in], triangle.normals[out], t)), !leaves && triangle.drawn[i]);
+  }
+  return kept;
+}
+
+class Batch {
+ public:
+  Batch(const Viewpoint& viewpoint, const std::function<void(std::span<const Corner>)>& take) : viewpoint_(viewpoint), take_(take) {
+    corners_.reserve(kAtOnce);
+  }
+
+  void add(const Polygon& polygon, Part part) {
+    for (unsigned i = 1; i + 1 < polygon.count; ++i) {
+      const bool first = i == 1, last = i + 2 == polygon.count;
+      const bool opposite_0 = polygon.drawn[i], opposite_1 = last && polygon.drawn[i + 1], opposite_2 = first && polygon.drawn[0];
+      const std::uint32_t look = std::uint32_t(part) | unsigned(opposite_0) << 2 | unsigned(opposite_1) << 3 | unsigned(opposite_2) << 4;
+      for (const unsigned corner : {0u, i, i + 1}) {
+        const Vector& n = polygon.normals[corner];
+        corners_.push_back({viewpoint_.in_scene(polygon.corners[corner]), {float(n[0]), float(n[1]), float(n[2])}, look});
+      }
+      if (corners_.size() == kAtOnce) flush();
+    }
+  }
+
+  void flush() {
+    if (!corners_.empty()) take_(corners_);
+    corners_.clear();
+  }
+
+ private:
+  const Viewpoint& viewpoint_;
+  const std::function<void(std::span<const Corner>)>& take_;
+  std::vector<Corner> corners_;
+};
+
+void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch) {
+  const std::vector<Triangle> triangles = boundary_triangles(mesh);
+  const auto smooth = smooth_normals(mesh, triangles);
+  const std::vector<double> distances = options.clip ? distances_beyond(mesh, *options.clip) : std::vector<double>{};
+  for (const Triangle& t : triangles) {
+    const Part part = part_of(mesh, t);
+    const Vector flat = normal_of(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
+    if (flat == Vector{}) continue;
+    Polygon polygon;
+    for (const std::uint32_t point : t) {
+      const Vector normal = part == Part::box ? Vector{} : unit_of({smooth[point][0], smooth[point][1], smooth[point][2]});
+      polygon.add(mesh.points[point], normal == Vector{} ? flat : normal, options.edges);
+    }
+    if (options.clip) polygon = clipped(polygon, {distances[t[0]], distances[t[1]], distances[t[2]]});
+    batch.add(polygon, part);
+  }
+}
+
+void add_cut(const Mesh& mesh, const Plane& plane, Batch& batch) {
+  const Vector normal = unit_of(plane.normal);
+  for (const TetCut& cut : plane_cut(mesh, plane)) {
+    Polygon polygon;
+    for (std::size_t i = 0; i < cut.count; ++i) polygon.add(cut.corners[i], normal, true);
+    batch.add(polygon, Part::cut);
+  }
+}
+
+}  // namespace
+
+void for_each_triangle(const Mesh& mesh, const TriangleOptions& options, const Viewpoint& viewpoint,
+                       const std::function<void(std::span<const Corner>)>& take) {
+  Batch batch(viewpoint, take);
+  add_boundary(mesh, options, batch);
+  if (options.clip) add_cut(mesh, *options.clip, batch);
+  batch.flush();
+}
+
+}  // namespace intervale

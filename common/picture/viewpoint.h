@@ -1,0 +1,29 @@
+// Where a picture is seen from, and how that puts points of the world onto it.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "common/lod.h"
+#include "common/plane_cut.h"
+
+namespace intervale {
+
+// A camera with the whole box in its picture of 1280 x 960 pixels, from above and aside. A cut is seen from its open side. The box is not a point.
+[[nodiscard]] Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip);
+
+// The scene: the world moved and scaled so that the box's corners lie on the sphere of radius 1 around the origin. Floats suffice there.
+struct Viewpoint {
+  Viewpoint(const Camera& camera, const Box& box);  // a camera that check_lod lets pass
+
+  [[nodiscard]] std::array<float, 3> in_scene(const std::array<double, 3>& world) const;
+
+  std::array<double, 3> centre;         // the scene's origin, in the world
+  double unit;                          // a length of 1 in the scene, in the world
+  std::array<float, 3> eye;             // in the scene
+  std::array<float, 9> rotation;        // from the scene to right, up and towards the viewer; column by column, as the next
+  std::array<float, 16> projection;     // from the scene to OpenGL's clip coordinates
+  std::array<float, 2> nearest_to_far;  // distances ahead of the eye between which the scene lies
+};
+
+}  // namespace intervale

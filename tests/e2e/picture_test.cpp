@@ -1,0 +1,212 @@
+// Pictures as their users have them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/e2e/support/programs.h"
+#include "tests/support/temp_dir.h"
+
+namespace intervale {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+using Colour = std::array<int, 3>;
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;
+  [[nodiscard]] Colour at(int x, int y) const {
+    const auto* p = rgb.data() + 3 * (std::size_t(y) * std::size_t(width) + std::size_t(x));
+    return {p[0], p[1], p[2]};
+  }
+};
+
+Image read_png(const std::filesystem::path& path) {
+  png_image head{};
+  head.version = PNG_IMAGE_VERSION;
+  EXPECT_NE(png_image_begin_read_from_file(&head, path.c_str()), 0) << head.message;
+  head.format = PNG_FORMAT_RGB;
+  Image image{int(head.width), int(head.height), std::vector<std::uint8_t>(PNG_IMAGE_SIZE(head))};
+  EXPECT_NE(png_image_finish_read(&head, nullptr, image.rgb.data(), 0, nullptr), 0) << head.message;
+  return image;
+}
+
+enum class Hue { background, blue, orange, sand, other };
+
+// The background is light and grey, nearly; sand is light and yellow.
+Hue hue(const Colour& c) {
+  const auto [r, g, b] = c;
+  if (b > r + 30 && b > g + 15) return Hue::blue;
+  if (r > b + 80 && r > g + 40) return Hue::orange;
+  if (r > b + 25 && g > b + 15 && r > 110) return Hue::sand;
+  if (std::min({r, g, b}) > 200 && std::max({r, g, b}) - std::min({r, g, b}) < 20) return Hue::background;
+  return Hue::other;
+}
+
+double share(const Image& image, Hue wanted) {
+  int count = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) count += hue(image.at(x, y)) == wanted ? 1 : 0;
+  return double(count) / (image.width * image.height);
+}
+
+// The buckyball's shape would have to be known: a thick shell of a ball instead, in [0, 32]^3, alpha at radius 14 and beta at 8.
+const std::filesystem::path& ball() {
+  static const TempDir folder;
+  static const std::filesystem::path path = [] {
+    std::string samples;
+    for (int z = 0; z < 33; ++z)
+      for (int y = 0; y < 33; ++y)
+        for (int x = 0; x < 33; ++x) samples += char(std::lround(255 - 8 * std::hypot(x - 16, y - 16, z - 16)));
+    const auto raw = folder.file("ball.raw", samples);
+    const Finished built =
+        run({program("intervale"), "build", raw, "--dims", "33", "33", "33", "--type", "u8", "--range", "143", "191", "-o", folder / "ball.ivm"});
+    EXPECT_EQ(built.status, 0) << built.err;
+    return folder / "ball.ivm";
+  }();
+  return path;
+}
+
+Finished extract(const std::filesystem::path& file, const std::string& options, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments{program("intervale"), "extract", file};
+  std::istringstream words(options);
+  for (std::string word; words >> word;) arguments.push_back(word);
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run(arguments);
+}
+
+Image drawn(const std::filesystem::path& file, const std::string& options) {
+  const TempDir folder;
+  const Finished done = extract(file, options, {"--image", folder / "x.png"});
+  EXPECT_EQ(done.status, 0) << done.err;
+  EXPECT_EQ(done.err, "");
+  EXPECT_THAT(done.out, HasSubstr("x.png"));
+  return read_png(folder / "x.png");
+}
+
+TEST(Pictures, OfABallIsBlueInTheMiddle) {
+  const Image image = drawn(ball(), "");
+  EXPECT_EQ(image.width, 1280);
+  EXPECT_EQ(image.height, 960);
+  EXPECT_EQ(hue(image.at(640, 480)), Hue::blue);
+  for (const auto& [x, y] : {std::pair(0, 0), {1279, 0}, {0, 959}, {1279, 959}}) EXPECT_EQ(hue(image.at(x, y)), Hue::background) << x << ' ' << y;
+  EXPECT_EQ(share(image, Hue::orange), 0);
+  EXPECT_GT(share(image, Hue::blue), 0.1);
+}
+
+// 32 units of height in 640 pixels at the depth of the middle, nearly: 20 pixels a unit.
+TEST(Pictures, ACutShowsSandAroundOrange) {
+  const std::string view = "--eye 16 16 916 --look-at 16 16 16 --fov 2.037 --viewport 800 640 --pixel-error 0.1 ";
+  const Image whole = drawn(ball(), view);
+  EXPECT_EQ(whole.width, 800);
+  EXPECT_EQ(whole.height, 640);
+  EXPECT_EQ(hue(whole.at(400, 320)), Hue::blue);
+  EXPECT_EQ(hue(whole.at(400 + 260, 320)), Hue::blue);
+  EXPECT_EQ(hue(whole.at(400 + 300, 320)), Hue::background);
+
+  const Image cut = drawn(ball(), view + "--clip 16 16 16.3 0 0 1");
+  EXPECT_EQ(hue(cut.at(400, 320)), Hue::orange);
+  EXPECT_EQ(hue(cut.at(400 + 300, 320)), Hue::background);
+  const double pixels = 800.0 * 640, ring = 3.14159 * (14 * 14 - 8 * 8) * 400 / pixels, hollow = 3.14159 * 64 * 400 / pixels;
+  EXPECT_NEAR(share(cut, Hue::sand), ring, 0.25 * ring);       // less what the lines take
+  EXPECT_NEAR(share(cut, Hue::orange), hollow, 0.2 * hollow);  // less its dark rim
+  EXPECT_LT(share(cut, Hue::blue), 0.002);
+
+  const Image away = drawn(ball(), view + "--clip 16 16 16 0 0 1 --roi 0 0 0 1 1 1 --error 1e9");  // hardly anything is left of it
+  EXPECT_EQ(away.width, 800);
+}
+
+TEST(Pictures, FromWithinShowTheInsideOfABall) {
+  const Image image = drawn(ball(), "--eye 16 16 16 --look-at 16 16 0 --viewport 200 200 --pixel-error 0.5");
+  EXPECT_GT(share(image, Hue::orange), 0.9);
+}
+
+TEST(Pictures, FetchDrawsWhatExtractDraws) {
+  ServerProgram server;
+  const TempDir folder;
+  for (const std::string& options :
+       {std::string("--error-percent 20"), std::string(),
+        std::string("--eye 1.2 0.1 -2.5 --look-at 0 0 0 --viewport 640 480 --pixel-error 2 --clip 0 0 0 0 0 -1 --edges")}) {
+    SCOPED_TRACE(options);
+    const Image expected = drawn(buckyball(), options);
+    std::vector<std::string> fetch{program("intervale-client"), "fetch", server.url("buckyball"), "--image", folder / "fetch.png"};
+    std::istringstream words(options);
+    for (std::string word; words >> word;) fetch.push_back(word);
+    const Finished fetched = run(fetch);
+    ASSERT_EQ(fetched.status, 0) << fetched.err;
+    const Image got = read_png(folder / "fetch.png");
+    ASSERT_EQ(got.rgb.size(), expected.rgb.size());
+    EXPECT_GT(share(got, Hue::blue), 0.02);
+    // The same mesh in another order: normals are summed up in that, and may be rounded otherwise.
+    std::size_t differ = 0;
+    for (std::size_t i = 0; i < got.rgb.size(); ++i) differ += std::abs(int(got.rgb[i]) - int(expected.rgb[i])) > 2 ? 1 : 0;
+    EXPECT_LE(differ, got.rgb.size() / 5000);
+  }
+}
+
+TEST(Pictures, GoWithAMeshFileAndWithFigures) {
+  const TempDir folder;
+  const Finished done = extract(ball(), "--json", {"--image", folder / "x.png", "-o", folder / "x.ply"});
+  EXPECT_EQ(done.status, 0) << done.err;
+  EXPECT_THAT(done.out, StartsWith("{"));
+  EXPECT_THAT(contents_of(folder / "x.ply"), StartsWith("ply"));
+  EXPECT_EQ(read_png(folder / "x.png").width, 1280);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);  // nothing is left beside them
+}
+
+TEST(Pictures, OfNothingAreBackground) {
+  const TempDir folder;
+  const auto raw = folder.file("zeros.raw", std::string(27, '\0'));
+  const Finished built =
+      run({program("intervale"), "build", raw, "--dims", "3", "3", "3", "--type", "u8", "--range", "5", "9", "-o", folder / "empty.ivm"});
+  ASSERT_EQ(built.status, 0) << built.err;
+  const Image image = drawn(folder / "empty.ivm", "--clip 0 0 0 1 0 0 --edges");
+  EXPECT_EQ(share(image, Hue::background), 1);
+}
+
+TEST(Pictures, WhatCannotBeDrawnIsOneLine) {
+  const TempDir folder;
+  const auto complaint = [&](const std::string& options, const std::string& name, int status, const std::string& about) {
+    const Finished done = extract(ball(), options, {"--image", folder / name});
+    EXPECT_EQ(done.status, status) << done.err;
+    EXPECT_THAT(done.err, HasSubstr(about));
+    EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
+    EXPECT_EQ(done.out, "");
+  };
+  complaint("--clip 0 0 0 0 0 0", "x.png", 2, "normal");
+  complaint("--clip 0 0 0 nan 0 1", "x.png", 2, "finite");
+  complaint("--clip 0 0 0 1", "x.png", 2, "--clip");
+  complaint("", "x.jpg", 2, ".png");
+  complaint("", "none/x.png", 1, "does not exist");
+  complaint("--eye 0 0 99 --look-at 0 0 0 --viewport 65535 65535", "x.png", 2, "smaller viewport");
+  complaint("--eye 0 0 99 --look-at 0 0 0 --viewport 65535 64", "x.png", 2, "each way");
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  const Finished without = extract(ball(), "--clip 0 0 0 0 0 1", {});
+  EXPECT_EQ(without.status, 2);
+  EXPECT_THAT(without.err, HasSubstr("--image"));
+}
+
+TEST(Pictures, AMachineWithoutEglIsOneLine) {
+  const TempDir folder;
+  const Finished done = run(
+      {"/usr/bin/env", "__EGL_VENDOR_LIBRARY_DIRS=" + folder.path().string(), program("intervale"), "extract", ball(), "--image", folder / "x.png"});
+  EXPECT_EQ(done.status, 1);
+  EXPECT_THAT(done.err, StartsWith("intervale: cannot draw a picture: "));
+  EXPECT_THAT(done.err, HasSubstr("libegl1"));
+  EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+}  // namespace
+}  // namespace intervale
