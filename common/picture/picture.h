@@ -23,8 +23,9 @@ struct PictureOptions {
 [[nodiscard]] Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera);
 
 // Draws what the camera sees, as large as its viewport, and writes it, aside and renamed. Without a camera: the whole box, from above and aside,
-// 1280 x 960 pixels. An empty mesh gives the background. Equal arguments give equal pictures on one machine. Options that check_picture lets
-// pass. Takes some 0.3 s and a second for a few million triangles; fails where there is no EGL, with what to install. One thread at a time.
+// 1280 x 960 pixels. An empty mesh gives the background. Equal meshes give equal pictures on one machine, whatever
+// the order of their points and tetrahedra. Options that check_picture lets pass. Takes some 0.3 s, and a second for a million triangles; fails where
+// there is no EGL, with what to install. One thread at a time.
 [[nodiscard]] Result<void> write_picture(const PictureOptions& options, const Mesh& mesh, const Box& box, const std::optional<Camera>& camera);
 
 }  // namespace intervale

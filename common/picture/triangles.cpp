@@ -35,8 +35,21 @@ Part part_of(const Mesh& mesh, const Triangle& t) {
   return surface == Surface::alpha ? Part::alpha : Part::beta;
 }
 
-std::vector<std::array<float, 3>> smooth_normals(const Mesh& mesh, const std::vector<Triangle>& triangles) {
-  std::vector<std::array<float, 3>> normals(mesh.points.size());
+// Beginning with the corner that is least by its coordinates. The order of a mesh's points and tetrahedra is not told by what the mesh is, and what
+// is drawn should be: rounding follows the order of corners.
+std::vector<Triangle> ordered_boundary(const Mesh& mesh) {
+  std::vector<Triangle> triangles = boundary_triangles(mesh);
+  for (Triangle& t : triangles)
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end(), [&](auto a, auto b) { return mesh.points[a] < mesh.points[b]; }), t.end());
+  return triangles;
+}
+
+// In whole steps of 2^-20, so that their sums do not depend on the triangles' order. Not of length 1.
+using SmoothNormal = std::array<std::int32_t, 3>;
+constexpr double kNormalSteps = 1 << 20;
+
+std::vector<SmoothNormal> smooth_normals(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+  std::vector<SmoothNormal> normals(mesh.points.size());
   for (const Triangle& t : triangles) {
     if (part_of(mesh, t) == Part::box) continue;
     const Vector normal = normal_of(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
@@ -44,7 +57,7 @@ std::vector<std::array<float, 3>> smooth_normals(const Mesh& mesh, const std::ve
       const Vector& at = mesh.points[t[i]];
       const Vector u = unit_of(minus(mesh.points[t[(i + 1) % 3]], at)), v = unit_of(minus(mesh.points[t[(i + 2) % 3]], at));
       const double angle = std::acos(std::clamp(dot(u, v), -1.0, 1.0));
-      for (std::size_t axis = 0; axis < 3; ++axis) normals[t[i]][axis] += float(angle * normal[axis]);
+      for (std::size_t axis = 0; axis < 3; ++axis) normals[t[i]][axis] += std::int32_t(std::lround(angle * normal[axis] * kNormalSteps));
     }
   }
   return normals;
@@ -111,7 +124,7 @@ class Batch {
 };
 
 void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch) {
-  const std::vector<Triangle> triangles = boundary_triangles(mesh);
+  const std::vector<Triangle> triangles = ordered_boundary(mesh);
   const auto smooth = smooth_normals(mesh, triangles);
   const std::vector<double> distances = options.clip ? distances_beyond(mesh, *options.clip) : std::vector<double>{};
   for (const Triangle& t : triangles) {
@@ -120,7 +133,7 @@ void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch
     if (flat == Vector{}) continue;
     Polygon polygon;
     for (const std::uint32_t point : t) {
-      const Vector normal = part == Part::box ? Vector{} : unit_of({smooth[point][0], smooth[point][1], smooth[point][2]});
+      const Vector normal = part == Part::box ? Vector{} : unit_of({double(smooth[point][0]), double(smooth[point][1]), double(smooth[point][2])});
       polygon.add(mesh.points[point], normal == Vector{} ? flat : normal, options.edges);
     }
     if (options.clip) polygon = clipped(polygon, {distances[t[0]], distances[t[1]], distances[t[2]]});
@@ -132,7 +145,9 @@ void add_cut(const Mesh& mesh, const Plane& plane, Batch& batch) {
   const Vector normal = unit_of(plane.normal);
   for (const TetCut& cut : plane_cut(mesh, plane)) {
     Polygon polygon;
-    for (std::size_t i = 0; i < cut.count; ++i) polygon.add(cut.corners[i], normal, true);
+    const auto corners = std::span(cut.corners).first(cut.count);
+    const auto least = std::size_t(std::min_element(corners.begin(), corners.end()) - corners.begin());
+    for (std::size_t i = 0; i < cut.count; ++i) polygon.add(corners[(least + i) % cut.count], normal, true);
     batch.add(polygon, Part::cut);
   }
 }

@@ -29,7 +29,8 @@ struct TriangleOptions {
 
 // Hands the corners over, three by three, counterclockwise seen from outside; some ten thousand at a time, valid during the call. Normals of the
 // alpha and of the beta surface are smooth: of its triangles around the point, weighted by their angles there (Thuermer and Wuethrich, Computing
-// Vertex Normals from Polygonal Facets, 1998). Triangles without an area are left out. O(points + tetrahedra).
+// Vertex Normals from Polygonal Facets, 1998). Triangles without an area are left out. Which triangles come, and
+// how their corners follow each other, depends on where points lie and not on their numbers. O(points + tetrahedra).
 void for_each_triangle(const Mesh& mesh, const TriangleOptions& options, const Viewpoint& viewpoint,
                        const std::function<void(std::span<const Corner>)>& take);
 
