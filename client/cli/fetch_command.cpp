@@ -9,6 +9,7 @@
 
 #include "client/cli/commands.h"
 #include "client/net/fetch.h"
+#include "common/mesh_digest.h"
 #include "common/mesh_writer.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
@@ -23,6 +24,7 @@ struct FetchCommand {
   FetchOptions fetch;
   std::optional<std::filesystem::path> output;
   std::optional<PictureOptions> picture;
+  bool digest = false;
   bool json = false;
 };
 
@@ -62,20 +64,23 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
   const FetchFigures& figures = fetched.figures;
   const double volume = volume_of(mesh);
   if (options.json) {
-    return print_json({{"updates", fetched.client.updates_in_mesh()},
-                       {"vertices", mesh.points.size()},
-                       {"tets", mesh.tets.size()},
-                       {"volume", volume},
-                       {"bytes_received", figures.bytes_received},
-                       {"messages", figures.messages},
-                       {"reconnects", figures.reconnects},
-                       {"seconds_first_mesh", figures.seconds_first_mesh},
-                       {"seconds", figures.seconds}});
+    nlohmann::ordered_json json{{"updates", fetched.client.updates_in_mesh()},
+                                {"vertices", mesh.points.size()},
+                                {"tets", mesh.tets.size()},
+                                {"volume", volume},
+                                {"bytes_received", figures.bytes_received},
+                                {"messages", figures.messages},
+                                {"reconnects", figures.reconnects},
+                                {"seconds_first_mesh", figures.seconds_first_mesh},
+                                {"seconds", figures.seconds}};
+    if (options.digest) json["digest"] = mesh_digest(mesh);
+    return print_json(json);
   }
   std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}\n", fetched.client.description().name,
                                  fetched.client.updates_in_mesh(), mesh.points.size(), mesh.tets.size(), volume);
   text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(figures.bytes_received),
                       figures.messages, 1000 * figures.seconds_first_mesh, figures.complete ? "all" : "budget reached", 1000 * figures.seconds);
+  if (options.digest) text += "digest " + mesh_digest(mesh) + "\n";
   if (options.output) text += "wrote " + options.output->string() + "\n";
   if (options.picture) text += "drew " + options.picture->file.string() + "\n";
   return print(text);
@@ -122,6 +127,7 @@ void add_fetch_command(Program& program) {
           "--reconnect", [options](unsigned seconds) { options->fetch.reconnect = std::chrono::seconds(seconds); },
           "How long to try to reach a lost server again, with what came so far (default 30; 0: not at all)")
       ->type_name("SECONDS");
+  add_digest_flag(command, options->digest);
   add_json_flag(command, options->json);
 }
 

@@ -153,7 +153,9 @@ Result<void> ViewingSession::take(const protocol::Done& done) {
   figures_.done = true;
   figures_.full = done.full;
   if (!done.full) {
-    figures_.remaining_error = figures_.remaining_pixels = 0;
+    const bool has_all = client_->updates() == client_->description().updates;
+    figures_.remaining_error = 0;
+    figures_.remaining_pixels = has_all || view_->region ? 0 : view_->camera.pixel_error;
     figures_.updates_to_go = 0;
   }
   return {};

@@ -42,7 +42,7 @@ class ViewingSession {
     std::uint64_t resumed = 0;   // of those, such as went on where another one was
     // The server's word on what this view wants and has not come; bounds from above.
     double remaining_error = 0;   // field units
-    double remaining_pixels = 0;  // on the camera's screen; 0 for a region
+    double remaining_pixels = 0;  // on the camera's screen; when done, what it asked for, or 0 if nothing is left; 0 for a region
     std::uint64_t updates_to_go = 0;
     bool done = false;  // all that the view wants has come
     bool full = false;  // ... that there is room for

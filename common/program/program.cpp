@@ -92,6 +92,9 @@ int Program::complain(const std::string& message, ExitStatus status) const {
 }
 
 CLI::Option* add_json_flag(CLI::App& app, bool& json) { return app.add_flag("--json", json, "Print the figures as one JSON object"); }
+CLI::Option* add_digest_flag(CLI::App& app, bool& digest) {
+  return app.add_flag("--digest", digest, "Say the mesh's digest too: equal for equal meshes, whatever the order of what is in them");
+}
 
 Result<void> print(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0) return {};

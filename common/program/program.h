@@ -51,6 +51,8 @@ class Program {
 
 // --json: one JSON object on stdout and nothing else there.
 CLI::Option* add_json_flag(CLI::App& app, bool& json);
+// --digest: what mesh_digest says of the mesh is among the figures.
+CLI::Option* add_digest_flag(CLI::App& app, bool& digest);
 
 // Prints to stdout and sees that it arrived (a full disk or a closed pipe is a failure): text as it stands; an object on one line.
 Result<void> print(const std::string& text);

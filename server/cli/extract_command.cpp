@@ -9,6 +9,7 @@
 
 #include "common/extraction.h"
 #include "common/ivm_file.h"
+#include "common/mesh_digest.h"
 #include "common/mesh_writer.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
@@ -26,6 +27,7 @@ struct ExtractCommand {
   std::optional<PictureOptions> picture;
   Lod lod;
   unsigned threads = 0;
+  bool digest = false;
   bool json = false;
 };
 
@@ -60,11 +62,14 @@ Result<void> run(const ExtractCommand& options) {
   }
   const double enclosed = volume_of(mesh);
   if (options.json) {
-    return print_json(
-        {{"updates", extracted->updates}, {"vertices", mesh.points.size()}, {"tets", mesh.tets.size()}, {"volume", enclosed}, {"seconds", seconds}});
+    nlohmann::ordered_json json{
+        {"updates", extracted->updates}, {"vertices", mesh.points.size()}, {"tets", mesh.tets.size()}, {"volume", enclosed}, {"seconds", seconds}};
+    if (options.digest) json["digest"] = mesh_digest(mesh);
+    return print_json(json);
   }
   std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", (*volume)->description().name,
                                  extracted->updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
+  if (options.digest) text += "digest " + mesh_digest(mesh) + "\n";
   if (options.output) text += "wrote " + options.output->string() + "\n";
   if (options.picture) text += "drew " + options.picture->file.string() + "\n";
   return print(text);
@@ -83,6 +88,7 @@ void add_extract_command(Program& program) {
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);
   command.add_option("--threads", options->threads, "0: one for each core")->capture_default_str();
+  add_digest_flag(command, options->digest);
   add_json_flag(command, options->json);
 }
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "client/core/stream_client.h"
-#include "client/view/plane_cut.h"
+#include "client/view/cross_section.h"
 #include "client/view/tets_in_box.h"
 #include "common/extraction.h"
 #include "common/mesh_writer.h"
@@ -215,7 +215,7 @@ TEST_P(SkinOf, CutsAddUpToTheVolume) {
     const double step = (high - low) / kCuts;
     double sum = 0;
     for (int n = 0; n < kCuts; ++n) {
-      const auto cut = plane_cut(skin, {direction, low + (n + 0.5) * step});
+      const auto cut = cross_section(skin, {direction, low + (n + 0.5) * step});
       ASSERT_EQ(cut.size() % 3, 0u);
       for (std::size_t i = 0; i < cut.size(); i += 3) {
         const auto from = [&](std::size_t k) {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "client/view/plane_cut.h"
+#include "client/view/cross_section.h"
 #include "client/view/skin.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
@@ -167,7 +167,7 @@ class Viewer {
   [[nodiscard]] bool is_stale() const { return stale_ || !skin_; }
   // Of a Cap, and of Tets, in messages.ts.
   val cap(const val& plane) const {
-    const auto vertices = plane_cut(*skin_, {three(plane["normal"]), plane["offset"].as<double>()});
+    const auto vertices = cross_section(*skin_, {three(plane["normal"]), plane["offset"].as<double>()});
     val cap = val::object();
     cap.set("vertices", buffer_of(vertices));
     cap.set("triangles", double(vertices.size() / 3));

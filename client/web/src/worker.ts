@@ -216,9 +216,10 @@ class Session {
     this.progressTimer = 0;
     this.progressAt = performance.now();
     const progress = this.viewer.progress();
+    const done = progress.done && !this.changed; // not before the page was sent the skin with all of it
     report({
       type: 'progress',
-      progress: { ...progress, memory: this.core.HEAPU8.byteLength, busy: { ...this.busy } },
+      progress: { ...progress, done, memory: this.core.HEAPU8.byteLength, busy: { ...this.busy } },
     });
   }
 

@@ -1,4 +1,4 @@
-#include "client/view/plane_cut.h"
+#include "client/view/cross_section.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,7 @@ class Cutter {
     }
   }
 
-  std::vector<CutVertex> run() {
+  std::vector<SectionVertex> run() {
     std::vector<Tet> tets;
     for (std::size_t number = 0; number < skin_.patches().supercubes(); ++number) {
       if (!may_meet(number)) continue;
@@ -97,11 +97,11 @@ class Cutter {
   Vector normal_;  // so that its product with a place in samples is the distance in world units
   double offset_ = 0;
   std::uint8_t level_ = 0;
-  std::vector<CutVertex> out_;
+  std::vector<SectionVertex> out_;
 };
 
 }  // namespace
 
-std::vector<CutVertex> plane_cut(const Skin& skin, const CutPlane& plane) { return Cutter(skin, plane).run(); }
+std::vector<SectionVertex> cross_section(const Skin& skin, const CutPlane& plane) { return Cutter(skin, plane).run(); }
 
 }  // namespace intervale

@@ -17,14 +17,14 @@ struct CutPlane {
 
 // side[k]: the distance from the triangle's side opposite to corner k, 255 there and 0 on that side; 255 at all three corners where that side is not
 // one of the cut tetrahedron's. So a shader can draw the cut tetrahedra's outlines.
-struct CutVertex {
+struct SectionVertex {
   float x = 0, y = 0, z = 0;  // samples
   std::array<std::uint8_t, 3> side{};
   std::uint8_t level = 0;  // as of SkinVertex
 };
-static_assert(sizeof(CutVertex) == 16);
+static_assert(sizeof(SectionVertex) == 16);
 
 // Triangles, three vertices each, that face the normal's side. By the skin's last update.
-[[nodiscard]] std::vector<CutVertex> plane_cut(const Skin& skin, const CutPlane& plane);
+[[nodiscard]] std::vector<SectionVertex> cross_section(const Skin& skin, const CutPlane& plane);
 
 }  // namespace intervale
