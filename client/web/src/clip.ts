@@ -5,36 +5,13 @@ import { short } from './format';
 import type { Frame } from './frame';
 import type { Handles } from './handles';
 import type { Box, Plane, Vec3 } from './messages';
+import { clamped, extent, holdOf, mainAxis, throughMiddle, tipOf, turnedTo } from './plane';
 import type { ViewState } from './state';
 import type { Store } from './store';
-import { add, along, corners, diagonal, dot, middle, scale, sub, turned, unit } from './vec';
+import { add, diagonal, dot, middle, scale, sub, turned } from './vec';
 
 const kStep = 0.01; // of the diagonal, by an arrow key
 const kTurnStep = Math.PI / 60;
-const kArm = 0.18; // of the diagonal, from one handle to the other
-
-// The least and the greatest offset at which a plane with this normal touches the box.
-export function extent(box: Box, normal: Vec3): [number, number] {
-  const offsets = corners(box).map((corner) => dot(normal, corner));
-  return [Math.min(...offsets), Math.max(...offsets)];
-}
-
-// Through the middle of the box, keeping what is on the side away from the normal.
-export const throughMiddle = (box: Box, normal: Vec3): Plane => ({ normal: unit(normal), offset: dot(unit(normal), middle(box)) });
-
-// Where the plane is held: nearest to the middle of the box.
-export const holdOf = (box: Box, plane: Plane): Vec3 => along(middle(box), plane.normal, plane.offset - dot(plane.normal, middle(box)));
-
-function clamped(box: Box, plane: Plane): Plane {
-  const [least, most] = extent(box, plane.normal);
-  return { normal: plane.normal, offset: Math.min(most, Math.max(least, plane.offset)) };
-}
-
-// Turned about the point where it is held.
-function turnedTo(box: Box, plane: Plane, normal: Vec3): Plane {
-  const n = unit(normal, plane.normal);
-  return clamped(box, { normal: n, offset: dot(n, holdOf(box, plane)) });
-}
 
 export class ClipControls {
   private last: Plane | null = null; // where it was when it was switched off
@@ -100,7 +77,6 @@ export class ClipControls {
       const [frame, plane] = [this.frame(), this.view.value.clip];
       return frame && plane ? { plane, at: holdOf(frame.box, plane), box: frame.box } : null;
     };
-    const arm = (box: Box) => kArm * diagonal(box);
     handles.add({
       label: 'Move the clip plane',
       icon: 'move',
@@ -117,18 +93,21 @@ export class ClipControls {
       icon: 'turn',
       at: () => {
         const now = held();
-        return now && along(now.at, now.plane.normal, arm(now.box));
+        return now && tipOf(now.box, now.plane);
       },
       begin: held,
       drag: (by, start) => {
         const from = start as ReturnType<typeof held>;
-        if (from) this.change((_, box) => turnedTo(box, from.plane, add(scale(from.plane.normal, arm(box)), by)));
+        if (from) this.change((_, box) => turnedTo(box, from.plane, add(tipOf(box, from.plane), by)));
       },
       nudge: (right, up) => {
         const pose = this.pose();
         if (!pose) return;
         const a = axes(pose);
-        this.change((plane, box) => turnedTo(box, plane, turned(turned(plane.normal, a.up, right * kTurnStep), a.right, -up * kTurnStep)));
+        this.change((plane, box) => {
+          const normal = turned(turned(plane.normal, a.up, right * kTurnStep), a.right, -up * kTurnStep);
+          return turnedTo(box, plane, add(holdOf(box, plane), normal));
+        });
       },
     });
   }
@@ -143,10 +122,4 @@ export class ClipControls {
     const part = dot(seen, seen);
     return part > 0.05 ? dot(by, seen) / part : dot(by, a.up);
   }
-}
-
-// The axis that v is nearest to, on v's side.
-function mainAxis(v: Vec3): Vec3 {
-  const i = [0, 1, 2].reduce((best, axis) => (Math.abs(v[axis]!) > Math.abs(v[best]!) ? axis : best), 0);
-  return [0, 1, 2].map((axis) => (axis === i ? Math.sign(v[i]!) || 1 : 0)) as Vec3;
 }

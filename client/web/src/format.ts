@@ -44,10 +44,12 @@ function superscript(n: number): string {
   return [...String(n)].map((c) => (c === '-' ? '⁻' : '⁰¹²³⁴⁵⁶⁷⁸⁹'[Number(c)]!)).join('');
 }
 
-// 1, 2 or 5 times a power of ten, no less than x.
+const kRound = [1, 1.5, 2, 3, 4, 5, 6, 8, 10];
+
+// The next round number, no less than x, and above 0.
 export function roundAbove(x: number): number {
   const power = 10 ** Math.floor(Math.log10(x));
-  return power * (x <= power ? 1 : x <= 2 * power ? 2 : x <= 5 * power ? 5 : 10);
+  return power * kRound.find((round) => x <= round * power * (1 + 1e-12))!;
 }
 
 export const sameJson = (a: unknown, b: unknown): boolean => JSON.stringify(a) === JSON.stringify(b);

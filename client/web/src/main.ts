@@ -21,6 +21,7 @@ import { Store } from './store';
 import { watchTheme } from './theme';
 import { Viewer } from './viewer';
 
+const kPictureLost = 'The graphics card has dropped the picture; it comes back as soon as the browser lets it. The mesh is still here.';
 const kHashMs = 300; // after the last change
 
 const view = new Store<ViewState>(fromHash(location.hash));
@@ -48,7 +49,7 @@ function start(): void {
   const movable: Movable = {
     pose: () => viewer.pose(),
     move: (pose) => view.set({ pose }),
-    centre: () => {},
+    centre: (x, y) => viewer.centre(x, y),
   };
   const handles = new Handles(element('handles'), canvas, () => viewer.pose());
   const clip = new ClipControls(view, () => viewer.frame, () => viewer.pose(), handles);
@@ -84,11 +85,12 @@ function start(): void {
     live.set({ skinVersion: version });
   };
   viewer.onResize = ask;
+  viewer.onContext = (lost) => live.set({ notice: lost ? kPictureLost : null });
   viewer.onDrawn = () => {
     const pose = viewer.pose();
     if (pose) showAxes(element('axes') as unknown as Element, pose);
     handles.place();
-    showLegend(view.value, viewer.picture.thicknessMost);
+    showLegend(view.value, viewer.picture.thickness.most);
   };
 
   const load = async () => {

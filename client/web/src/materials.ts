@@ -31,7 +31,7 @@ export const shared = {
   levels: { value: 1 },
   depths: { value: new Vector2(0, 1) },
   shrink: { value: 0.8 },
-  outline: { value: 0.75 },
+  outline: { value: 0.4 },
   alpha: { value: new Vector3() },
   beta: { value: new Vector3() },
   box: { value: new Vector3() },
@@ -122,5 +122,7 @@ export function overMaterial(fragment: string, own: Record<string, IUniform>): R
 export function lineMaterial(depthTest: boolean, opacity: number): RawShaderMaterial {
   return material(shaders.kLineVertex, shaders.kLineFragment, { ink: { value: new Vector4(1, 1, 1, opacity) } }, { ...kOver, depthTest });
 }
+
+export const distanceMaterial = () => material(shaders.kSkinVertex, shaders.kDistanceFragment, {});
 
 export const stagingMaterial = () => material(shaders.kStagingVertex, shaders.kStagingFragment, {});

@@ -26,6 +26,11 @@ export function watchPanel(view: Store<ViewState>, live: Store<Live>): void {
   watchSurfaces(view, live);
   watchSwitches(view);
   watchSliders(view);
+  live.watch(['tets'], ({ tets }) => {
+    const all = `${count(tets?.outOf ?? 0)} tetrahedra`;
+    const text = !tets ? '' : tets.count < tets.outOf ? `The region has ${all}: too many. ${count(tets.count)} of them are shown. A smaller region shows all.` : `${all} in the region`;
+    setText(element('tets-note'), text);
+  });
   live.watch(['datasets', 'dataset'], ({ datasets, dataset }) => showDatasets(datasets, dataset, (name) => view.set({ dataset: name, ...kOfTheBox })));
   element('panel-toggle').addEventListener('click', () => {
     const open = element('panel').classList.toggle('open');
@@ -90,13 +95,15 @@ function showDatasets(datasets: Listed[] | null, open: Listed | null, choose: (n
       const radio = Object.assign(document.createElement('input'), { type: 'radio', name: 'dataset', value: dataset.name, checked: dataset.name === open?.name });
       radio.addEventListener('change', () => choose(dataset.name));
       const name = Object.assign(document.createElement('span'), { className: 'name', textContent: dataset.name });
-      label.append(radio, name, Object.assign(document.createElement('small'), { textContent: summary(dataset) }));
+      label.append(radio, name, summary(dataset));
       return label;
     }),
   );
 }
 
-function summary(d: Listed): string {
-  const size = d.fullTets > 0 ? ` · ${count(d.fullTets)} tetrahedra, ${bytes(d.fullBytes)}` : '';
-  return `${d.dims.join(' × ')} · ${rangeText(d.range)}${size}`;
+function summary(d: Listed): HTMLElement {
+  const parts = [d.dims.join(' × '), rangeText(d.range), ...(d.fullTets > 0 ? [`${count(d.fullTets)} tetrahedra`, bytes(d.fullBytes)] : [])];
+  const line = document.createElement('small');
+  line.append(...parts.map((text) => Object.assign(document.createElement('span'), { textContent: text })));
+  return line;
 }

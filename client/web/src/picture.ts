@@ -1,16 +1,17 @@
 // The picture: what is drawn, with what, in which order. Draws when told to, never by itself.
 import { Color, LinearSRGBColorSpace, type Material, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
-import type { Pose } from './camera';
+import { type Pose, rayThrough } from './camera';
 import { type Frame, planeToDrawing, shiftOf, toDrawing } from './frame';
 import { Guides } from './guides';
 import { setLooks, shared, surfaceMaterials } from './materials';
-import type { Box, Cap, Tets } from './messages';
+import type { Box, Cap, Tets, Vec3 } from './messages';
 import { SkinView } from './skin';
+import { Pick } from './pick';
 import { CapView, TetsView } from './solids';
 import type { ViewState } from './state';
 import { Thickness } from './thickness';
 import { Veil } from './veil';
-import { corners, dot, length, sub, unit } from './vec';
+import { along, corners, dot, length, sub, unit } from './vec';
 
 const kMostPixelRatio = 2;
 const kNowhere: Box = { min: [-1, -1, -1], max: [1, 1, 1] }; // with its ends swapped
@@ -22,9 +23,9 @@ export class Picture {
   readonly thickness: Thickness;
   readonly cap = new CapView();
   readonly tets = new TetsView();
-  thicknessMost = 1; // world units
   private materials = surfaceMaterials();
   private veil = new Veil();
+  private pick = new Pick();
   private camera = new PerspectiveCamera();
   private skinScene = new Scene();
   private solidScene = new Scene();
@@ -92,7 +93,7 @@ export class Picture {
     renderer.setClearColor(this.background, 1);
     renderer.clear();
     if (view.thickness && this.thickness.possible) {
-      this.thickness.draw(renderer, camera, this.thicknessMost, () => this.layers(frame, pose));
+      this.thickness.draw(renderer, camera, () => this.layers(frame, pose));
     } else {
       this.solids(this.materials.solid, this.cap.material, this.tets.material);
       if (view.wireframe) renderer.render(this.edgeScene, camera);
@@ -108,12 +109,22 @@ export class Picture {
     if (withGuides) renderer.render(this.guides.scene, camera);
   }
 
+  // The point that is drawn at a pixel of the layout, in the world; null where there is none.
+  at(frame: Frame, pose: Pose, x: number, y: number): Vec3 | null {
+    this.aim(frame, pose);
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const away = this.pick.distance(this.renderer, this.camera, x, y, width, height, () =>
+      this.solids(this.pick.material, this.pick.material, this.tets.material),
+    );
+    return away === null ? null : along(pose.eye, rayThrough(pose, x, y, width, height), away);
+  }
+
   private faces(materials: Material | Material[]): void {
     this.skin.use(materials);
     this.renderer.render(this.skinScene, this.camera);
   }
 
-  private solids(skin: Material[], cap: Material, tets: Material): void {
+  private solids(skin: Material | Material[], cap: Material, tets: Material): void {
     this.faces(skin);
     this.cap.mesh.material = cap;
     this.tets.mesh.material = tets;

@@ -4,7 +4,7 @@ import { orbited, panned, type Pose, rolled, zoomed } from './camera';
 export interface Movable {
   pose(): Pose | null;
   move(pose: Pose): void;
-  centre(x: number, y: number): void; // turn about what is drawn at this pixel from now on
+  centre(x: number, y: number): void; // bring what is drawn at this pixel to the middle
 }
 
 const kTurn = Math.PI; // for a drag across the shorter side

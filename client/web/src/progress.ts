@@ -11,6 +11,7 @@ const kOften = 100; // ms between two looks at numbers
 export function headline(live: Readonly<Live>): string {
   const { connection, progress, dataset } = live;
   if (live.trouble !== null) return 'Stopped';
+  if (live.needsToken) return 'Waiting for a token';
   if (connection.state === 'waiting') return 'Connection lost';
   if (connection.state === 'connecting' && !progress) return 'Connecting…';
   if (!dataset) return 'Loading…';
@@ -51,6 +52,7 @@ function line(p: Progress | null): void {
         [bytes(p.bytes), ''],
         [count(p.updates), 'updates'],
         [count(p.tets), 'tetrahedra'],
+        [bounded(p.volume, p.volumeBound), 'units³'],
       ]
     : [];
   target.replaceChildren(

@@ -43,21 +43,21 @@ vec3 lit(vec3 color, vec3 n, vec3 p) {
   vec3 to_light = normalize(to_eye - 0.35 * right + 0.45 * up);
   float sky = 0.5 + 0.5 * dot(n, up);
   float diffuse = max(dot(n, to_light), 0.0);
-  float highlight = pow(max(dot(n, normalize(to_light + to_eye)), 0.0), 40.0);
+  float highlight = pow(max(dot(n, normalize(to_light + to_eye)), 0.0), 32.0);
   float rim = 1.0 - max(dot(n, to_eye), 0.0);
   vec3 base = linear(color);
-  vec3 ambient = mix(vec3(0.16, 0.15, 0.15), vec3(0.30, 0.32, 0.36), sky);
-  return srgb(base * (ambient + 0.78 * diffuse) + 0.10 * highlight + 0.05 * rim * rim * rim * (0.4 + base));
+  vec3 ambient = mix(vec3(0.19, 0.185, 0.18), vec3(0.30, 0.32, 0.35), sky);
+  return srgb(base * (ambient + 0.78 * diffuse) + 0.07 * highlight + 0.05 * rim * rim * rim * (0.4 + base));
 }
 `;
 
-// Levels of detail: from fine and dark to coarse and light, even in lightness, told apart without red and green (after cividis).
+// Levels of detail: from fine and dark to coarse and light, even in lightness, told apart without red and green (after viridis).
 export const kRamp: readonly [number, number, number][] = [
-  [0.0, 0.18, 0.42],
-  [0.29, 0.33, 0.45],
-  [0.48, 0.48, 0.47],
-  [0.7, 0.65, 0.42],
-  [0.99, 0.9, 0.27],
+  [0.3, 0.17, 0.5],
+  [0.23, 0.35, 0.6],
+  [0.13, 0.57, 0.55],
+  [0.45, 0.78, 0.35],
+  [0.99, 0.9, 0.2],
 ];
 const kLevels = `
 uniform float byLevel, levels; // 1 where colours are the levels'; the coarsest level
@@ -151,7 +151,7 @@ void main() {
   float near = min(min(pixels.x, pixels.y), pixels.z);
   float line = 1.0 - smoothstep(outline - 0.5, outline + 0.5, near);
   float small = clamp(0.25 / max(max(max(slope.x, slope.y), slope.z), 1e-6), 0.0, 1.0); // fades where triangles are but a few pixels
-  picture = vec4(mix(shade, shade * 0.42, line * small), 1.0);
+  picture = vec4(mix(shade, shade * 0.45, line * small), 1.0);
 }`;
 
 export const kTetsVertex = `${kPrecision}
@@ -185,6 +185,7 @@ void main() {
   vec3 n = normalize(cross(dFdx(place), dFdy(place)));
   if (dot(clip.xyz, whole) > clip.w) discard;
   vec3 color = share.x > 0.999 ? alpha : share.y > 0.999 ? beta : box;
+  color *= 0.5 + 0.5 * abs(dot(n, normalize(cameraPosition - place))); // what is seen at a slant is darker, or gaps do not show
   picture = vec4(lit(colored(color, level), n, place), 1.0);
 }`;
 
@@ -200,6 +201,15 @@ void main() {
   bool front = capFacing == 0.0 ? gl_FrontFacing : capFacing > 0.0;
   float way = distance(cameraPosition, place);
   sum = vec4(front ? -way : way, 1.0, 0.0, 0.0);
+}`;
+
+export const kDistanceFragment = `${kPrecision}
+uniform vec3 cameraPosition;
+${kCut}
+out vec4 picture;
+void main() {
+  cut();
+  picture = vec4(distance(cameraPosition, place), 0.0, 0.0, 1.0);
 }`;
 
 export const kFullScreenVertex = `${kPrecision}
@@ -258,3 +268,19 @@ void main() { gl_Position = vec4(uintBitsToFloat(position.xyz), 0.0); }`;
 export const kStagingFragment = `${kPrecision}
 out vec4 picture;
 void main() { picture = vec4(0.0); }`;
+
+// The greatest of a block's sums, of which one in a stride is looked at.
+export const kMostFragment = `${kPrecision}
+uniform sampler2D sums;
+uniform ivec2 size;
+out vec4 most;
+void main() {
+  ivec2 block = (size + 31) / 32;
+  ivec2 first = ivec2(gl_FragCoord.xy) * block;
+  ivec2 stride = max(block / 16, 1);
+  float greatest = 0.0;
+  for (int y = 0; y < block.y; y += stride.y)
+    for (int x = 0; x < block.x; x += stride.x)
+      greatest = max(greatest, texelFetch(sums, min(first + ivec2(x, y), size - 1), 0).r);
+  most = vec4(greatest, 0.0, 0.0, 1.0);
+}`;

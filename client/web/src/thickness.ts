@@ -1,19 +1,29 @@
 // How thick the solid is along each ray, whatever the order of its triangles: each adds its distance from the eye where the ray leaves the solid,
 // and takes it where the ray enters, in floats. In the spirit of the paper's Figure 6.
-import { type Camera, FloatType, HalfFloatType, NearestFilter, Vector2, type WebGLRenderer, WebGLRenderTarget } from 'three';
+import { type Camera, FloatType, HalfFloatType, NearestFilter, RedFormat, Vector2, type WebGLRenderer, WebGLRenderTarget } from 'three';
+import { roundAbove } from './format';
 import { overMaterial, thicknessMaterial } from './materials';
-import { kThicknessOverFragment } from './shaders';
+import { kMostFragment, kThicknessOverFragment } from './shaders';
 import { fullScreen } from './veil';
+
+const kBlocks = 32; // a side, as the shader has it
 
 export class Thickness {
   readonly material = thicknessMaterial(0);
   readonly trouble: string | null; // why it cannot be drawn, or not well
   readonly possible: boolean;
+  most = 1; // world units at the end of the ramp; follows the picture
+  onMost: () => void = () => {}; // it has changed: to be drawn again
   private precise: boolean;
   private target: WebGLRenderTarget | null = null;
   private size = new Vector2();
   private overMaterial = overMaterial(kThicknessOverFragment, { sums: { value: null }, most: { value: 1 } });
   private over = fullScreen(this.overMaterial);
+  private mostMaterial = overMaterial(kMostFragment, { sums: { value: null }, size: { value: new Vector2() } });
+  private mostOver = fullScreen(this.mostMaterial);
+  private mostTarget = new WebGLRenderTarget(kBlocks, kBlocks, { type: FloatType, depthBuffer: false });
+  private mosts = new Float32Array(4 * kBlocks * kBlocks);
+  private reading = false;
 
   constructor(renderer: WebGLRenderer) {
     this.possible = renderer.extensions.has('EXT_color_buffer_float');
@@ -25,16 +35,37 @@ export class Thickness {
         : 'Thickness is rough here: this graphics card or driver adds only 16-bit floats (no EXT_float_blend).';
   }
 
-  // most: world units at the end of the ramp. layers: draws all triangles of the solid.
-  draw(renderer: WebGLRenderer, camera: Camera, most: number, layers: () => void): void {
+  // layers: draws all triangles of the solid.
+  draw(renderer: WebGLRenderer, camera: Camera, layers: () => void): void {
     const target = this.obtained(renderer);
     renderer.setRenderTarget(target);
     renderer.setClearColor(0x000000, 0);
     renderer.clear();
     layers();
+    void this.follow(renderer, camera);
     renderer.setRenderTarget(null);
-    this.overMaterial.uniforms['most']!.value = most;
+    this.overMaterial.uniforms['most']!.value = this.most;
     renderer.render(this.over, camera);
+  }
+
+  // Looks for the greatest thickness in the picture, without waiting for it. The ramp's end is a round number above that, and stays while the
+  // greatest is above a third of it: so colours are still while one turns.
+  private async follow(renderer: WebGLRenderer, camera: Camera): Promise<void> {
+    if (this.reading) return;
+    this.reading = true;
+    renderer.setRenderTarget(this.mostTarget);
+    renderer.render(this.mostOver, camera);
+    try {
+      await renderer.readRenderTargetPixelsAsync(this.mostTarget, 0, 0, kBlocks, kBlocks, this.mosts);
+    } catch {
+      return; // the context was lost
+    } finally {
+      this.reading = false;
+    }
+    const greatest = this.mosts.reduce((most, x, i) => (i % 4 === 0 && x > most ? x : most), 0);
+    if (!(greatest > 0) || (greatest <= this.most && greatest > this.most / 3)) return;
+    this.most = roundAbove(greatest);
+    this.onMost();
   }
 
   private obtained(renderer: WebGLRenderer): WebGLRenderTarget {
@@ -43,12 +74,14 @@ export class Thickness {
     if (this.target && this.target.width === width && this.target.height === height) return this.target;
     this.target?.dispose();
     this.target = new WebGLRenderTarget(width, height, {
+      format: RedFormat,
       type: this.precise ? FloatType : HalfFloatType,
       minFilter: NearestFilter,
       magFilter: NearestFilter,
       depthBuffer: false,
     });
-    this.overMaterial.uniforms['sums']!.value = this.target.texture;
+    this.overMaterial.uniforms['sums']!.value = this.mostMaterial.uniforms['sums']!.value = this.target.texture;
+    this.mostMaterial.uniforms['size']!.value.set(width, height);
     return this.target;
   }
 }

@@ -6,6 +6,7 @@ import type { Cap, Skin, Tets } from './messages';
 import { Picture } from './picture';
 import type { ViewState } from './state';
 import type { Store } from './store';
+import { add, sub } from './vec';
 
 export interface Stats {
   frames: number; // drawn
@@ -36,11 +37,13 @@ export class Viewer {
   onShown: (version: number) => void = () => {};
   onDrawn: () => void = () => {};
   onResize: () => void = () => {};
+  onContext: (lost: boolean) => void = () => {};
   private coarsest = 1;
   private cap: Cap | null = null; // that waits for its skin
   private dirty = true;
   private asked = false;
   private lost = false;
+  private fence: WebGLSync | null = null; // behind the last picture
 
   // Throws if there is no WebGL 2.
   constructor(canvas: HTMLCanvasElement, private view: Store<ViewState>) {
@@ -50,11 +53,17 @@ export class Viewer {
       this.onResize();
       this.draw(); // at once: the canvas has just been emptied
     }).observe(canvas);
-    canvas.addEventListener('webglcontextlost', () => (this.lost = true));
+    canvas.addEventListener('webglcontextlost', () => {
+      this.lost = true;
+      this.fence = null;
+      this.onContext(true);
+    });
     canvas.addEventListener('webglcontextrestored', () => {
       this.lost = false;
+      this.onContext(false);
       this.changed(); // buffers come again from what the pieces keep
     });
+    this.picture.thickness.onMost = () => this.changed();
     view.watch([], () => {
       this.applyLooks();
       this.changed();
@@ -114,6 +123,14 @@ export class Viewer {
     });
   }
 
+  // Brings what is drawn at this pixel to the middle, to turn about it.
+  centre(x: number, y: number): void {
+    const pose = this.pose();
+    const at = this.frame && pose && !this.lost ? this.picture.at(this.frame, pose, x, y) : null;
+    if (!at || !pose) return;
+    this.view.set({ pose: { ...pose, lookAt: at, eye: add(at, sub(pose.eye, pose.lookAt)) } });
+  }
+
   private ask(): void {
     if (this.asked) return;
     this.asked = true;
@@ -123,6 +140,7 @@ export class Viewer {
   private step(): void {
     this.asked = false;
     if (this.lost) return;
+    if (this.drawing()) return this.ask();
     const { skin } = this.picture;
     let shown = 0;
     if (skin.busy && this.frame) {
@@ -152,9 +170,27 @@ export class Viewer {
     const { clip, region } = this.view.value;
     this.picture.guides.set(this.frame, { region, plane: clip });
     this.picture.draw(this.frame, pose, this.view.value, withGuides);
+    this.putFence();
     this.stats.frames++;
     this.stats.lastFrameMs = performance.now() - start;
     this.onDrawn();
+  }
+
+  // Whether the graphics card is still at the last picture. Whatever is asked of it meanwhile may have to wait, and this thread with it; so nothing is.
+  private drawing(): boolean {
+    if (!this.fence) return false;
+    const gl = this.picture.renderer.getContext() as WebGL2RenderingContext;
+    if (gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return true;
+    gl.deleteSync(this.fence);
+    this.fence = null;
+    return false;
+  }
+
+  private putFence(): void {
+    const gl = this.picture.renderer.getContext() as WebGL2RenderingContext;
+    if (this.fence) gl.deleteSync(this.fence);
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
   }
 
   private showCap(cap: Cap): void {
