@@ -62,6 +62,7 @@ class Session {
     if (this.socket === null && !this.ended && this.timer === 0) this.connect();
     this.send();
     this.changed = true; // a budget hides or shows at once
+    this.tellProgress(true);
     this.plan();
   }
 

@@ -1,0 +1,329 @@
+// The viewer in a real browser, against a real server.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { after, before, describe, test } from 'node:test';
+
+import {
+  colours,
+  difference,
+  digestOf,
+  kBuckyball,
+  kGyroid,
+  launch,
+  makeData,
+  matches,
+  open,
+  photograph,
+  program,
+  progressOf,
+  serve,
+  set,
+  settled,
+  slowLine,
+} from './support.mjs';
+
+const kEverything = { min: [-100, -100, -100], max: [100, 100, 100] };
+const kCamera = 'eye=2.6,-3.2,2.2&at=0,0,0&up=0,0,1';
+const fetched = (server, name, ...options) =>
+  JSON.parse(program('intervale-client', 'fetch', `ws://${server.address}/${name}`, '--json', '--digest', ...options));
+
+let data;
+let server;
+let browser;
+before(async () => {
+  data = makeData(kBuckyball, kGyroid);
+  server = await serve(data);
+  browser = await launch();
+});
+after(async () => {
+  await browser.close();
+  await server.kill();
+});
+
+// A page on the buckyball that fails its test if anything went wrong in it.
+async function withPage(hash, options, body) {
+  const { page, wrong, close } = await open(browser, `${server.url}#data=buckyball&${hash}`, options);
+  try {
+    await settled(page);
+    await body(page);
+    assert.deepEqual(wrong, []);
+  } finally {
+    await close();
+  }
+}
+
+describe('The page', () => {
+  test('comes with a strict policy, compressed, and refines to the end without an error', async () => {
+    const answer = await fetch(server.url);
+    const policy = answer.headers.get('content-security-policy');
+    assert.match(policy, /default-src 'none'/);
+    assert.doesNotMatch(policy, /'unsafe-eval'|'unsafe-inline'/);
+    const { page, wrong, close } = await open(browser, server.url);
+    await settled(page);
+    assert.equal(await page.textContent('#progress-text'), 'Done for this view');
+    const size = await page.evaluate(() =>
+      performance
+        .getEntries()
+        .filter((entry) => entry instanceof PerformanceNavigationTiming || (entry instanceof PerformanceResourceTiming && !entry.name.includes('/api/')))
+        .reduce((sum, entry) => sum + entry.encodedBodySize, 0),
+    );
+    assert.ok(size > 50_000 && size <= 400_000, `${size} bytes are downloaded before data`);
+    assert.deepEqual(wrong, []);
+    await close();
+  });
+
+  test('has the mesh of the native client, for all of the data and for a view of it', async () => {
+    await withPage('', {}, async (page) => {
+      const { view, width, height } = await page.evaluate(() => {
+        const { canvas } = window.intervale;
+        const eye = [2.5, -3.25, 2.125];
+        window.intervale.set({ pose: { eye, lookAt: [0, 0, 0], up: [0, 0, 1], fov: 30 } });
+        return { view: eye, width: canvas.width, height: canvas.height };
+      });
+      await set(page, { pixelError: 2 });
+      // Nothing but this view may have been asked for, or there is more than it wants.
+      const hash = await page.evaluate(() => location.hash);
+      const other = await open(browser, server.url + hash);
+      await settled(other.page);
+      const part = await digestOf(other.page);
+      const native = fetched(server, 'buckyball', '--eye', ...view.map(String), '--look-at', '0', '0', '0', '--up', '0', '0', '1', '--fov', '30',
+        '--viewport', String(width), String(height), '--pixel-error', '2');
+      assert.equal(part.updates, native.updates);
+      assert.equal(part.digest, native.digest);
+      await other.close();
+      await set(page, { region: kEverything });
+      const all = await digestOf(page);
+      assert.equal(all.digest, fetched(server, 'buckyball').digest);
+    });
+  });
+
+  test('has its state in the address', async () => {
+    await withPage(`${kCamera}&px=4&clip=1,0,0,0.25&show=wireframe&alpha=ff0000,0.5`, {}, async (page) => {
+      const state = await page.evaluate(() => window.intervale.state);
+      assert.equal(state.pixelError, 4);
+      assert.deepEqual(state.clip, { normal: [1, 0, 0], offset: 0.25 });
+      assert.equal(state.wireframe, true);
+      assert.deepEqual(state.alpha, { color: '#ff0000', opacity: 0.5 });
+      await set(page, { pixelError: 2, levels: true });
+      const hash = await page.evaluate(() => location.hash);
+      const copy = await open(browser, server.url + hash);
+      await settled(copy.page);
+      assert.deepEqual(await copy.page.evaluate(() => window.intervale.state), await page.evaluate(() => window.intervale.state));
+      await copy.close();
+    });
+  });
+});
+
+describe('Pictures', () => {
+  const size = { width: 640, height: 480 };
+  test('show the surfaces', () =>
+    withPage(kCamera, size, async (page) => {
+      const { blue, orange } = await colours(page, await matches(page, 'surfaces'));
+      assert.ok(blue > 0.05 && orange < 0.01);
+    }));
+  test('show the solid inside where a plane cuts it', () =>
+    withPage(`${kCamera}&clip=0,-1,0,0`, size, async (page) => {
+      assert.ok((await page.evaluate(() => window.intervale.stats.capTriangles)) > 100);
+      const { sand } = await colours(page, await matches(page, 'clip'));
+      assert.ok(sand > 0.01, `${sand}`);
+    }));
+  test('show shrunken tetrahedra', () =>
+    withPage(`${kCamera}&roi=-0.5,-1,-0.5,0.5,0,0.5&show=tets&shrink=0.7&px=4`, size, async (page) => {
+      assert.ok((await page.evaluate(() => window.intervale.stats.tets)) > 100);
+      await matches(page, 'tets');
+    }));
+  test('show thickness', () => withPage(`${kCamera}&show=thickness`, size, (page) => matches(page, 'thickness')));
+  test('show a region refined while the rest is coarse', () =>
+    withPage(`${kCamera}&roi=0,-1,-1,1,1,1&show=wireframe`, size, async (page) => {
+      await matches(page, 'region');
+      const { updates } = await progressOf(page);
+      assert.ok(updates < 0.8 * (await page.evaluate(() => window.intervale.live.dataset.updates)));
+    }));
+});
+
+describe('Controls', () => {
+  // What each switch and slider does, seen in the picture: off again, it is as before.
+  for (const [id, change] of [
+    ['clip', (page) => page.evaluate(() => window.intervale.state.clip !== null)],
+    ['thickness', (page) => page.evaluate(() => window.intervale.state.thickness)],
+    ['wireframe', (page) => page.evaluate(() => window.intervale.state.wireframe)],
+    ['levels', (page) => page.evaluate(() => window.intervale.state.levels)],
+  ]) {
+    test(`${id} changes the picture, and off again gives it back`, () =>
+      withPage(kCamera, {}, async (page) => {
+        const first = await photograph(page);
+        const turn = async () => {
+          await page.locator(`label:has(#${id})`).click();
+          await page.waitForTimeout(300);
+          await settled(page);
+        };
+        await turn();
+        assert.ok(await change(page));
+        const { mean } = await difference(page, first, await photograph(page));
+        assert.ok(mean > 0.5, `${mean}`);
+        await turn();
+        assert.ok(!(await change(page)));
+        const back = await difference(page, first, await photograph(page));
+        assert.ok(back.mean < 0.5, `${back.mean}`);
+      }));
+  }
+
+  test('keys do what the switches do', () =>
+    withPage(kCamera, {}, async (page) => {
+      await page.focus('#canvas');
+      for (const [key, name] of [['c', 'clip'], ['g', 'region'], ['t', 'thickness'], ['w', 'wireframe'], ['l', 'levels']]) {
+        await page.keyboard.press(key);
+        assert.ok(await page.evaluate((name) => Boolean(window.intervale.state[name]), name), name);
+        await page.keyboard.press(key);
+        assert.ok(!(await page.evaluate((name) => Boolean(window.intervale.state[name]), name)), name);
+      }
+      const pose = () => page.evaluate(() => JSON.stringify(window.intervale.state.pose));
+      const first = await pose();
+      for (const key of ['ArrowLeft', 'ArrowUp', '+', '-', 'Shift+ArrowLeft']) {
+        const before = await pose();
+        await page.keyboard.press(key);
+        await page.waitForTimeout(200);
+        assert.notEqual(await pose(), before, key);
+      }
+      await page.keyboard.press('r');
+      await page.waitForTimeout(200);
+      assert.notEqual(await pose(), first);
+      await page.keyboard.press('h');
+      assert.ok(await page.isVisible('#help-dialog'));
+      await page.keyboard.press('Escape');
+    }));
+
+  test('dragging turns, the wheel zooms, and new views bring more', () =>
+    withPage('px=4', {}, async (page) => {
+      const before = await progressOf(page);
+      const box = await page.locator('#canvas').boundingBox();
+      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+      await page.mouse.move(x, y);
+      await page.mouse.down();
+      await page.mouse.move(x + 120, y + 40, { steps: 6 });
+      await page.mouse.up();
+      assert.notEqual(await page.evaluate(() => window.intervale.state.pose), null);
+      for (let k = 0; k < 6; ++k) {
+        await page.mouse.wheel(0, -240);
+        await page.waitForTimeout(60);
+      }
+      await page.waitForTimeout(400);
+      await settled(page);
+      assert.ok((await progressOf(page)).updates > before.updates);
+    }));
+
+  test('the error on screen, and budgets, hold', () =>
+    withPage('px=8', {}, async (page) => {
+      const coarse = await progressOf(page);
+      await set(page, { pixelError: 0.5 });
+      const fine = await progressOf(page);
+      assert.ok(fine.updates > 2 * coarse.updates);
+      // No report ever says more than the budget.
+      await page.evaluate(() => {
+        window.mostTets = 0;
+        window.watching = (async () => {
+          while (window.watching !== null) window.mostTets = Math.max(window.mostTets, (await window.intervale.next('progress')).progress.tets);
+        })();
+      });
+      await set(page, { maxTets: 20_000 });
+      await page.evaluate(() => (window.mostTets = 0));
+      await set(page, { region: kEverything });
+      assert.ok((await page.evaluate(() => window.mostTets)) <= 20_000);
+      assert.ok((await progressOf(page)).tets > 10_000);
+      await set(page, { maxTets: null });
+      assert.equal((await progressOf(page)).updatesShown, (await progressOf(page)).updates);
+    }));
+
+  test('the memory budget holds, and says when there is no room', () =>
+    withPage('mb=1', {}, async (page) => {
+      await set(page, { region: kEverything });
+      const progress = await progressOf(page);
+      assert.ok(progress.full);
+      assert.ok(progress.updates <= 1e6 / 30, `${progress.updates}`);
+      assert.equal(await page.textContent('#progress-text'), 'Done: no room for more');
+    }));
+
+  test('another data set is opened, and its name is in the address', () =>
+    withPage('', {}, async (page) => {
+      await page.getByText('gyroid').click();
+      await page.waitForFunction(() => window.intervale.live.dataset?.name === 'gyroid');
+      await settled(page);
+      assert.match(await page.evaluate(() => location.hash), /data=gyroid/);
+    }));
+
+  test('pictures and meshes are saved', () =>
+    withPage('px=4', {}, async (page) => {
+      const save = async (id) => {
+        const [download] = await Promise.all([page.waitForEvent('download'), page.click(`#save-${id}`)]);
+        return { name: download.suggestedFilename(), bytes: readFileSync(await download.path()) };
+      };
+      const { tets, triangles } = await progressOf(page);
+      const picture = await save('picture');
+      assert.match(picture.name, /^buckyball.*\.png$/);
+      assert.equal(picture.bytes.subarray(1, 4).toString(), 'PNG');
+      const vtu = await save('vtu');
+      assert.match(vtu.bytes.subarray(0, 2000).toString('latin1'), new RegExp(`NumberOfCells="${tets}"`));
+      const stl = await save('stl');
+      assert.equal(stl.bytes.readUInt32LE(80), triangles);
+      const glb = await save('glb');
+      assert.equal(glb.bytes.subarray(0, 4).toString(), 'glTF');
+    }));
+});
+
+describe('A server that is lost', () => {
+  test('is waited for, and the stream goes on with nothing sent twice', async () => {
+    const first = await serve(data);
+    const port = await slowLine(first.port, 40_000);
+    const { page, close } = await open(browser, `http://127.0.0.1:${port}/#data=buckyball&roi=-100,-100,-100,100,100,100`);
+    await page.waitForFunction(() => window.intervale.progress?.updates > 3000);
+    await first.kill();
+    await page.waitForFunction(() => window.intervale.live.connection.state === 'waiting');
+    assert.ok(await page.isVisible('#banner'));
+    const before = await progressOf(page);
+    assert.ok(!before.done);
+    const second = await serve(data, first.port);
+    await settled(page);
+    const progress = await progressOf(page);
+    assert.ok(await page.evaluate(() => window.intervale.live.resumed));
+    assert.equal(progress.updates, await page.evaluate(() => window.intervale.live.dataset.updates));
+    assert.equal(progress.repeated, 0);
+    assert.ok(progress.reconnects >= 1);
+    assert.equal((await digestOf(page)).digest, fetched(second, 'buckyball').digest);
+    await close();
+    await second.kill();
+  });
+
+  test('that was never there is said in words, and found when it comes', async () => {
+    const first = await serve(data);
+    const { page, close } = await open(browser, first.url);
+    await settled(page);
+    await first.kill();
+    await page.waitForFunction(() => window.intervale.live.connection.state === 'waiting' && window.intervale.live.connection.attempt > 1);
+    assert.match(await page.textContent('#banner-text'), /\w+ \w+/);
+    const second = await serve(data, first.port);
+    await settled(page);
+    await page.waitForSelector('#banner', { state: 'hidden' });
+    await close();
+    await second.kill();
+  });
+});
+
+describe('Sizes', () => {
+  for (const [name, width, height, scheme] of [['phone', 360, 740, 'dark'], ['laptop', 1280, 800, 'light'], ['4k', 3840, 2160, 'dark']]) {
+    test(`${width} by ${height}`, () =>
+      withPage('px=8', { width, height, colorScheme: scheme }, async (page) => {
+        const { scroll, canvas } = await page.evaluate(() => ({
+          scroll: [document.documentElement.scrollWidth, document.documentElement.scrollHeight],
+          canvas: document.getElementById('canvas').getBoundingClientRect().toJSON(),
+        }));
+        assert.ok(scroll[0] <= width && scroll[1] <= height, `the page scrolls: ${scroll}`);
+        assert.ok(canvas.width * canvas.height > 0.4 * width * height);
+        if (width < 600) await page.click('#panel-toggle');
+        await page.locator('#save-glb').scrollIntoViewIfNeeded();
+        const button = await page.locator('#save-glb').boundingBox();
+        assert.ok(button.x >= 0 && button.x + button.width <= width && button.y + button.height <= height, JSON.stringify(button));
+        assert.ok(button.height >= 24, 'large enough to touch');
+        await page.screenshot({ path: `${process.env.INTERVALE_WEB_OUT}/size-${name}.png` });
+      }));
+  }
+});
