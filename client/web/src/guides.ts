@@ -8,7 +8,7 @@ import { corners, kBoxEdges } from './vec';
 
 export class Guides {
   readonly scene = new Scene();
-  private materials = [lineMaterial(true, 0.9), lineMaterial(false, 0.25)];
+  private materials = [lineMaterial(true, 0.9), lineMaterial(false, 0.45)];
   private lines = this.materials.map((material) => new LineSegments(new BufferGeometry(), material));
 
   constructor() {

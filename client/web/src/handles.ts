@@ -39,7 +39,7 @@ export class Handles {
       const spot = at ? projected(pose, at, width, height) : null;
       const inside = spot !== null && spot.depth > 0 && spot.x > -20 && spot.y > -20 && spot.x < width + 20 && spot.y < height + 20;
       if (button.hidden === inside) button.hidden = !inside;
-      if (inside) button.style.transform = `translate(${spot.x.toFixed(1)}px, ${spot.y.toFixed(1)}px)`;
+      if (inside) button.style.translate = `${spot.x.toFixed(1)}px ${spot.y.toFixed(1)}px`;
     }
   }
 

@@ -31,12 +31,7 @@ const automation = new Automation();
 function start(): void {
   const canvas = element<HTMLCanvasElement>('canvas');
   let viewer: Viewer;
-  try {
-    viewer = new Viewer(canvas, view);
-  } catch {
-    live.set({ trouble: 'This browser does not draw with WebGL 2, which the picture needs: it may be old, or drawing by the graphics card switched off.' });
-    return;
-  }
+  // First what takes its time elsewhere: the worker loads its core while this thread makes ready to draw.
   const session = new Session(live, {
     skin: (skin) => viewer.takeSkin(skin),
     cap: (cap) => viewer.takeCap(cap),
@@ -44,6 +39,14 @@ function start(): void {
     saved: downloadMesh,
     other: (report) => automation.reported(report),
   });
+  const firstListing = listDatasets(null);
+  try {
+    viewer = new Viewer(canvas, view);
+  } catch {
+    session.end();
+    live.set({ trouble: 'This browser does not draw with WebGL 2, which the picture needs: it may be old, or drawing by the graphics card switched off.' });
+    return;
+  }
   automation.expose(view, live, viewer, (request) => session.send(request));
 
   const movable: Movable = {
@@ -93,9 +96,9 @@ function start(): void {
     showLegend(view.value, viewer.picture.thickness.most);
   };
 
-  const load = async () => {
+  const load = async (asked = listDatasets(live.value.token)) => {
     live.set({ trouble: null });
-    const listing = await listDatasets(live.value.token);
+    const listing = await asked;
     element('token-form').hidden = !('needsToken' in listing);
     if ('needsToken' in listing) return live.set({ needsToken: true });
     if ('trouble' in listing) return live.set({ trouble: listing.trouble });
@@ -154,7 +157,7 @@ function start(): void {
   });
   watchBanner(live, () => (live.value.dataset && live.value.datasets ? open(live.value.dataset) : void load()));
   keepAddress();
-  void load();
+  void load(firstListing);
 }
 
 // The address follows the view, and the view an address that is typed.

@@ -1,5 +1,5 @@
 // The picture: what is drawn, with what, in which order. Draws when told to, never by itself.
-import { Color, LinearSRGBColorSpace, type Material, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+import { BufferGeometry, Color, LinearSRGBColorSpace, type Material, Mesh, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { type Pose, rayThrough } from './camera';
 import { type Frame, planeToDrawing, shiftOf, toDrawing } from './frame';
 import { Guides } from './guides';
@@ -37,6 +37,7 @@ export class Picture {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
     this.renderer.autoClear = false;
     this.renderer.outputColorSpace = LinearSRGBColorSpace; // the shaders write sRGB themselves
+    this.warmUp();
     this.skin = new SkinView(this.renderer, this.materials);
     this.thickness = new Thickness(this.renderer);
     this.skinScene.add(this.skin.faces);
@@ -117,6 +118,13 @@ export class Picture {
       this.solids(this.pick.material, this.pick.material, this.tets.material),
     );
     return away === null ? null : along(pose.eye, rayThrough(pose, x, y, width, height), away);
+  }
+
+  // Has the shader of the first picture compiled while the mesh is still on its way.
+  private warmUp(): void {
+    const scene = new Scene();
+    scene.add(...this.materials.solid.map((material) => new Mesh(new BufferGeometry(), material)));
+    this.renderer.compile(scene, this.camera);
   }
 
   private faces(materials: Material | Material[]): void {

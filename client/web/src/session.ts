@@ -38,6 +38,10 @@ export class Session {
     this.worker.onmessageerror = () => this.fail('The worker sent what cannot be read.');
   }
 
+  end(): void {
+    this.worker.terminate();
+  }
+
   send(request: Request): void {
     this.worker.postMessage(request);
   }
