@@ -22,11 +22,30 @@ function clientCore(folder: string | undefined): Plugin {
   };
 }
 
+// The page brings shaders of its own, so those of three.js stay at home: a quarter of what the page would be. They are all behind one object, by which
+// `#include` finds them.
+function withoutShaders(): Plugin {
+  let met = false;
+  return {
+    name: 'without-shaders',
+    enforce: 'pre',
+    load(id) {
+      if (!id.endsWith('/three/src/renderers/shaders/ShaderChunk.js')) return null;
+      met = true;
+      return 'export const ShaderChunk = {};';
+    },
+    buildEnd(error) {
+      if (!error && !met) this.error('three.js keeps its shaders elsewhere than it did: see withoutShaders in vite.config.ts');
+    },
+  };
+}
+
 export default defineConfig(() => {
   const core = () => clientCore(process.env.INTERVALE_CORE_DIR);
   return {
     base: './', // works below any path
-    plugins: [core()],
+    plugins: [core(), withoutShaders()],
+    resolve: { alias: [{ find: /^three$/, replacement: 'three/src/Three.js' }] },
     worker: { format: 'es' as const, plugins: () => [core()] },
     build: {
       outDir: process.env.INTERVALE_VIEWER_OUT ?? 'dist',

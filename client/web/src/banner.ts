@@ -48,13 +48,14 @@ export function watchBanner(live: Store<Live>, retry: () => void): void {
       ticker = 0;
     }
     last = connection;
-    if (connection.state === 'open' && wasLost) {
-      wasLost = false;
-      const notice = live.value.resumed ? 'Connected again: the stream goes on where it was.' : 'Connected again.';
-      live.set({ notice });
-      window.setTimeout(() => live.value.notice === notice && live.set({ notice: null }), kResumedMs);
-    }
     show();
+  });
+  live.watch(['opened'], ({ opened }) => {
+    if (!wasLost) return;
+    wasLost = false;
+    const notice = opened.resumed ? 'Connected again: the stream goes on where it was.' : 'Connected again: the stream begins anew.';
+    live.set({ notice });
+    window.setTimeout(() => live.value.notice === notice && live.set({ notice: null }), kResumedMs);
   });
   onClick('retry', retry);
   onClick('dismiss', () => {

@@ -24,6 +24,7 @@ export class Handles {
     button.className = handle.icon ? 'handle large' : 'handle';
     button.setAttribute('aria-label', handle.label);
     button.title = handle.label;
+    button.hidden = true; // until it has a place
     if (handle.icon) button.append(icon(handle.icon));
     this.layer.append(button);
     this.placed.push({ button, handle });

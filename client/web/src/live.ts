@@ -10,7 +10,7 @@ export interface Live {
   datasets: Listed[] | null; // null: not known yet
   dataset: Listed | null; // that is open
   connection: ConnectionState;
-  resumed: boolean; // the last time it opened
+  opened: { times: number; resumed: boolean }; // so far; the last time, by going on where it was
   progress: Progress | null;
   trouble: string | null; // what failed, for people; with a button to try again
   needsToken: boolean;
@@ -25,7 +25,7 @@ export const kNothingYet: Live = {
   datasets: null,
   dataset: null,
   connection: { state: 'closed' },
-  resumed: false,
+  opened: { times: 0, resumed: false },
   progress: null,
   trouble: null,
   needsToken: false,

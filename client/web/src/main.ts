@@ -100,7 +100,10 @@ function start(): void {
     live.set({ trouble: null });
     const listing = await asked;
     element('token-form').hidden = !('needsToken' in listing);
-    if ('needsToken' in listing) return live.set({ needsToken: true });
+    if ('needsToken' in listing) {
+      input('token').focus();
+      return live.set({ needsToken: true });
+    }
     if ('trouble' in listing) return live.set({ trouble: listing.trouble });
     live.set({ datasets: listing.datasets, needsToken: false });
     const { dataset: name } = view.value;

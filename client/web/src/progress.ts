@@ -66,7 +66,7 @@ function line(p: Progress | null): void {
 
 const pixels = (p: Progress): string => `${short(p.remainingPixels)} px`;
 
-function facts({ progress: p, dataset, skinVersion }: Readonly<Live>): void {
+function facts({ progress: p, dataset }: Readonly<Live>): void {
   const rows: [string, string][] = p
     ? [
         ['Volume', `${bounded(p.volume, p.volumeBound)} units³`],
@@ -78,10 +78,10 @@ function facts({ progress: p, dataset, skinVersion }: Readonly<Live>): void {
         ['Still to come', p.done ? 'none' : `at most ${count(p.updatesToGo)}`],
         ['Received', bytes(p.bytes)],
         ['Memory', bytes(p.memory)],
-        ...(p.busy.seconds > 0 ? [['Decoded and applied', `${count(p.busy.updates / p.busy.seconds)} updates/s`] as [string, string]] : []),
+        ...(p.busy.seconds > 0 ? [['Updates in a second', count(p.busy.updates / p.busy.seconds)] as [string, string]] : []),
         ...(p.reconnects > 0 ? [['Reconnected', p.reconnects === 1 ? 'once' : `${p.reconnects} times`] as [string, string]] : []),
       ]
-    : [['Skin', skinVersion === 0 ? 'none yet' : String(skinVersion)]];
+    : [['Received', 'nothing yet']];
   const list = element('facts');
   // Rows stay where they are, so that text in them can be selected while numbers change.
   while (list.children.length < 2 * rows.length) list.append(document.createElement(list.children.length % 2 === 0 ? 'dt' : 'dd'));

@@ -117,7 +117,7 @@ export class Session {
         this.live.set({ connection: report.state, ...(report.state.state === 'open' ? { trouble: null } : {}) });
         break;
       case 'opened':
-        this.live.set({ resumed: report.resumed });
+        this.live.set({ opened: { times: this.live.value.opened.times + 1, resumed: report.resumed } });
         break;
       case 'progress':
         this.live.set({ progress: report.progress });

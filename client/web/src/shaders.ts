@@ -150,7 +150,7 @@ void main() {
   vec3 pixels = sides / max(slope, 1e-6);
   float near = min(min(pixels.x, pixels.y), pixels.z);
   float line = 1.0 - smoothstep(outline - 0.5, outline + 0.5, near);
-  float small = clamp(0.25 / max(max(max(slope.x, slope.y), slope.z), 1e-6), 0.0, 1.0); // fades where triangles are but a few pixels
+  float small = clamp(0.14 / max(max(max(slope.x, slope.y), slope.z), 1e-6), 0.0, 1.0); // fades where triangles are but a few pixels
   picture = vec4(mix(shade, shade * 0.45, line * small), 1.0);
 }`;
 

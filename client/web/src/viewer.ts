@@ -156,7 +156,7 @@ export class Viewer {
     if (this.dirty) this.draw();
     if (shown > 0) {
       Object.assign(this.stats, { skinVersion: shown, skinTriangles: skin.triangles, skinBytes: skin.bytes });
-      if (this.stats.firstMeshMs === 0 && skin.triangles > 0) this.stats.firstMeshMs = performance.now();
+      if (this.stats.firstMeshMs === 0 && skin.triangles > 0) this.stats.firstMeshMs = performance.mark('intervale: first mesh').startTime;
       this.onShown(shown);
     }
     if (skin.busy || this.dirty) this.ask();

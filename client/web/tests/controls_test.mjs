@@ -266,6 +266,8 @@ for (const [width, height] of [[360, 740], [3840, 2160]]) {
 test('lost connections and errors are said in words', async () => {
   const page = await openPage(browser, stand.address + '#data=lost');
   await page.waitForFunction(() => /Connection lost: .* Connecting again in [1-8] s/.test(document.querySelector('#banner-text').textContent));
+  await page.waitForFunction(() => document.querySelector('#banner-text').textContent === 'Connected again: the stream goes on where it was.');
+  await untilDone(page);
   await page.goto(stand.address + '#data=broken');
   await page.reload();
   await page.getByRole('button', { name: 'Try again' }).click();

@@ -262,6 +262,13 @@ self.onmessage = ({ data }) => {
     if (name === 'large') return large();
     refine();
     if (name === 'lost') say({ type: 'connection', state: { state: 'waiting', seconds: 8, attempt: 2, reason: 'the server went away' } });
+    if (name === 'lost') timer = setTimeout(() => {
+      say({ type: 'connection', state: { state: 'connecting' } });
+      say({ type: 'connection', state: { state: 'open' } });
+      say({ type: 'opened', dataset: null, resumed: true });
+      name = 'gyroid';
+      refine();
+    }, 3000);
   } else if (data.type === 'shown' && name !== 'lost' && name !== 'large') {
     timer = setTimeout(refine, 30);
   } else if (data.type === 'clip') {
