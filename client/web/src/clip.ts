@@ -47,8 +47,10 @@ export class ClipControls {
     this.show();
   }
 
-  forget(): void {
+  // Another data set: where it was in the last means nothing in this.
+  opened(): void {
     this.last = null;
+    this.show();
   }
 
   private facing(normal: Vec3): void {

@@ -75,9 +75,9 @@ function start(): void {
   };
   const open = (dataset: Listed) => {
     live.set({ dataset, skinVersion: 0 });
-    clip.forget();
-    region.forget();
     viewer.open(dataset);
+    clip.opened();
+    region.opened();
     view.set({ dataset: dataset.name });
     const now = wanted();
     if (now) session.open(dataset.name, { view: now, plane: view.value.clip, tetsBox: tetsBox(), edges: view.value.wireframe });

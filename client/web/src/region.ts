@@ -60,8 +60,10 @@ export class RegionControls {
     this.view.set({ tets: !this.view.value.tets && this.view.value.region !== null });
   }
 
-  forget(): void {
+  // Another data set: where it was in the last means nothing in this.
+  opened(): void {
     this.last = null;
+    this.show();
   }
 
   private change(make: (region: Box, within: Box) => Box): void {

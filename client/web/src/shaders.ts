@@ -145,7 +145,9 @@ ${kLevels}${kLight}
 out vec4 picture;
 void main() {
   if (all(greaterThan(place, hiddenMin)) && all(lessThan(place, hiddenMax))) discard;
-  vec3 shade = lit(colored(color, level), clip.xyz, place);
+  vec3 to_eye = normalize(cameraPosition - place);
+  vec3 facing = dot(clip.xyz, to_eye) < 0.0 ? -clip.xyz : clip.xyz;
+  vec3 shade = lit(colored(color, level), normalize(facing + 0.7 * to_eye), place); // a cut at a slant is to be read, too
   vec3 slope = fwidth(sides);
   vec3 pixels = sides / max(slope, 1e-6);
   float near = min(min(pixels.x, pixels.y), pixels.z);
