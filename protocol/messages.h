@@ -15,16 +15,20 @@
 namespace intervale::protocol {
 
 inline constexpr const char* kSubprotocol = "intervale.v1";  // the WebSocket subprotocol: client offers it, server confirms it
-inline constexpr const char* kPath = "/v1/stream";           // the WebSocket's path
-inline constexpr const char* kServerName = "intervale";      // how the server's HTTP Server header begins
+// A client that cannot set headers offers its token beside it, as a subprotocol of this and the token in base64url without padding.
+inline constexpr const char* kTokenSubprotocol = "intervale.token.";
+inline constexpr const char* kPath = "/v1/stream";       // the WebSocket's path
+inline constexpr const char* kServerName = "intervale";  // how the server's HTTP Server header begins
 
 // Why a session ended, as the WebSocket's close code.
 enum class CloseCode : std::uint16_t {
   normal = 1000,
-  going_away = 1001,  // the server shuts down
-  text_frame = 1003,  // a text frame, where only binary ones are spoken
-  internal = 1011,    // the server's own failure
-  malformed = 4400,   // a message that does not decode, or says what cannot be
+  going_away = 1001,    // the server shuts down
+  text_frame = 1003,    // a text frame, where only binary ones are spoken
+  internal = 1011,      // the server's own failure
+  malformed = 4400,     // a message that does not decode, or says what cannot be
+  unauthorized = 4401,  // no token, or one that opens nothing
+  forbidden = 4403,     // the token does not open this data set
   no_such_dataset = 4404,
   timed_out = 4408,     // no Open within the handshake time, or no credit while updates wait
   out_of_order = 4409,  // a message that is not allowed in this state

@@ -9,6 +9,7 @@
 
 #include "client/cli/commands.h"
 #include "client/net/fetch.h"
+#include "client/program/access_options.h"
 #include "common/mesh_digest.h"
 #include "common/mesh_writer.h"
 #include "common/picture/picture.h"
@@ -21,6 +22,7 @@ namespace {
 
 struct FetchCommand {
   std::string url;
+  Access access;
   FetchOptions fetch;
   std::optional<std::filesystem::path> output;
   std::optional<PictureOptions> picture;
@@ -87,8 +89,9 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
 }
 
 Result<void> run(const FetchCommand& options) {
-  const auto url = parse_url(options.url);
+  auto url = parse_url(options.url);
   if (!url) return tl::unexpected(url.error());
+  url->access = options.access;
   if (url->name.empty()) return misuse("which data set? " + url->server() + "/NAME is wanted; see intervale-client list " + url->server());
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
@@ -128,6 +131,7 @@ void add_fetch_command(Program& program) {
           "How long to try to reach a lost server again, with what came so far (default 30; 0: not at all)")
       ->type_name("SECONDS");
   add_digest_flag(command, options->digest);
+  add_access_options(command, options->access);
   add_json_flag(command, options->json);
 }
 

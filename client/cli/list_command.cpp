@@ -6,12 +6,14 @@
 
 #include "client/cli/commands.h"
 #include "client/net/http_get.h"
+#include "client/program/access_options.h"
 
 namespace intervale {
 namespace {
 
 struct ListOptions {
   std::string url;
+  Access access;
   bool json = false;
 };
 
@@ -34,8 +36,9 @@ std::string line_of(const nlohmann::ordered_json& dataset) {
 }
 
 Result<void> list(const ListOptions& options) {
-  const auto url = parse_url(options.url);
+  auto url = parse_url(options.url);
   if (!url) return tl::unexpected(url.error());
+  url->access = options.access;
   if (!url->name.empty()) return misuse("list takes a server, without a data set's name: " + url->server());
   const auto body = http_get(*url, "/api/datasets");
   if (!body) return tl::unexpected(body.error());
@@ -57,6 +60,7 @@ void add_list_command(Program& program) {
   const auto options = std::make_shared<ListOptions>();
   CLI::App& command = program.add_command("list", "Lists the data sets of a server", [options] { return list(*options); });
   command.add_option("URL", options->url, "ws://host:port")->required();
+  add_access_options(command, options->access);
   add_json_flag(command, options->json);
 }
 

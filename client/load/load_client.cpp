@@ -159,7 +159,8 @@ asio::awaitable<bool> LoadClient::connect() {
   beast::error_code ignored;
   stream.socket().set_option(tcp::no_delay(true), ignored);
   ws_.set_option(websocket::stream_base::timeout{plan_.patience, kSilenceTime, true});
-  ws_.set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
+  ws_.set_option(websocket::stream_base::decorator([this](websocket::request_type& request) {
+    if (plan_.url.access.token) request.set(http::field::authorization, "Bearer " + *plan_.url.access.token);
     request.set(http::field::user_agent, "intervale-load/" INTERVALE_VERSION);
     request.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
   }));

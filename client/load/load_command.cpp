@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "client/load/load_run.h"
+#include "client/program/access_options.h"
 #include "common/program/progress.h"
 
 namespace intervale {
@@ -19,6 +20,7 @@ namespace {
 
 struct LoadCommand {
   std::string url;
+  Access access;
   LoadOptions load;
   bool json = false;
 };
@@ -36,8 +38,9 @@ Result<void> verdict(const LoadReport& report) {
 }
 
 Result<void> run(const LoadCommand& options) {
-  const auto url = parse_url(options.url);
+  auto url = parse_url(options.url);
   if (!url) return tl::unexpected(url.error());
+  url->access = options.access;
   if (url->name.empty()) return misuse("which data set? " + url->server() + "/NAME is wanted; see intervale-client list " + url->server());
   const auto report = run_load(*url, options.load);
   if (!report) return tl::unexpected(report.error());
@@ -127,6 +130,7 @@ void add_load_command(Program& program) {
              "ends"),
          0, 1e15, "N")
       ->needs(verify);
+  add_access_options(app, options->access);
   add_json_flag(app, options->json);
 }
 

@@ -74,7 +74,8 @@ Result<void> StreamConnection::Socket::connect() {
 
 Result<void> StreamConnection::Socket::shake_hands() {
   ws.set_option(websocket::stream_base::timeout{kConnectTime, kSilenceTime, true});
-  ws.set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
+  ws.set_option(websocket::stream_base::decorator([this](websocket::request_type& request) {
+    if (url.access.token) request.set(http::field::authorization, "Bearer " + *url.access.token);
     request.set(http::field::user_agent, "intervale-client/" INTERVALE_VERSION);
     request.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
   }));
@@ -84,6 +85,7 @@ Result<void> StreamConnection::Socket::shake_hands() {
   websocket::response_type response;
   const auto error = run([&](auto done) { ws.async_handshake(response, url.authority(), protocol::kPath, done); });
   if (error == beast::error::timeout) return fail("no answer from " + url.authority() + " within 5 s: is it an intervale server?");
+  if (error == websocket::error::upgrade_declined && response.result() == http::status::unauthorized) return tl::unexpected(unauthorized(url));
   if (error == websocket::error::upgrade_declined && response.result() == http::status::service_unavailable) {
     return fail("the server at " + url.authority() + " takes no new sessions now: it is shutting down or full");
   }
@@ -114,9 +116,16 @@ tl::unexpected<Error> StreamConnection::Socket::faulted(const protocol::Fault& f
   if (fault.code == CloseCode::no_such_dataset) {
     return fail("no data set '" + url.name + "' at " + url.server() + "; see intervale-client list " + url.server());
   }
+  if (fault.code == CloseCode::unauthorized) return tl::unexpected(unauthorized(url));
+  if (fault.code == CloseCode::forbidden) return fail("the token given does not open '" + url.name + "' at " + url.server());
   if (fault.code == CloseCode::going_away) return fail("the server at " + url.authority() + " is shutting down");
   return fail("the server at " + url.authority() + " ended the session: " + text + " (code " + std::to_string(static_cast<unsigned>(fault.code)) +
               ")");
+}
+
+Error unauthorized(const ServerUrl& url) {
+  if (url.access.token) return {"the server at " + url.authority() + " does not know the token given"};
+  return {"the server at " + url.authority() + " wants a token: --token or INTERVALE_TOKEN"};
 }
 
 StreamConnection::StreamConnection(std::unique_ptr<Socket> socket) : socket_(std::move(socket)) {}

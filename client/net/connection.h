@@ -14,6 +14,9 @@ namespace intervale {
 inline constexpr std::chrono::seconds kConnectTime{5};   // to reach the server, and then for it to answer
 inline constexpr std::chrono::seconds kSilenceTime{30};  // pings unanswered: the server is gone
 
+// The server wants a token, or another one.
+[[nodiscard]] Error unauthorized(const ServerUrl& url);
+
 // One thread at a time. Every error says which server it is about.
 class StreamConnection {
  public:

@@ -52,6 +52,7 @@ Result<std::string> http_get(const ServerUrl& url, const std::string& target) {
   request.set(http::field::host, url.authority());
   request.set(http::field::user_agent, "intervale-client/" INTERVALE_VERSION);
   request.set(http::field::connection, "close");
+  if (url.access.token) request.set(http::field::authorization, "Bearer " + *url.access.token);
   http::response_parser<http::string_body> parser;
   parser.body_limit(kMaxBody);
   beast::flat_buffer buffer;
@@ -61,6 +62,7 @@ Result<std::string> http_get(const ServerUrl& url, const std::string& target) {
   if (error == beast::error::timeout) return fail("no answer from " + url.authority() + " within 10 s: is it an intervale server?");
   if (error) return fail(url.authority() + " is not an intervale server: " + error.message());
   if (!parser.get()[http::field::server].starts_with(protocol::kServerName)) return fail(url.authority() + " is not an intervale server");
+  if (parser.get().result() == http::status::unauthorized) return tl::unexpected(unauthorized(url));
   if (parser.get().result() != http::status::ok) {
     return fail("the server at " + url.authority() + " answered " + std::to_string(parser.get().result_int()) + " for " + target);
   }

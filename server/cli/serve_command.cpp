@@ -1,3 +1,5 @@
+#include <chrono>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -52,6 +54,87 @@ void add_log_options(CLI::App& command, LogOptions& log) {
   };
 }
 
+CLI::Validator at_least_one() {
+  return {[](const std::string& text) {
+            double value = 0;
+            return std::string(CLI::detail::lexical_cast(text, value) && value >= 1 && value <= 1e15 ? "" : "must be 1 or more");
+          },
+          "", ""};
+}
+
+void add_milliseconds(CLI::App& command, const std::string& name, std::chrono::milliseconds& time, double least, const std::string& description) {
+  command
+      .add_option_function<double>(
+          name, [&time](double seconds) { time = std::chrono::milliseconds(std::llround(1000 * seconds)); }, description)
+      ->check(CLI::Range(least, 86400.0))
+      ->type_name("SECONDS")
+      ->group("Limits");
+}
+
+template <class Number>
+CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optional<Number>& limit, const std::string& description) {
+  return command.add_option_function<Number>(
+      name, [&limit](Number number) { limit = number; }, description);
+}
+
+void add_limits(CLI::App& command, ServeOptions& serve) {
+  const auto group = "Limits";
+  command.add_option("--max-connections", serve.max_connections, "More than these are turned away")
+      ->check(at_least_one())
+      ->capture_default_str()
+      ->group(group);
+  add_optional(command, "--max-connections-per-address", serve.max_connections_per_address,
+               "The same, from one address (IPv6: from one /64); not behind a proxy, whose address is that of all. Default: none")
+      ->check(at_least_one())
+      ->type_name("N")
+      ->group(group);
+  add_optional(command, "--max-sessions", serve.max_sessions, "More than these are answered 503. Default: none")
+      ->check(at_least_one())
+      ->type_name("N")
+      ->group(group);
+  const auto bytes = CLI::AsSizeValue(true);
+  add_optional(command, "--max-memory", serve.max_memory,
+               "While the process has more resident, new sessions are answered 503; 2GiB, 500MB. Default: none")
+      ->transform(bytes)
+      ->type_name("BYTES")
+      ->group(group);
+  command
+      .add_option(
+          "--max-queued-bytes", serve.max_queued_bytes,
+          "Of messages that are leaving, in all; past it, those that have been leaving the longest are cut off with their connections, if that is "
+          "more than a second. Default: 512MiB")
+      ->transform(bytes)
+      ->type_name("BYTES")
+      ->group(group);
+  command.add_option("--max-messages-per-second", serve.messages_per_second, "Of each session; one that sends more is read more slowly")
+      ->check(at_least_one())
+      ->capture_default_str()
+      ->group(group);
+  command.add_option("--max-views-per-second", serve.views_per_second, "Of those, new views; likewise")
+      ->check(at_least_one())
+      ->capture_default_str()
+      ->group(group);
+  add_milliseconds(command, "--handshake-time", serve.handshake_time, 0.1,
+                   "For a request to arrive, and from a WebSocket's start to its Open: each. Default: 10");
+  add_milliseconds(command, "--drain-time", serve.drain_time, 0, "How long clients have to take their leave at the end. Default: 5");
+}
+
+void add_access_options(CLI::App& command, ServeOptions& serve) {
+  const auto group = "Access";
+  command
+      .add_option_function<std::string>(
+          "--tokens", [&serve](const std::string& file) { serve.tokens = file; },
+          "Who may come in: a token a line, and after it the data sets it opens, if not all, where * and ? stand for others; read again when it "
+          "changes")
+      ->type_name("FILE")
+      ->group(group);
+  command
+      .add_option("--allow-origin", serve.allowed_origins,
+                  "Pages that may open sessions: https://example.org, * for any. Default: those of the host that the request names")
+      ->type_name("ORIGIN ...")
+      ->group(group);
+}
+
 }  // namespace
 
 void add_serve_command(Program& program) {
@@ -73,7 +156,8 @@ void add_serve_command(Program& program) {
       ->type_name("ADDRESS:PORT")
       ->group("Observation");
   add_log_options(command, options->log);
-  command.add_option("--max-connections", options->serve.max_connections, "More than these are turned away")->capture_default_str();
+  add_access_options(command, options->serve);
+  add_limits(command, options->serve);
 }
 
 }  // namespace intervale

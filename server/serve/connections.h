@@ -15,7 +15,9 @@ namespace intervale {
 class Connection {
  public:
   virtual ~Connection() = default;
-  virtual void go_away() = 0;  // the server drains: take leave soon. Any thread; does not block.
+  // Any thread; these do not block.
+  virtual void go_away() = 0;  // the server drains: take leave soon
+  virtual void drop() = 0;     // end at once, without leave
 };
 
 // Any thread.

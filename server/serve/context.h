@@ -4,10 +4,13 @@
 #include <atomic>
 #include <cstdint>
 
+#include "server/serve/access.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/connections.h"
+#include "server/serve/guard.h"
 #include "server/serve/metrics.h"
 #include "server/serve/options.h"
+#include "server/serve/replaceable.h"
 #include "server/serve/static_files.h"
 #include "server/serve/turnstile.h"
 
@@ -15,12 +18,15 @@ namespace intervale {
 
 // Outlives every session. The catalogue, the viewer and the options do not change while serving.
 struct ServerContext {
-  explicit ServerContext(unsigned threads) : turnstile(threads) {}
-  ServeOptions options;
+  explicit ServerContext(const ServeOptions& wanted) : options(wanted), outbox(wanted.max_queued_bytes), turnstile(wanted.threads) {}
+  const ServeOptions options;  // threads is not 0
   Catalogue catalogue;
   StaticFiles viewer;
   Metrics metrics;
+  Replaceable<Tokens> tokens;  // nullptr: whoever comes may see everything
   Connections connections;
+  AddressCounts addresses;
+  Outbox outbox;
   Turnstile turnstile;
   std::atomic<std::uint64_t> next_session_id{1};
 };

@@ -36,18 +36,21 @@ std::string escaped(std::string_view text) {
   return html;
 }
 
-std::string datasets_json(const Catalogue& catalogue) {
+std::string datasets_json(const Catalogue& catalogue, const Scope& scope) {
   auto datasets = nlohmann::ordered_json::array();
-  for (const auto& [name, volume] : catalogue.volumes()) datasets.push_back(to_json(volume->description()));
+  for (const auto& [name, volume] : catalogue.volumes()) {
+    if (scope.allows(name)) datasets.push_back(to_json(volume->description()));
+  }
   return nlohmann::ordered_json{{"datasets", std::move(datasets)}}.dump() + "\n";
 }
 
-std::string front_page(const Catalogue& catalogue) {
+std::string front_page(const Catalogue& catalogue, const Scope* scope) {
   std::string page =
       "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Intervale</title>\n<h1>Intervale</h1>\n"
       "<p>This server streams interval volumes: tetrahedral meshes of the part of a volume whose values lie in a range, coarse first and refined as "
       "far as you ask. Fetch one with <code>intervale-client fetch ws://HOST:PORT/NAME -o mesh.vtu</code>.</p>\n<ul>\n";
   for (const auto& [name, volume] : catalogue.volumes()) {
+    if (scope == nullptr || !scope->allows(name)) continue;
     const Description& d = volume->description();
     page += "<li>" + escaped(name) + ": " + std::to_string(d.grid.dims[0]) + " × " + std::to_string(d.grid.dims[1]) + " × " +
             std::to_string(d.grid.dims[2]) + " samples, " + std::to_string(d.updates) + " updates, " + std::to_string(d.full.tets) +
@@ -103,18 +106,30 @@ HttpAnswer short_answer(unsigned status, std::string line) {
   return {.status = status, .body = std::make_shared<const std::string>(std::move(line) + "\n")};
 }
 
+HttpAnswer unauthorized() {
+  HttpAnswer answer = short_answer(401, "a token is wanted: Authorization: Bearer TOKEN");
+  answer.headers.emplace_back("WWW-Authenticate", "Bearer");
+  return answer;
+}
+
 HttpAnswer answer(const HttpRequest& request, const HttpState& state) {
   const auto path = decode_path(request.target);
   if (!path) return short_answer(400, "not a target this server can read");
   const StaticFile* const file = state.door == Door::all ? state.viewer.find(*path) : nullptr;
   if (!is_known(*path, state) && file == nullptr) return short_answer(404, "nothing here");
   if (request.method != "GET" && request.method != "HEAD") return short_answer(405, "only GET and HEAD");
-  if (*path == "/api/datasets") return with_body(kJson, datasets_json(state.catalogue));
-  if (*path == "/metrics") return with_body(kPrometheus, state.metrics.text(state.catalogue));
+  if (*path == "/api/datasets") {
+    return request.scope != nullptr ? with_body(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized();
+  }
+  if (*path == "/metrics" && state.door == Door::all) {
+    if (request.scope == nullptr) return unauthorized();
+    if (!request.scope->is_everything()) return short_answer(403, "metrics tell of every data set, and this token does not open them all");
+  }
+  if (*path == "/metrics") return with_body(kPrometheus, state.metrics.text(state.catalogue, state.queued_bytes));
   if (*path == "/healthz") return short_answer(200, "ok");
   if (*path == "/readyz") return state.ready ? short_answer(200, "ok") : short_answer(503, "draining");
   if (file != nullptr) return file_answer(request, *file);
-  return with_body(kHtml, front_page(state.catalogue));
+  return with_body(kHtml, front_page(state.catalogue, request.scope));
 }
 
 }  // namespace intervale

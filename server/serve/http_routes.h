@@ -1,12 +1,14 @@
 // What the server answers over HTTP: a pure function of the request. No I/O.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "server/serve/access.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/metrics.h"
 #include "server/serve/static_files.h"
@@ -20,6 +22,7 @@ struct HttpRequest {
   std::string_view host;
   std::string_view accept_encoding;
   std::string_view if_none_match;
+  const Scope* scope = nullptr;  // what whoever asks may see; nullptr: only what everybody may
 };
 
 struct HttpAnswer {
@@ -33,6 +36,8 @@ struct HttpAnswer {
 
 // An answer of one line.
 [[nodiscard]] HttpAnswer short_answer(unsigned status, std::string line);
+// 401: what whoever has no token gets.
+[[nodiscard]] HttpAnswer unauthorized();
 
 // What a port is for: everything, or nothing but /metrics, /healthz and /readyz.
 enum class Door { all, metrics };
@@ -41,14 +46,16 @@ struct HttpState {
   const Catalogue& catalogue;
   const Metrics& metrics;
   const StaticFiles& viewer;
+  std::uint64_t queued_bytes = 0;
   Door door = Door::all;
   bool has_metrics_door = false;  // then /metrics is answered there only
   bool ready = true;              // false while draining
 };
 
 // GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists
-// the data sets. A query is ignored. 405 for other methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET;
-// whoever sends it leaves the body out.
+// the data sets. A query is ignored. With no scope 401 for what tells of data sets; with one
+// that is not everything 403 for /metrics, which tells of all, unless it has a door of its own. 405 for other methods, 404 for other targets, 400 for
+// those that cannot be read. HEAD is answered like GET; whoever sends it leaves the body out.
 [[nodiscard]] HttpAnswer answer(const HttpRequest& request, const HttpState& state);
 
 }  // namespace intervale

@@ -27,7 +27,6 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
-constexpr std::chrono::seconds kRequestTime{10};    // for a request to arrive in whole
 constexpr std::chrono::seconds kKeepAliveTime{30};  // between requests
 constexpr std::chrono::seconds kAnswerTime{30};
 constexpr std::uint32_t kMaxHeader = 4096;
@@ -64,8 +63,8 @@ Response response_to(const Request& request, const HttpAnswer& answer, bool keep
 
 class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(asio::ip::tcp::socket socket, ServerContext& context, Door door)
-      : stream_(std::move(socket)), strand_(stream_.get_executor()), context_(context), door_(door) {}
+  HttpSession(asio::ip::tcp::socket socket, ServerContext& context, Door door, AddressCounts::Seat seat)
+      : stream_(std::move(socket)), strand_(stream_.get_executor()), context_(context), door_(door), seat_(std::move(seat)) {}
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
   ~HttpSession() override { context_.metrics.connections.Decrement(); }
@@ -74,6 +73,10 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     context_.metrics.connections.Increment();
     membership_ = context_.connections.join(shared_from_this());
     asio::co_spawn(strand_, run(shared_from_this()), [](const std::exception_ptr& failure) { report(failure); });
+  }
+
+  void drop() override {
+    asio::post(strand_, [self = shared_from_this()] { self->stream_.close(); });
   }
 
   void go_away() override {
@@ -95,7 +98,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   // Whatever ends this coroutine ends the connection, but for an upgrade, which takes the socket along. `self` keeps the object.
   asio::awaitable<void> run([[maybe_unused]] std::shared_ptr<HttpSession> self) {
-    for (std::chrono::seconds patience = kRequestTime; !leaving_; patience = kKeepAliveTime) {
+    for (std::chrono::milliseconds patience = context_.options.handshake_time; !leaving_; patience = kKeepAliveTime) {
       http::request_parser<http::empty_body> parser;
       parser.header_limit(kMaxHeader);
       stream_.expires_after(patience);
@@ -114,7 +117,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
           break;
         }
         stream_.expires_never();  // from here on the WebSocket's own deadlines hold
-        start_websocket_session(std::move(stream_), request, context_);
+        start_websocket_session(std::move(stream_), request, context_, {scope_for(request), std::move(seat_)});
         co_return;
       }
       // A body is not read, so what follows it cannot be told from it: the connection ends with this answer.
@@ -130,14 +133,17 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   HttpAnswer answer_to(const Request& request) const {
     if (door_ == Door::all && request.target() == protocol::kPath) return short_answer(426, "this is where WebSocket sessions are opened");
+    const auto scope = scope_for(request);
     const HttpRequest asked{.method = request.method_string(),
                             .target = request.target(),
                             .host = request[http::field::host],
                             .accept_encoding = request[http::field::accept_encoding],
-                            .if_none_match = request[http::field::if_none_match]};
+                            .if_none_match = request[http::field::if_none_match],
+                            .scope = scope.get()};
     return intervale::answer(asked, {.catalogue = context_.catalogue,
                                      .metrics = context_.metrics,
                                      .viewer = context_.viewer,
+                                     .queued_bytes = context_.outbox.bytes(),
                                      .door = door_,
                                      .has_metrics_door = context_.options.metrics_listen.has_value(),
                                      .ready = !leaving_});
@@ -146,7 +152,36 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   std::optional<HttpAnswer> unfit_for_session(const Request& request) const {
     if (leaving_) return short_answer(503, "draining");
     if (!offers_our_subprotocol(request)) return short_answer(400, "the subprotocol intervale.v1 is not offered");
+    const std::string_view origin = request[http::field::origin], host = request[http::field::host];
+    if (!is_allowed_origin(origin, host, context_.options.allowed_origins)) {
+      return refused(Refusal::origin, short_answer(403, "pages of this origin may not open sessions here"));
+    }
+    // A page is not shown the answer to its upgrade: it is let in, to be told with a close code.
+    if (origin.empty() && scope_for(request) == nullptr) return refused(Refusal::token, unauthorized());
+    const auto& most = context_.options.max_sessions;
+    if (most && context_.metrics.sessions.Value() >= double(*most)) return refused(Refusal::sessions, full());
+    const auto& memory = context_.options.max_memory;
+    if (memory && resident_bytes() > *memory) return refused(Refusal::memory, full());
     return {};
+  }
+
+  [[nodiscard]] HttpAnswer refused(Refusal reason, HttpAnswer answer) const {
+    context_.metrics.refused(reason);
+    return answer;
+  }
+
+  static HttpAnswer full() {
+    HttpAnswer answer = short_answer(503, "no room for another session now");
+    answer.headers.emplace_back("Retry-After", "5");
+    return answer;
+  }
+
+  // What whoever sends this may see; nullptr: nothing.
+  [[nodiscard]] std::shared_ptr<const Scope> scope_for(const Request& request) const {
+    const auto tokens = context_.tokens.get();
+    if (!tokens) return Scope::everything();
+    const auto token = token_of(request[http::field::authorization], request[http::field::sec_websocket_protocol]);
+    return token ? tokens->find(*token) : nullptr;
   }
 
   // What did not read as a request is told so, if it was bytes at all that came.
@@ -170,6 +205,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   asio::any_io_executor strand_;  // apart, for go_away comes from other threads and an upgrade moves the stream away
   ServerContext& context_;
   Door door_;
+  AddressCounts::Seat seat_;
   beast::flat_buffer buffer_{2 * kMaxHeader};
   bool waiting_ = false;  // for a request
   bool leaving_ = false;
@@ -178,8 +214,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
 }  // namespace
 
-void start_http_session(asio::ip::tcp::socket socket, ServerContext& context, Door door) {
-  std::make_shared<HttpSession>(std::move(socket), context, door)->start();
+void start_http_session(asio::ip::tcp::socket socket, ServerContext& context, Door door, AddressCounts::Seat seat) {
+  std::make_shared<HttpSession>(std::move(socket), context, door, std::move(seat))->start();
 }
 
 }  // namespace intervale

@@ -73,9 +73,17 @@ void Listener::close() {
   });
 }
 
+std::optional<AddressCounts::Seat> Listener::seat_for(const tcp::socket& socket) {
+  if (door_ != Door::all || !context_.options.max_connections_per_address) return AddressCounts::Seat();
+  boost::system::error_code error;
+  const auto peer = socket.remote_endpoint(error);
+  if (error) return {};  // gone already
+  return context_.addresses.enter(peer.address(), *context_.options.max_connections_per_address);
+}
+
 asio::awaitable<void> Listener::accept_all() {
   while (acceptor_.is_open()) {
-    auto [error, socket] = co_await acceptor_.async_accept(asio::make_strand(io_), kAwait);
+    auto [error, accepted] = co_await acceptor_.async_accept(asio::make_strand(io_), kAwait);
     if (error == asio::error::operation_aborted) co_return;
     if (error) {
       // Out of descriptors, most likely: what is open goes on, and in a while there may be room again.
@@ -84,12 +92,18 @@ asio::awaitable<void> Listener::accept_all() {
       co_await pause.async_wait(kAwait);
       continue;
     }
+    tcp::socket socket(std::move(accepted));
     // Whoever watches is let in, when it matters most.
     if (door_ == Door::all && context_.connections.size() >= context_.options.max_connections) {
-      context_.metrics.refused_total.Increment();  // and the socket closes
+      context_.metrics.refused(Refusal::connections);  // and the socket closes
       continue;
     }
-    start_http_session(std::move(socket), context_, door_);
+    auto seat = seat_for(socket);
+    if (!seat) {
+      context_.metrics.refused(Refusal::address);
+      continue;
+    }
+    start_http_session(std::move(socket), context_, door_, std::move(*seat));
   }
 }
 

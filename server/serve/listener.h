@@ -5,6 +5,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/result.h"
@@ -28,6 +29,7 @@ class Listener {
  private:
   Listener(boost::asio::io_context& io, ServerContext& context, Door door);
   boost::asio::awaitable<void> accept_all();
+  std::optional<AddressCounts::Seat> seat_for(const boost::asio::ip::tcp::socket& socket);  // nothing: too many from there
 
   boost::asio::io_context& io_;
   boost::asio::ip::tcp::acceptor acceptor_;  // on a strand of its own

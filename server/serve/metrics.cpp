@@ -1,13 +1,13 @@
 #include "server/serve/metrics.h"
 
 #include <prometheus/text_serializer.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <utility>
 #include <vector>
+
+#include "server/serve/guard.h"
 
 namespace intervale {
 namespace {
@@ -18,7 +18,10 @@ using prometheus::MetricType;
 using prometheus::Registry;
 
 // Of all that a client may send, so that there are never more series than these.
-constexpr std::array<unsigned, 15> kCodes{1000, 1001, 1002, 1003, 1005, 1011, 1013, 4400, 4401, 4403, 4404, 4408, 4409, 4413, 4429};
+constexpr std::array<unsigned, 13> kCodes{1000, 1001, 1002, 1003, 1005, 1011, 4400, 4401, 4403, 4404, 4408, 4409, 4413};
+
+// In Refusal's order.
+constexpr std::array<const char*, 6> kReasons{"connections", "address", "sessions", "memory", "origin", "token"};
 
 const Histogram::BucketBoundaries kSelectionSeconds{0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1};
 const Histogram::BucketBoundaries kAnswerSeconds{0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10};
@@ -46,16 +49,6 @@ MetricFamily gauges(const char* name, const char* help, std::vector<prometheus::
   return {name, help, MetricType::Gauge, std::move(metrics)};
 }
 
-// The process' memory that is in use, as the kernel counts it.
-double resident_bytes() {
-  long pages = 0;
-  if (std::FILE* const file = std::fopen("/proc/self/statm", "re")) {
-    if (std::fscanf(file, "%*s %ld", &pages) != 1) pages = 0;
-    std::fclose(file);
-  }
-  return double(pages) * double(::sysconf(_SC_PAGESIZE));
-}
-
 }  // namespace
 
 Metrics::Metrics()
@@ -63,34 +56,40 @@ Metrics::Metrics()
                   .Name("intervale_session_closes_total")
                   .Help("Sessions that ended, by close code; none: the connection broke.")
                   .Register(registry_)),
+      refusals_(prometheus::BuildCounter()
+                    .Name("intervale_refused_total")
+                    .Help("Connections and sessions that were turned away, by reason.")
+                    .Register(registry_)),
       connections(gauge(registry_, "intervale_connections", "Open connections.")),
       sessions(gauge(registry_, "intervale_sessions", "Open streaming sessions.")),
       sessions_total(counter(registry_, "intervale_sessions_total", "Streaming sessions so far.")),
-      refused_total(counter(registry_, "intervale_connections_refused_total", "Connections turned away at a limit.")),
       updates_sent_total(counter(registry_, "intervale_updates_sent_total", "Updates sent.")),
       bytes_sent_total(counter(registry_, "intervale_bytes_sent_total", "Bytes of streaming messages sent.")),
       faults_total(counter(registry_, "intervale_session_faults_total", "Sessions closed for what their client did.")),
-      queued_bytes(gauge(registry_, "intervale_queued_bytes", "Bytes of streaming messages that are leaving.")),
       selection_(histogram(registry_, "intervale_selection_seconds", "Time to choose and pack one message.", kSelectionSeconds)),
       first_mesh_(
           histogram(registry_, "intervale_first_mesh_seconds", "From a session's first view to the first message for it, sent.", kAnswerSeconds)),
       view_change_(histogram(registry_, "intervale_view_change_seconds", "From a later view to the first message for it, sent.", kAnswerSeconds)) {
   // Counters that are there from the start: rates begin at 0.
   for (const unsigned code : kCodes) closes_.Add({{"code", std::to_string(code)}});
+  for (const char* reason : kReasons) refusals_.Add({{"reason", reason}});
 }
+
+void Metrics::refused(Refusal reason) { refusals_.Add({{"reason", kReasons[std::size_t(reason)]}}).Increment(); }
 
 void Metrics::closed(unsigned code) {
   const bool known = std::find(kCodes.begin(), kCodes.end(), code) != kCodes.end();
   closes_.Add({{"code", code == 0 ? "none" : known ? std::to_string(code) : "other"}}).Increment();
 }
 
-std::string Metrics::text(const Catalogue& catalogue) const {
+std::string Metrics::text(const Catalogue& catalogue, std::uint64_t queued_bytes) const {
   std::vector<MetricFamily> families = registry_.Collect();
   std::vector<prometheus::ClientMetric> memory;
   for (const auto& [name, volume] : catalogue.volumes()) memory.push_back(value(double(volume->memory_bytes()), {{"dataset", name}}));
+  families.push_back(gauges("intervale_queued_bytes", "Bytes of streaming messages that are leaving.", {value(double(queued_bytes))}));
   families.push_back(gauges("intervale_datasets", "Data sets that are served.", {value(double(catalogue.volumes().size()))}));
   families.push_back(gauges("intervale_dataset_memory_bytes", "Memory that a data set takes.", std::move(memory)));
-  families.push_back(gauges("intervale_resident_memory_bytes", "Memory that the server takes in all.", {value(resident_bytes())}));
+  families.push_back(gauges("intervale_resident_memory_bytes", "Memory that the server takes in all.", {value(double(resident_bytes()))}));
   return prometheus::TextSerializer().Serialize(families);
 }
 

@@ -15,10 +15,15 @@
 
 namespace intervale {
 
+// Why somebody was turned away: too many connections, or from one address, too many sessions, too much memory; a page's origin; no token that opens
+// what is asked for.
+enum class Refusal { connections, address, sessions, memory, origin, token };
+
 class Metrics {
   // Before the references below, which are made of it.
   prometheus::Registry registry_;
   prometheus::Family<prometheus::Counter>& closes_;
+  prometheus::Family<prometheus::Counter>& refusals_;
 
  public:
   using Duration = std::chrono::steady_clock::duration;
@@ -30,19 +35,19 @@ class Metrics {
   prometheus::Gauge& connections;
   prometheus::Gauge& sessions;  // WebSocket sessions
   prometheus::Counter& sessions_total;
-  prometheus::Counter& refused_total;  // connections over the limit
   prometheus::Counter& updates_sent_total;
   prometheus::Counter& bytes_sent_total;  // of WebSocket messages
   prometheus::Counter& faults_total;      // sessions ended for what the client did
-  prometheus::Gauge& queued_bytes;        // of WebSocket messages that are leaving
 
   void chose(Duration time) { observe(selection_, time); }            // choosing and packing one message
   void first_answer(Duration time) { observe(first_mesh_, time); }    // from a session's first View to its first message, sent
   void answered_view(Duration time) { observe(view_change_, time); }  // the same of a later View
-  void closed(unsigned code);                                         // a session has ended so; 0: its connection broke
+  void refused(Refusal reason);
+  void closed(unsigned code);  // a session has ended so; 0: its connection broke
 
-  // In Prometheus' text format, version 0.0.4. What is served is told as of now.
-  [[nodiscard]] std::string text(const Catalogue& catalogue) const;
+  // In Prometheus' text format, version 0.0.4. What is served is told as of now, and queued_bytes, of
+  // WebSocket messages that are leaving.
+  [[nodiscard]] std::string text(const Catalogue& catalogue, std::uint64_t queued_bytes) const;
 
  private:
   static void observe(prometheus::Histogram& histogram, Duration time) { histogram.Observe(std::chrono::duration<double>(time).count()); }

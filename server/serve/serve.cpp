@@ -4,6 +4,8 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <functional>
@@ -16,6 +18,8 @@
 
 namespace intervale {
 namespace {
+
+constexpr std::chrono::seconds kLook{2};  // at files that may have changed
 
 // Where a build and an installation alike put the viewer.
 std::optional<std::filesystem::path> viewer_beside_the_program() {
@@ -56,6 +60,15 @@ void await_each(boost::asio::signal_set& signals, const std::function<void()>& a
   });
 }
 
+// Now and then, and whenever the timer is cancelled, as long as the io_context runs.
+void repeat(boost::asio::steady_timer& timer, const std::function<void()>& act) {
+  timer.expires_after(kLook);
+  timer.async_wait([&timer, act](const boost::system::error_code&) {
+    act();
+    repeat(timer, act);
+  });
+}
+
 }  // namespace
 
 Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std::vector<std::filesystem::path>& inputs) {
@@ -71,8 +84,12 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
     signals.stop();
   });
   boost::asio::signal_set hang_up(signals, SIGHUP);
+  boost::asio::steady_timer timer(signals);
   LevelSwitch level(log);
-  await_each(hang_up, [&level] { level.next(); });
+  await_each(hang_up, [&] {
+    level.next();
+    timer.cancel();  // and looks at once
+  });
 
   ServeOptions options = wanted;
   if (!options.viewer) options.viewer = viewer_beside_the_program();
@@ -83,6 +100,7 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
   if (!server) return tl::unexpected(server.error());
   spdlog::info("serving {} data set{}{}{}", count, count == 1 ? "" : "s", options.viewer ? "; the viewer is at " : " at ", (*server)->url());
 
+  repeat(timer, [&server] { (*server)->refresh(); });
   signals.run();
   spdlog::info("{}: draining", signal == SIGINT ? "SIGINT" : "SIGTERM");
   (*server)->stop();

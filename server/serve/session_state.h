@@ -5,9 +5,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "protocol/limits.h"
 #include "protocol/messages.h"
+#include "server/serve/access.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/stream_plan.h"
 
@@ -16,7 +18,8 @@ namespace intervale {
 // One thread at a time. `catalogue` must outlive it.
 class SessionState {
  public:
-  explicit SessionState(const Catalogue& catalogue) : catalogue_(catalogue) {}
+  // scope: what may be opened; nullptr: nothing.
+  SessionState(const Catalogue& catalogue, std::shared_ptr<const Scope> scope) : catalogue_(catalogue), scope_(std::move(scope)) {}
 
   // Takes a client's message. A fault ends the session: nothing else may be called after.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
@@ -43,6 +46,7 @@ class SessionState {
   std::optional<protocol::ServerMessage> next_batch_or_done(std::size_t max_payload);
 
   const Catalogue& catalogue_;
+  std::shared_ptr<const Scope> scope_;
   Catalogue::Volume volume_;
   std::string dataset_;
   std::optional<StreamPlan> plan_;

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/serve/header_text.h"
+
 namespace intervale {
 namespace {
 
@@ -99,24 +101,6 @@ StaticContent content_of(std::string bytes) {
   std::array<char, 24> tag{};
   std::snprintf(tag.data(), tag.size(), "\"%016llx\"", static_cast<unsigned long long>(XXH3_64bits(bytes.data(), bytes.size())));
   return {std::make_shared<const std::string>(std::move(bytes)), tag.data()};
-}
-
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
-
-// What stands before the separator, which is taken away with it.
-std::string_view take(std::string_view& rest, char separator) {
-  const auto end = rest.find(separator);
-  const std::string_view item = rest.substr(0, end);
-  rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
-  return trimmed(item);
-}
-
-bool equal_but_for_case(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
 // "gzip;q=0.5" without the name. What cannot be read is a no.

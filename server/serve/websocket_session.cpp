@@ -36,12 +36,16 @@ constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
  public:
-  WebSocketSession(beast::tcp_stream stream, ServerContext& context)
+  WebSocketSession(beast::tcp_stream stream, ServerContext& context, Guest guest)
       : ws_(std::move(stream)),
         wake_(ws_.get_executor()),
         write_deadline_(ws_.get_executor()),
+        pace_(ws_.get_executor()),
         context_(context),
-        state_(context.catalogue),
+        guest_(std::move(guest)),
+        state_(context.catalogue, guest_.scope),
+        messages_(context.options.messages_per_second),
+        views_(context.options.views_per_second),
         id_(context.next_session_id++) {}
   WebSocketSession(const WebSocketSession&) = delete;
   WebSocketSession& operator=(const WebSocketSession&) = delete;
@@ -69,6 +73,13 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     asio::post(ws_.get_executor(), [self = shared_from_this()] { self->end({CloseCode::going_away, "the server shuts down"}); });
   }
 
+  void drop() override {
+    asio::post(ws_.get_executor(), [self = shared_from_this()] {
+      if (self->note_.empty()) self->note_ = "the client does not take what it asked for, and memory is short";
+      self->cut_off();
+    });
+  }
+
  private:
   void spawn(asio::awaitable<void> coroutine) {
     asio::co_spawn(ws_.get_executor(), std::move(coroutine), [self = shared_from_this()](const std::exception_ptr& failure) {
@@ -90,6 +101,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   void end(Fault why) {
     if (!why_ && !gone_) why_ = std::move(why);
     wake_.cancel();
+    pace_.cancel();
   }
 
   // Ends it at once.
@@ -97,6 +109,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     gone_ = true;
     beast::get_lowest_layer(ws_).close();
     wake_.cancel();
+    pace_.cancel();
   }
 
   asio::awaitable<void> run(std::shared_ptr<WebSocketSession> self, Request request) {
@@ -104,6 +117,10 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (const auto [error] = co_await ws_.async_accept(request, kAwait); error) {
       note_ = error.message();
       co_return;
+    }
+    if (guest_.scope == nullptr) {
+      context_.metrics.refused(Refusal::token);
+      end({CloseCode::unauthorized, "a token is wanted, and none that opens anything came"});
     }
     open_deadline_ = Clock::now() + context_.options.handshake_time;
     spawn(write_messages(self));
@@ -138,10 +155,13 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         if (buffer.size() > protocol::kMaxClientMessage) co_return end({CloseCode::too_large, "the message is too large"});
       } while (!ws_.is_message_done());
       if (why_) co_return;
+      co_await keep_pace(messages_);
       const std::span bytes(static_cast<const std::uint8_t*>(buffer.data().data()), buffer.size());
       const auto message = protocol::decode_client_message(bytes);
       if (!message) co_return end({CloseCode::malformed, message.error().message});
-      if (const auto* view = std::get_if<protocol::View>(&*message); view != nullptr && !view->forget.empty()) {
+      const auto* const view = std::get_if<protocol::View>(&*message);
+      if (view != nullptr) co_await keep_pace(views_);
+      if (view != nullptr && !view->forget.empty()) {
         // That takes time, like a batch.
         co_await context_.turnstile.enter(id_, Turnstile::Turn::answer, asio::use_awaitable);
         const Inside inside{context_.turnstile, Turnstile::Turn::answer};
@@ -150,6 +170,14 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         receive(*message);
       }
     }
+  }
+
+  // A client that sends faster than it may is read more slowly, and its line fills up.
+  asio::awaitable<void> keep_pace(RateLimit& limit) {
+    const auto time = limit.take(Clock::now());
+    if (time == Clock::duration(0) || why_ || gone_) co_return;
+    pace_.expires_after(time);
+    co_await pace_.async_wait(kAwait);
   }
 
   // Between enter() and leave().
@@ -256,9 +284,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     write_deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
       if (const auto self = weak.lock(); self && !error) self->cut_off();
     });
-    context_.metrics.queued_bytes.Increment(double(bytes.size()));
+    const auto leaving = context_.outbox.add(weak_from_this(), bytes.size());
     const auto [error, size] = co_await ws_.async_write(asio::buffer(bytes), kAwait);
-    context_.metrics.queued_bytes.Decrement(double(bytes.size()));
     write_deadline_.cancel();
     if (error) {
       if (note_.empty()) note_ = error.message();
@@ -284,8 +311,11 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   websocket::stream<beast::tcp_stream> ws_;
   asio::steady_timer wake_;  // the writer sleeps on it
   asio::steady_timer write_deadline_;
+  asio::steady_timer pace_;  // the reader sleeps on it
   ServerContext& context_;
+  Guest guest_;
   SessionState state_;
+  RateLimit messages_, views_;
   std::uint64_t id_;
   std::optional<Fault> why_;  // set once the session is to end
   bool gone_ = false;         // nothing can be sent any more
@@ -307,8 +337,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
 }  // namespace
 
-void start_websocket_session(beast::tcp_stream stream, const Request& request, ServerContext& context) {
-  std::make_shared<WebSocketSession>(std::move(stream), context)->start(request);
+void start_websocket_session(beast::tcp_stream stream, const Request& request, ServerContext& context, Guest guest) {
+  std::make_shared<WebSocketSession>(std::move(stream), context, std::move(guest))->start(request);
 }
 
 }  // namespace intervale

@@ -5,12 +5,20 @@
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
 
+#include <memory>
+
 #include "server/serve/context.h"
 
 namespace intervale {
 
+// Who the session is for.
+struct Guest {
+  std::shared_ptr<const Scope> scope;  // nullptr: it has no right to be here, and is told so with close code 4401
+  AddressCounts::Seat seat;
+};
+
 // Answers an upgrade request that offers our subprotocol and streams from then on. Returns at once; the session keeps itself alive.
 void start_websocket_session(boost::beast::tcp_stream stream, const boost::beast::http::request<boost::beast::http::empty_body>& request,
-                             ServerContext& context);
+                             ServerContext& context, Guest guest);
 
 }  // namespace intervale

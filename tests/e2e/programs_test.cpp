@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -278,6 +279,36 @@ TEST(Programs, AServerThatIsKilledAndStartedAgainIsFoundAgain) {
   const auto got = fetch_json({}, relay.url("buckyball"));
   EXPECT_GE(got.at("reconnects"), 1);
   for (const char* key : {"updates", "vertices", "tets", "volume"}) EXPECT_EQ(got.at(key), whole.at(key)) << key;
+}
+
+TEST(Programs, TokensLetInAndAreNeverTold) {
+  const TempDir folder;
+  const std::string secret = "hush-0123456789", wrong = "wrong-0123456789";
+  ServerProgram server(buckyball().string(), {"--tokens", folder.file("tokens", secret + "\n" + secret + "2 other\n"), "--log-level", "trace"});
+  const auto fetch = [&server](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{client(), "fetch", server.url("buckyball"), "--error-percent", "50"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  };
+  expect_complaint(fetch({}), 1, "wants a token: --token or INTERVALE_TOKEN");
+  expect_complaint(fetch({"--token", wrong}), 1, "does not know the token given");
+  expect_complaint(fetch({"--token", secret + "2"}), 1, "does not open 'buckyball'");
+  EXPECT_EQ(fetch({"--token", secret}).status, 0);
+  expect_complaint(run({client(), "list", server.url()}), 1, "wants a token");
+  folder.file("tokens", secret + "\n" + secret + "3 buckyball\n");
+  EXPECT_TRUE(server.process().wait_for("read the tokens in "));
+  EXPECT_EQ(fetch({"--token", secret + "3"}).status, 0);
+  expect_complaint(run({client(), "fetch", server.url("buckyball"), "--token", "a b"}), 2, "--token");
+  ::setenv("INTERVALE_TOKEN", secret.c_str(), 1);
+  const auto listed = run({client(), "list", server.url()});
+  const auto loaded = run({program("intervale-load"), server.url("buckyball"), "--clients", "2", "--duration", "0.1"});
+  ::unsetenv("INTERVALE_TOKEN");
+  EXPECT_THAT(listed.out, StartsWith("buckyball: "));
+  EXPECT_EQ(loaded.status, 0) << loaded.err;
+  server.process().signal(SIGTERM);
+  const Finished served = server.process().wait();
+  EXPECT_EQ(served.status, 0);
+  EXPECT_THAT(served.err, testing::AllOf(HasSubstr("session 1 "), Not(HasSubstr("hush")), Not(HasSubstr("wrong-"))));
 }
 
 TEST(Programs, SighupChangesWhatTheServerSays) {

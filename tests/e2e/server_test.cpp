@@ -40,6 +40,10 @@ std::unique_ptr<Server> start(const ServeOptions& wanted = {}) {
   return std::move(*server);
 }
 
+std::string get(std::uint16_t port, const std::string& target) {
+  return talk(port, "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+}
+
 const Open kOpen{"buckyball", "test", protocol::kDefaultWindow};
 const View kEverything{1, {}};
 
@@ -292,6 +296,150 @@ TEST(Server, TurnsConnectionsAwayAtItsLimit) {
   EXPECT_GT(second.finish(), 0u);
 }
 
+TEST(Server, TurnsSessionsAwayAtItsLimits) {
+  ServeOptions options;
+  options.max_sessions = 1;
+  {
+    const auto server = start(options);
+    EXPECT_EQ(upgrade_status(server->port(), {}), 101u);
+    const Waiting only(server->port());
+    EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
+    EXPECT_THAT(get(server->port(), "/metrics"), HasSubstr("intervale_refused_total{reason=\"sessions\"} 1\n"));
+  }
+  options = {};
+  options.max_memory = 1;
+  {
+    const auto server = start(options);
+    EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
+    EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
+  }
+  options = {};
+  options.max_connections_per_address = 2;
+  const auto server = start(options);
+  Waiting first(server->port());
+  Waiting second(server->port());
+  EXPECT_EQ(talk(server->port(), ""), "");
+  EXPECT_GT(first.finish(), 0u);
+}
+
+TEST(Server, ReadsASessionThatSaysTooMuchMoreSlowly) {
+  ServeOptions options;
+  options.messages_per_second = 50;
+  options.views_per_second = 20;
+  const auto server = start(options);
+  RawClient client(server->port());
+  client.send(kOpen);
+  const auto begun = std::chrono::steady_clock::now();
+  for (std::uint64_t epoch = 1; epoch <= 30; ++epoch) client.send(View{epoch, {}});
+  (void)client.expect<Opened>();
+  for (std::uint64_t epoch = 0; epoch < 30;) {  // 20 at once, and 10 more within half a second
+    const auto message = client.receive().value();
+    if (const auto* batch = std::get_if<Batch>(&message)) epoch = batch->epoch, client.send(Credit{protocol::cost_of(*batch)});
+    if (const auto* done = std::get_if<Done>(&message)) epoch = done->epoch;
+  }
+  EXPECT_GE(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(450));
+}
+
+struct Guarded {
+  TempDir folder;
+  std::unique_ptr<Server> server;
+  Guarded() {
+    ServeOptions options;
+    options.tokens = folder.file("tokens", "all-of-it\nbucky-only bucky*\nother-only other\n");
+    server = start(options);
+  }
+  [[nodiscard]] std::uint16_t port() const { return server->port(); }
+};
+
+TEST(Access, NeedsATokenInTheHeader) {
+  const Guarded guarded;
+  EXPECT_EQ(upgrade_status(guarded.port(), {}), 401u);
+  EXPECT_EQ(upgrade_status(guarded.port(), {.authorization = "Bearer wrong"}), 401u);
+  for (const char* token : {"all-of-it", "bucky-only"}) {
+    RawClient client(guarded.port(), {.authorization = std::string("Bearer ") + token});
+    client.send(kOpen);
+    client.send(kEverything);
+    EXPECT_GT(client.stream_to_end(), 0u);
+  }
+}
+
+// What there is cannot be told from what there is not.
+TEST(Access, ATokenOpensItsDataSetsOnly) {
+  const Guarded guarded;
+  for (const char* name : {"buckyball", "nothing", "../buckyball"}) {
+    RawClient client(guarded.port(), {.authorization = "Bearer other-only"});
+    client.send(Open{name, "", 0});
+    const auto end = client.end();
+    EXPECT_EQ(end.code, static_cast<unsigned>(CloseCode::forbidden)) << name;
+    EXPECT_EQ(end.fault.value().text, "this token does not open that data set");
+  }
+  RawClient client(guarded.port(), {.authorization = "Bearer all-of-it"});
+  client.send(Open{"nothing", "", 0});
+  EXPECT_EQ(client.end().code, static_cast<unsigned>(CloseCode::no_such_dataset));
+}
+
+TEST(Access, PagesSendTheirTokenAsASubprotocolAndAreToldByACloseCode) {
+  const Guarded guarded;
+  const std::string origin = "http://127.0.0.1";
+  RawClient good(guarded.port(), {.subprotocols = "intervale.v1, intervale.token.YWxsLW9mLWl0", .origin = origin});
+  good.send(kOpen);
+  good.send(kEverything);
+  EXPECT_GT(good.stream_to_end(), 0u);
+  for (const char* offered : {"intervale.v1", "intervale.v1, intervale.token.d3Jvbmc"}) {
+    RawClient bad(guarded.port(), {.subprotocols = offered, .origin = origin});
+    bad.send(kOpen);
+    const auto end = bad.end();
+    EXPECT_EQ(end.code, static_cast<unsigned>(CloseCode::unauthorized));
+    ASSERT_TRUE(end.fault);
+    EXPECT_EQ(end.fault->code, CloseCode::unauthorized);
+  }
+}
+
+TEST(Access, ListsWhatATokenOpens) {
+  const Guarded guarded;
+  const auto list = [&](const std::string& token) {
+    return talk(guarded.port(), "GET /api/datasets HTTP/1.1\r\nHost: x\r\nConnection: close\r\nAuthorization: Bearer " + token + "\r\n\r\n");
+  };
+  EXPECT_THAT(list("wrong"), testing::AllOf(StartsWith("HTTP/1.1 401"), HasSubstr("WWW-Authenticate: Bearer"), Not(HasSubstr("buckyball"))));
+  EXPECT_THAT(list("bucky-only"), HasSubstr("buckyball"));
+  EXPECT_THAT(list("other-only"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("\"datasets\":[]")));
+  EXPECT_THAT(get(guarded.port(), "/"), Not(HasSubstr("buckyball")));
+  EXPECT_THAT(get(guarded.port(), "/metrics"), StartsWith("HTTP/1.1 401"));
+  for (const char* target : {"/healthz", "/readyz"}) EXPECT_THAT(get(guarded.port(), target), StartsWith("HTTP/1.1 200"));
+}
+
+TEST(Access, TokensAreReadAgainWhenTheirFileChanges) {
+  const Guarded guarded;
+  const RawClient::Hello old{.authorization = "Bearer all-of-it"}, late{.authorization = "Bearer another-one"};
+  RawClient running(guarded.port(), old);
+  guarded.folder.file("tokens", "another-one\n");
+  guarded.server->refresh();
+  EXPECT_EQ(upgrade_status(guarded.port(), old), 401u);
+  EXPECT_EQ(upgrade_status(guarded.port(), late), 101u);
+  running.send(kOpen);
+  running.send(kEverything);
+  EXPECT_GT(running.stream_to_end(), 0u) << "a session keeps what it was let in with";
+  guarded.folder.file("tokens", "n o ! t o k e n s\n!\n");
+  guarded.server->refresh();
+  EXPECT_EQ(upgrade_status(guarded.port(), late), 101u) << "what cannot be read changes nothing";
+  std::filesystem::remove(guarded.folder / "tokens");
+  guarded.server->refresh();
+  EXPECT_EQ(upgrade_status(guarded.port(), late), 101u);
+}
+
+TEST(Access, PagesOfOtherOriginsOpenNothing) {
+  const auto server = start();
+  EXPECT_EQ(upgrade_status(server->port(), {.origin = "http://127.0.0.1"}), 101u);
+  EXPECT_EQ(upgrade_status(server->port(), {.origin = "http://evil.example"}), 403u);
+  EXPECT_EQ(upgrade_status(server->port(), {.origin = "null"}), 403u);
+  ServeOptions options;
+  options.allowed_origins = {"https://good.example"};
+  const auto strict = start(options);
+  EXPECT_EQ(upgrade_status(strict->port(), {}), 101u);
+  EXPECT_EQ(upgrade_status(strict->port(), {.origin = "https://good.example"}), 101u);
+  EXPECT_EQ(upgrade_status(strict->port(), {.origin = "http://127.0.0.1"}), 403u);
+}
+
 TEST(Server, AnAddressThatCannotBeHadIsAnError) {
   const auto server = start();
   for (const std::string& listen : {"127.0.0.1:" + std::to_string(server->port()), std::string("192.0.2.1:1")}) {
@@ -333,10 +481,6 @@ TEST(Http, AnswersByMethodAndTarget) {
   EXPECT_THAT(ask("POST /"), testing::AllOf(StartsWith("HTTP/1.1 405"), HasSubstr("Allow: GET, HEAD")));
   EXPECT_THAT(ask("GET /../etc/passwd"), StartsWith("HTTP/1.1 404"));
   EXPECT_THAT(ask("GET /v1/stream"), StartsWith("HTTP/1.1 426"));
-}
-
-std::string get(std::uint16_t port, const std::string& target) {
-  return talk(port, "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
 }
 
 TEST(Metrics, TellWhatASessionGot) {

@@ -35,6 +35,7 @@ HttpAnswer get(const StaticFiles& viewer, HttpRequest request) {
   const Catalogue catalogue;
   const Metrics metrics;
   if (request.method.empty()) request.method = "GET";
+  request.scope = Scope::everything().get();
   return answer(request, {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
 }
 

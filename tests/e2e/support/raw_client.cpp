@@ -18,6 +18,14 @@ namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 using asio::ip::tcp;
 
+void set_headers(websocket::stream<tcp::socket>& ws, const RawClient::Hello& hello) {
+  ws.set_option(websocket::stream_base::decorator([hello](websocket::request_type& request) {
+    request.set(beast::http::field::sec_websocket_protocol, hello.subprotocols);
+    if (!hello.authorization.empty()) request.set(beast::http::field::authorization, hello.authorization);
+    if (!hello.origin.empty()) request.set(beast::http::field::origin, hello.origin);
+  }));
+}
+
 }  // namespace
 
 struct RawClient::Socket {
@@ -26,12 +34,22 @@ struct RawClient::Socket {
   unsigned close_code = 0;
 };
 
-RawClient::RawClient(std::uint16_t port) : socket_(std::make_unique<Socket>()) {
+RawClient::RawClient(std::uint16_t port, const Hello& hello) : socket_(std::make_unique<Socket>()) {
   auto& ws = socket_->ws;
   ws.next_layer().connect({asio::ip::address_v4::loopback(), port});
-  ws.set_option(websocket::stream_base::decorator(
-      [](websocket::request_type& request) { request.set(beast::http::field::sec_websocket_protocol, protocol::kSubprotocol); }));
+  set_headers(ws, hello);
   ws.handshake("127.0.0.1", protocol::kPath);
+}
+
+unsigned upgrade_status(std::uint16_t port, const RawClient::Hello& hello) {
+  asio::io_context io;
+  websocket::stream<tcp::socket> ws(io);
+  ws.next_layer().connect({asio::ip::address_v4::loopback(), port});
+  set_headers(ws, hello);
+  websocket::response_type response;
+  beast::error_code ignored;
+  ws.handshake(response, "127.0.0.1", protocol::kPath, ignored);
+  return response.result_int();
 }
 
 RawClient::~RawClient() = default;

@@ -13,7 +13,13 @@ namespace intervale {
 
 class RawClient {
  public:
-  explicit RawClient(std::uint16_t port);  // with the handshake done
+  struct Hello {
+    std::string subprotocols = protocol::kSubprotocol;
+    std::string authorization = {}, origin = {};  // headers; empty: none
+  };
+  // With the handshake done. Throws if it is refused.
+  explicit RawClient(std::uint16_t port) : RawClient(port, Hello{}) {}
+  RawClient(std::uint16_t port, const Hello& hello);
   ~RawClient();
 
   void send(const protocol::ClientMessage& message);
@@ -40,6 +46,9 @@ class RawClient {
   struct Socket;
   std::unique_ptr<Socket> socket_;
 };
+
+// The status that the server answers an upgrade with; 101: it is accepted.
+unsigned upgrade_status(std::uint16_t port, const RawClient::Hello& hello);
 
 // Sends bytes over plain TCP and gives what comes back until the server closes.
 [[nodiscard]] std::string talk(std::uint16_t port, const std::string& bytes);
