@@ -117,7 +117,7 @@ Result<void> run(const FetchCommand& options) {
 void add_fetch_command(Program& program) {
   const auto options = std::make_shared<FetchCommand>();
   CLI::App& command = program.add_command("fetch", "Receives a mesh, and writes it or draws it", [options] { return run(*options); });
-  command.add_option("URL", options->url, "ws://host:port/NAME")->required();
+  command.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
   command
       .add_option_function<std::string>(
           "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")

@@ -3,6 +3,7 @@
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/connect.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -18,8 +19,9 @@
 #include <variant>
 #include <vector>
 
-#include "client/net/connection.h"
 #include "client/core/grants.h"
+#include "client/net/connection.h"
+#include "client/net/line.h"
 #include "protocol/codec.h"
 
 namespace intervale {
@@ -98,7 +100,7 @@ class LoadClient {
   [[nodiscard]] protocol::View view() const;
   [[nodiscard]] std::optional<protocol::View> due_view();
 
-  websocket::stream<beast::tcp_stream> ws_;
+  websocket::stream<Stream> ws_;
   beast::flat_buffer buffer_;
   asio::steady_timer wake_;  // the writer sleeps on it
   asio::steady_timer line_;  // the reader does, where the rate is limited
@@ -150,14 +152,25 @@ asio::awaitable<void> LoadClient::run() {
 
 asio::awaitable<bool> LoadClient::connect() {
   auto& stream = beast::get_lowest_layer(ws_);
-  stream.expires_after(plan_.patience);
-  if (const auto [error, endpoint] = co_await stream.async_connect(endpoints_, kAwait); error) {
+  // Until the WebSocket's own deadlines hold.
+  asio::steady_timer deadline(ws_.get_executor(), plan_.patience);
+  deadline.async_wait([&stream](beast::error_code error) {
+    if (!error) stream.close();
+  });
+  if (const auto [error, endpoint] = co_await asio::async_connect(stream.socket(), endpoints_, kAwait); error) {
     fail("cannot connect to " + plan_.url.authority() + ": " + error.message());
     co_return false;
   }
-  stream.expires_never();  // from here on the WebSocket's own deadlines hold
   beast::error_code ignored;
   stream.socket().set_option(tcp::no_delay(true), ignored);
+  if (plan_.tls) {
+    stream.use_tls(plan_.tls, plan_.url.host);
+    if (const auto [error] = co_await stream.async_handshake(kAwait); error) {
+      fail(tls_failure(stream, plan_.url, error));
+      co_return false;
+    }
+  }
+  deadline.cancel();
   ws_.set_option(websocket::stream_base::timeout{plan_.patience, kSilenceTime, true});
   ws_.set_option(websocket::stream_base::decorator([this](websocket::request_type& request) {
     if (plan_.url.access.token) request.set(http::field::authorization, "Bearer " + *plan_.url.access.token);

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -20,6 +21,8 @@
 
 namespace intervale {
 
+class TlsContext;
+
 using LoadClock = std::chrono::steady_clock;
 
 inline constexpr std::chrono::milliseconds kLate{5};  // a view sent later than this is a late one
@@ -27,8 +30,9 @@ inline constexpr std::chrono::seconds kGrace{2};      // after the duration, for
 
 struct LoadPlan {
   ServerUrl url;
-  Description description;  // of the data set: every client is to be told the same
-  CameraPath path;          // with the run's seed, from which the clients' are made
+  std::shared_ptr<const TlsContext> tls;  // if the URL says so
+  Description description;                // of the data set: every client is to be told the same
+  CameraPath path;                        // with the run's seed, from which the clients' are made
   unsigned clients = 1;
   LoadClock::time_point start;  // of the first client
   LoadClock::duration duration{};

@@ -111,7 +111,7 @@ void add_load_command(Program& program) {
   LoadOptions& load = options->load;
   load.threads = std::max(1u, std::thread::hardware_concurrency() / 2);
   CLI::App& app = program.only_command([options] { return run(*options); });
-  app.add_option("URL", options->url, "ws://host:port/NAME")->required();
+  app.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
   within(app.add_option("--clients", load.clients, "Clients at once")->required(), 1, 1e6, "N");
   add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent; answers are waited for 2 s more at most");
   app.get_option("--duration")->required();

@@ -18,6 +18,7 @@
 #include "client/load/verify_meshes.h"
 #include "client/net/connection.h"
 #include "client/net/fetch.h"
+#include "client/net/line.h"
 #include "common/program/program.h"
 #include "common/program/progress.h"
 
@@ -181,8 +182,11 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   report.scenario = name_of(options.scenario);
   report.clients = options.clients;
   report.threads = std::min(options.threads, options.clients);
+  auto tls = tls_for(url);
+  if (!tls) return tl::unexpected(tls.error());
   const double cpu_before = cpu_seconds(RUSAGE_SELF);
-  const LoadPlan plan = plan_of(url, options, *description);
+  LoadPlan plan = plan_of(url, options, *description);
+  plan.tls = std::move(*tls);
   Crew crew(plan, report.threads);
   crew.watch(plan);
   report.figures = crew.figures();

@@ -1,12 +1,11 @@
 #include "client/net/connection.h"
 
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
 #include <string>
 #include <utility>
 
+#include "client/net/line.h"
 #include "protocol/codec.h"
 
 namespace intervale {
@@ -16,61 +15,23 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
-using asio::ip::tcp;
 using protocol::CloseCode;
 
 }  // namespace
 
 struct StreamConnection::Socket {
   ServerUrl url;
-  asio::io_context io{1};
-  websocket::stream<beast::tcp_stream> ws{io};
+  BlockingRun run;
+  websocket::stream<Stream> ws{run.io()};
   beast::flat_buffer buffer;
   std::uint64_t bytes_received = 0;
   std::uint64_t messages = 0;
   bool is_lost = false;
 
-  // Runs one asynchronous operation to its end: Beast's deadlines hold for those only.
-  template <class Start>
-  beast::error_code run(Start start) {
-    beast::error_code result;
-    bool done = false;
-    start([&](beast::error_code error, auto&&...) {
-      result = error;
-      done = true;
-    });
-    if (io.stopped()) io.restart();
-    while (!done && io.run_one() != 0) {
-    }
-    return result;
-  }
-
-  Result<void> connect();
   Result<void> shake_hands();
   tl::unexpected<Error> lost(beast::error_code error);
   tl::unexpected<Error> faulted(const protocol::Fault& fault) const;
 };
-
-Result<void> StreamConnection::Socket::connect() {
-  tcp::resolver resolver(io);
-  tcp::resolver::results_type endpoints;
-  beast::error_code error;
-  error = run([&](auto done) {
-    resolver.async_resolve(url.host, url.port, [&endpoints, done](beast::error_code failure, tcp::resolver::results_type found) mutable {
-      endpoints = std::move(found);
-      done(failure);
-    });
-  });
-  if (error) return fail("cannot find the host " + url.host + ": " + error.message());
-  auto& stream = beast::get_lowest_layer(ws);
-  stream.expires_after(kConnectTime);
-  error = run([&](auto done) { stream.async_connect(endpoints, done); });
-  if (error == beast::error::timeout) return fail("cannot connect to " + url.authority() + ": no answer within 5 s");
-  if (error) return fail("cannot connect to " + url.authority() + ": " + error.message());
-  stream.expires_never();  // from here on the WebSocket's own deadlines hold
-  stream.socket().set_option(tcp::no_delay(true), error);
-  return {};
-}
 
 Result<void> StreamConnection::Socket::shake_hands() {
   ws.set_option(websocket::stream_base::timeout{kConnectTime, kSilenceTime, true});
@@ -136,7 +97,7 @@ StreamConnection::~StreamConnection() = default;
 Result<StreamConnection> StreamConnection::open(const ServerUrl& url) {
   auto socket = std::make_unique<Socket>();
   socket->url = url;
-  if (auto connected = socket->connect(); !connected) return tl::unexpected(connected.error());
+  if (auto connected = connect(socket->run, socket->ws.next_layer(), url); !connected) return tl::unexpected(connected.error());
   if (auto greeted = socket->shake_hands(); !greeted) return tl::unexpected(greeted.error());
   return StreamConnection(std::move(socket));
 }

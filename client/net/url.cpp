@@ -1,6 +1,7 @@
 #include "client/net/url.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cstdint>
@@ -8,7 +9,11 @@
 namespace intervale {
 namespace {
 
-constexpr std::string_view kScheme = "ws://";
+struct Scheme {
+  std::string_view text;
+  bool secure;
+};
+constexpr std::array<Scheme, 2> kSchemes{{{"ws://", false}, {"wss://", true}}};
 
 bool is_host(std::string_view host, bool bracketed) {
   return !host.empty() && std::all_of(host.begin(), host.end(), [bracketed](unsigned char c) {
@@ -30,10 +35,11 @@ Result<ServerUrl> parse_url(std::string_view text) {
   const auto wrong = [text](const char* what) {
     return misuse("cannot read the URL '" + std::string(text) + "': " + what + "; ws://host:port or ws://host:port/name is wanted");
   };
-  if (text.starts_with("wss://")) return misuse("wss:// is not supported yet: use ws://, through a tunnel where the network is not trusted");
-  if (!text.starts_with(kScheme)) return wrong("it does not begin with ws://");
-  std::string_view rest = text.substr(kScheme.size());
+  const auto* const scheme = std::find_if(kSchemes.begin(), kSchemes.end(), [text](const Scheme& one) { return text.starts_with(one.text); });
+  if (scheme == kSchemes.end()) return wrong("it does not begin with ws:// or wss://");
+  std::string_view rest = text.substr(scheme->text.size());
   ServerUrl url;
+  url.secure = scheme->secure;
   if (const auto slash = rest.find('/'); slash != std::string_view::npos) {
     url.name = rest.substr(slash + 1);
     rest = rest.substr(0, slash);
@@ -46,7 +52,7 @@ Result<ServerUrl> parse_url(std::string_view text) {
   if (bracketed && end == std::string_view::npos) return wrong("a bracket is missing");
   url.host = bracketed ? rest.substr(1, end - 1) : rest.substr(0, end);
   rest = end == std::string_view::npos ? std::string_view() : rest.substr(bracketed ? end + 1 : end);
-  url.port = rest.empty() ? "80" : std::string(rest.substr(1));
+  url.port = rest.empty() ? (url.secure ? "443" : "80") : std::string(rest.substr(1));
   if (!is_host(url.host, bracketed)) return wrong("the host is no name and no address");
   if ((!rest.empty() && rest.front() != ':') || !is_port(url.port)) return wrong("the port is not 1 to 65535");
   return url;

@@ -1,6 +1,7 @@
 // Where a server is, and which of its data sets is meant.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,20 +13,22 @@ namespace intervale {
 // How to be let in; no part of a URL.
 struct Access {
   std::optional<std::string> token;
+  std::optional<std::filesystem::path> authorities;  // PEM: certificates to trust instead of the system's
 };
 
 struct ServerUrl {
-  std::string host;  // a name or an address, without brackets
-  std::string port;  // 1 to 65535, in digits
-  std::string name;  // the data set's; empty: none
+  std::string host;     // a name or an address, without brackets
+  std::string port;     // 1 to 65535, in digits
+  std::string name;     // the data set's; empty: none
+  bool secure = false;  // TLS
   Access access = {};
 
   [[nodiscard]] std::string authority() const;  // "localhost:8080", "[::1]:8080"
-  [[nodiscard]] std::string server() const { return "ws://" + authority(); }
+  [[nodiscard]] std::string server() const { return (secure ? "wss://" : "ws://") + authority(); }
 };
 
-// "ws://host:port" or "ws://host:port/name"; an IPv6 address in brackets; port 80 if there is none. Misuse: anything else, wss:// too, for there is
-// no TLS.
+// "ws://host:port" or "ws://host:port/name"; wss:// for TLS. An IPv6 address in brackets; port 80, or 443, if
+// there is none. Misuse: anything else.
 [[nodiscard]] Result<ServerUrl> parse_url(std::string_view text);
 
 }  // namespace intervale

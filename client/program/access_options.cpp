@@ -25,6 +25,11 @@ void add_access_options(CLI::App& app, Access& access) {
          "What the server knows you by, if it asks; better given in the environment, where other users do not see it")
       ->type_name("TOKEN")
       ->group(group);
+  app.add_option_function<std::string>(
+         "--ca", [&access](const std::string& file) { access.authorities = file; },
+         "With wss://: certificates (PEM) to trust instead of the system's, such as the server's own")
+      ->type_name("FILE")
+      ->group(group);
 }
 
 }  // namespace intervale

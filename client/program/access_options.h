@@ -6,7 +6,7 @@
 
 namespace intervale {
 
-// --token (INTERVALE_TOKEN). `access` must live until the options are read.
+// --token (INTERVALE_TOKEN) and --ca (INTERVALE_CA). `access` must live until the options are read.
 void add_access_options(CLI::App& app, Access& access);
 
 }  // namespace intervale

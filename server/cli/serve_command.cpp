@@ -14,6 +14,7 @@ namespace {
 struct ServeCommand {
   ServeOptions serve;
   LogOptions log;
+  TlsFiles tls;
   std::vector<std::string> inputs;
 };
 
@@ -119,8 +120,23 @@ void add_limits(CLI::App& command, ServeOptions& serve) {
   add_milliseconds(command, "--drain-time", serve.drain_time, 0, "How long clients have to take their leave at the end. Default: 5");
 }
 
-void add_access_options(CLI::App& command, ServeOptions& serve) {
+void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
   const auto group = "Access";
+  const auto use_tls = [&serve, &tls](std::filesystem::path& path) {
+    return [&serve, &tls, &path](const std::string& file) {
+      path = file;
+      serve.tls = tls;
+    };
+  };
+  const auto certificate =
+      command
+          .add_option_function<std::string>(
+              "--tls-cert", use_tls(tls.certificate),
+              "Speak https and wss with this certificate (PEM), and those that vouch for it behind it; read again when it changes")
+          ->type_name("FILE")
+          ->group(group);
+  command.add_option_function<std::string>("--tls-key", use_tls(tls.key), "Its key (PEM)")->type_name("FILE")->group(group)->needs(certificate);
+  certificate->needs("--tls-key");
   command
       .add_option_function<std::string>(
           "--tokens", [&serve](const std::string& file) { serve.tokens = file; },
@@ -156,7 +172,7 @@ void add_serve_command(Program& program) {
       ->type_name("ADDRESS:PORT")
       ->group("Observation");
   add_log_options(command, options->log);
-  add_access_options(command, options->serve);
+  add_access_options(command, options->serve, options->tls);
   add_limits(command, options->serve);
 }
 

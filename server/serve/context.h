@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "protocol/transport/tls.h"
 #include "server/serve/access.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/connections.h"
@@ -23,7 +24,8 @@ struct ServerContext {
   Catalogue catalogue;
   StaticFiles viewer;
   Metrics metrics;
-  Replaceable<Tokens> tokens;  // nullptr: whoever comes may see everything
+  Replaceable<Tokens> tokens;   // nullptr: whoever comes may see everything
+  Replaceable<TlsContext> tls;  // nullptr: plain
   Connections connections;
   AddressCounts addresses;
   Outbox outbox;

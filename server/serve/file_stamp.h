@@ -5,7 +5,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
+#include <utility>
+#include <vector>
 
 namespace intervale {
 
@@ -22,5 +25,21 @@ struct FileStamp {
   return FileStamp{status.st_mtim.tv_sec, status.st_mtim.tv_nsec, std::uint64_t(status.st_size), std::uint64_t(status.st_dev),
                    std::uint64_t(status.st_ino)};
 }
+
+// Files that are read together.
+class FileChanges {
+ public:
+  // Whether any of them is another than when this was last asked, or this is the first time.
+  bool look(std::initializer_list<std::filesystem::path> paths) {
+    std::vector<std::optional<FileStamp>> stamps;
+    for (const std::filesystem::path& path : paths) stamps.push_back(stamp_of(path));
+    if (stamps == stamps_) return false;
+    stamps_ = std::move(stamps);
+    return true;
+  }
+
+ private:
+  std::vector<std::optional<FileStamp>> stamps_;
+};
 
 }  // namespace intervale

@@ -5,6 +5,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
@@ -29,6 +30,7 @@ namespace http = beast::http;
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr std::chrono::seconds kKeepAliveTime{30};  // between requests
 constexpr std::chrono::seconds kAnswerTime{30};
+constexpr std::chrono::seconds kGoodbyeTime{1};
 constexpr std::uint32_t kMaxHeader = 4096;
 
 using Request = http::request<http::empty_body>;
@@ -64,7 +66,12 @@ Response response_to(const Request& request, const HttpAnswer& answer, bool keep
 class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
   HttpSession(asio::ip::tcp::socket socket, ServerContext& context, Door door, AddressCounts::Seat seat)
-      : stream_(std::move(socket)), strand_(stream_.get_executor()), context_(context), door_(door), seat_(std::move(seat)) {}
+      : stream_(std::move(socket)),
+        deadline_(stream_.get_executor()),
+        strand_(stream_.get_executor()),
+        context_(context),
+        door_(door),
+        seat_(std::move(seat)) {}
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
   ~HttpSession() override { context_.metrics.connections.Decrement(); }
@@ -82,7 +89,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void go_away() override {
     asio::post(strand_, [self = shared_from_this()] {
       self->leaving_ = true;
-      if (self->waiting_) self->stream_.cancel();  // an answer under way is finished
+      if (self->waiting_) self->stream_.socket().cancel();  // an answer under way is finished
     });
   }
 
@@ -98,10 +105,11 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   // Whatever ends this coroutine ends the connection, but for an upgrade, which takes the socket along. `self` keeps the object.
   asio::awaitable<void> run([[maybe_unused]] std::shared_ptr<HttpSession> self) {
+    if (!co_await begin_tls()) co_return;
     for (std::chrono::milliseconds patience = context_.options.handshake_time; !leaving_; patience = kKeepAliveTime) {
       http::request_parser<http::empty_body> parser;
       parser.header_limit(kMaxHeader);
-      stream_.expires_after(patience);
+      expire_after(patience);
       waiting_ = true;
       const auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
       waiting_ = false;
@@ -116,7 +124,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
           co_await send(response);
           break;
         }
-        stream_.expires_never();  // from here on the WebSocket's own deadlines hold
+        deadline_.cancel();  // from here on the WebSocket's own deadlines hold
         start_websocket_session(std::move(stream_), request, context_, {scope_for(request), std::move(seat_)});
         co_return;
       }
@@ -127,8 +135,30 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
       Response response = response_to(request, answer, keep_alive);
       if (!co_await send(response) || !keep_alive) break;
     }
+    expire_after(kGoodbyeTime);
     beast::error_code ignored;
-    stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+    if (stream_.tls() != nullptr) co_await stream_.async_shutdown(kAwait);
+    deadline_.cancel();
+    if (stream_.socket().is_open()) stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+  }
+
+  // Whether there is none, or its handshake is done. A door for metrics has none.
+  asio::awaitable<bool> begin_tls() {
+    auto tls = context_.tls.get();
+    if (!tls || door_ != Door::all) co_return true;
+    stream_.use_tls(std::move(tls));
+    expire_after(context_.options.handshake_time);
+    const auto [error] = co_await stream_.async_handshake(kAwait);
+    if (error) spdlog::debug("no TLS handshake: {}", error.message());
+    co_return !error;
+  }
+
+  // Cuts the connection unless this or cancelling the deadline is called again by then.
+  void expire_after(std::chrono::milliseconds time) {
+    deadline_.expires_after(time);
+    deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
+      if (const auto self = weak.lock(); self && !error) self->stream_.close();
+    });
   }
 
   HttpAnswer answer_to(const Request& request) const {
@@ -196,12 +226,13 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   // By reference, and never from a temporary: g++ 12 destroys some temporaries of a co_await expression twice.
   asio::awaitable<bool> send(Response& response) {
-    stream_.expires_after(kAnswerTime);
+    expire_after(kAnswerTime);
     const auto [error, size] = co_await http::async_write(stream_, response, kAwait);
     co_return !error;
   }
 
-  beast::tcp_stream stream_;
+  Stream stream_;
+  asio::steady_timer deadline_;
   asio::any_io_executor strand_;  // apart, for go_away comes from other threads and an upgrade moves the stream away
   ServerContext& context_;
   Door door_;

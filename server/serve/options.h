@@ -13,6 +13,11 @@
 
 namespace intervale {
 
+// PEM: the server's certificate and those that vouch for it, and its key.
+struct TlsFiles {
+  std::filesystem::path certificate, key;
+};
+
 struct ServeOptions {
   std::string listen = "127.0.0.1:8080";                                // address:port, an IPv6 address in brackets; port 0 takes any free one
   std::optional<std::string> metrics_listen;                            // where /metrics is answered instead, for those who watch
@@ -20,6 +25,7 @@ struct ServeOptions {
   unsigned threads = 0;                                                 // 0: one for each core
   std::optional<std::filesystem::path> tokens;                          // file of those who may come in, see Tokens; off: everybody
   std::vector<std::string> allowed_origins;                             // of pages that may open sessions; none: those of the host they are sent to
+  std::optional<TlsFiles> tls;                                          // off: plain HTTP and WebSocket
   std::size_t max_connections = 4096;                                   // more than these are turned away at once; keep below the limit on open files
   std::optional<std::size_t> max_connections_per_address;               // at least 1; the same
   std::optional<std::size_t> max_sessions;                              // more than these are answered 503

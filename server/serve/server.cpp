@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
-#include <optional>
 #include <sstream>
 #include <thread>
 #include <utility>
@@ -22,27 +21,34 @@ namespace asio = boost::asio;
 // Destroyed from the bottom up: threads are joined in stop(), then sessions go with the io_context that holds them, the context last.
 struct Server::Running {
   explicit Running(const ServeOptions& options) : context(options) {}
-  Result<void> load_tokens();
+  // Whether they had changed.
+  Result<bool> load_tokens();
+  Result<bool> load_certificate();
   ServerContext context;
   asio::io_context io;
   std::unique_ptr<Listener> listener, metrics_listener;
   std::vector<std::thread> threads;
-  std::optional<FileStamp> tokens_stamp;
+  FileChanges tokens_changed, certificate_changed;
   bool stopped = false;
 };
 
-Result<void> Server::Running::load_tokens() {
+// The stamps are taken before reading: what is written meanwhile is then seen as a change.
+Result<bool> Server::Running::load_tokens() {
   const auto& path = context.options.tokens;
-  if (!path) return {};
-  // The stamp first: what is written while we read is then seen as a change.
-  const auto stamp = stamp_of(*path);
-  if (stamp && stamp == tokens_stamp) return {};
-  const bool again = std::exchange(tokens_stamp, stamp).has_value();
+  if (!path || !tokens_changed.look({*path})) return false;
   auto tokens = Tokens::load(*path);
   if (!tokens) return tl::unexpected(tokens.error());
   context.tokens.set(std::make_shared<const Tokens>(std::move(*tokens)));
-  if (again) spdlog::info("read the tokens in {} again", path->string());
-  return {};
+  return true;
+}
+
+Result<bool> Server::Running::load_certificate() {
+  const auto& files = context.options.tls;
+  if (!files || !certificate_changed.look({files->certificate, files->key})) return false;
+  auto tls = TlsContext::server(files->certificate, files->key);
+  if (!tls) return tl::unexpected(tls.error());
+  context.tls.set(std::move(*tls));
+  return true;
 }
 
 Server::Server(std::unique_ptr<Running> running) : running_(std::move(running)) {}
@@ -60,6 +66,7 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& wanted, Catalo
     running->context.viewer = std::move(*viewer);
   }
   if (auto loaded = running->load_tokens(); !loaded) return tl::unexpected(loaded.error());
+  if (auto loaded = running->load_certificate(); !loaded) return tl::unexpected(loaded.error());
   auto listener = Listener::open(running->io, options.listen, running->context, Door::all);
   if (!listener) return tl::unexpected(listener.error());
   running->listener = std::move(*listener);
@@ -77,10 +84,12 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& wanted, Catalo
 }
 
 void Server::refresh() {
-  const auto before = running_->tokens_stamp;
-  if (auto loaded = running_->load_tokens(); !loaded && running_->tokens_stamp != before) {
-    spdlog::error("{}; those from before hold", loaded.error().message);
-  }
+  const auto tell = [](const Result<bool>& loaded, const char* what) {
+    if (!loaded) spdlog::error("{}; what was read before holds", loaded.error().message);
+    if (loaded && *loaded) spdlog::info("read the {} again", what);
+  };
+  tell(running_->load_tokens(), "tokens");
+  tell(running_->load_certificate(), "certificate");
 }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
@@ -91,7 +100,7 @@ std::uint16_t Server::metrics_port() const {
 
 std::string Server::url() const {
   std::ostringstream text;
-  text << "http://" << running_->listener->endpoint() << '/';
+  text << (running_->context.options.tls ? "https://" : "http://") << running_->listener->endpoint() << '/';
   return text.str();
 }
 

@@ -14,13 +14,14 @@ namespace intervale {
 class Server {
  public:
   // Listens, and serves on threads of its own from then on. Failures: an address that cannot be read, or cannot be
-  // had; a viewer or tokens that cannot be read.
+  // had; a viewer, tokens or a certificate that cannot be read.
   static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);
   ~Server();  // stops
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  // Reads the tokens again if their file has changed. What cannot be read is logged, and what was read before holds. One thread at a time.
+  // Reads the tokens and the certificate again if their files have changed. What cannot be read is logged, and what was read before holds. One thread
+  // at a time.
   void refresh();
 
   [[nodiscard]] std::uint16_t port() const;

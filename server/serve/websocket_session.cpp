@@ -36,7 +36,7 @@ constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
  public:
-  WebSocketSession(beast::tcp_stream stream, ServerContext& context, Guest guest)
+  WebSocketSession(Stream stream, ServerContext& context, Guest guest)
       : ws_(std::move(stream)),
         wake_(ws_.get_executor()),
         write_deadline_(ws_.get_executor()),
@@ -308,7 +308,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     cut_off();
   }
 
-  websocket::stream<beast::tcp_stream> ws_;
+  websocket::stream<Stream> ws_;
   asio::steady_timer wake_;  // the writer sleeps on it
   asio::steady_timer write_deadline_;
   asio::steady_timer pace_;  // the reader sleeps on it
@@ -337,7 +337,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
 }  // namespace
 
-void start_websocket_session(beast::tcp_stream stream, const Request& request, ServerContext& context, Guest guest) {
+void start_websocket_session(Stream stream, const Request& request, ServerContext& context, Guest guest) {
   std::make_shared<WebSocketSession>(std::move(stream), context, std::move(guest))->start(request);
 }
 

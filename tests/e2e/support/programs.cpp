@@ -38,7 +38,7 @@ const std::filesystem::path& buckyball() {
 }
 
 ServerProgram::ServerProgram(const std::string& input, const std::vector<std::string>& more) : process_(command(input, more)) {
-  const std::string before = "http://127.0.0.1:";
+  const std::string before = "://127.0.0.1:";
   const auto said = process_.wait_for("/\n");
   if (!said || said->find(before) == std::string::npos) throw std::runtime_error("the server did not start: " + said.value_or(process_.wait().err));
   port_ = static_cast<std::uint16_t>(std::stoi(said->substr(said->find(before) + before.size())));
