@@ -34,10 +34,15 @@ export function makeData(...wanted) {
 export const kBuckyball = { name: 'buckyball', size: 65, range: [128, 188] };
 export const kGyroid = { name: 'gyroid', size: 33, range: [-0.4, 0.4] };
 
+const servers = new Set();
+export const killServers = () => servers.forEach((server) => server.kill('SIGKILL'));
+
 // A running `intervale serve`. port 0: any that is free.
 export async function serve(folder, port = 0) {
   const server = spawn(join(bin, 'intervale'), ['serve', folder, '--listen', `127.0.0.1:${port}`], { stdio: ['ignore', 'ignore', 'pipe'] });
   process.on('exit', () => server.kill('SIGKILL'));
+  servers.add(server);
+  server.on('exit', () => servers.delete(server));
   let log = '';
   const address = await new Promise((resolve, reject) => {
     server.stderr.on('data', (text) => {
@@ -113,7 +118,7 @@ export async function open(browser, url, { width = 800, height = 600, expected =
 export async function settled(page) {
   await page.waitForFunction(() => {
     const { progress, live, stats } = window.intervale;
-    return progress?.done && live.connection.state === 'open' && stats.skinTriangles === progress.triangles;
+    return progress?.done && live.connection.state === 'open' && stats.skinVersion === progress.skin;
   });
   await drawn(page);
 }

@@ -9,6 +9,7 @@ import {
   digestOf,
   kBuckyball,
   kGyroid,
+  killServers,
   launch,
   makeData,
   matches,
@@ -37,7 +38,7 @@ before(async () => {
 });
 after(async () => {
   await browser.close();
-  await server.kill();
+  killServers(); // those of tests that failed, too
 });
 
 // A page on the buckyball that fails its test if anything went wrong in it.
@@ -115,7 +116,7 @@ describe('The page', () => {
 });
 
 describe('Pictures', () => {
-  const size = { width: 640, height: 480 };
+  const size = { width: 480, height: 400 };
   test('show the surfaces', () =>
     withPage(kCamera, size, async (page) => {
       const { blue, orange } = await colours(page, await matches(page, 'surfaces'));
@@ -284,7 +285,7 @@ describe('A server that is lost', () => {
     const second = await serve(data, first.port);
     await settled(page);
     const progress = await progressOf(page);
-    assert.ok(await page.evaluate(() => window.intervale.live.resumed));
+    assert.ok(await page.evaluate(() => window.intervale.live.opened.resumed));
     assert.equal(progress.updates, await page.evaluate(() => window.intervale.live.dataset.updates));
     assert.equal(progress.repeated, 0);
     assert.ok(progress.reconnects >= 1);

@@ -16,7 +16,7 @@ declare module '@core/core.js' {
     updates(): number;
     done(): boolean;
     dataset(): Dataset;
-    progress(): Omit<Progress, 'memory' | 'busy'>;
+    progress(): Omit<Progress, 'skin' | 'memory' | 'busy'>;
     skin(edges: boolean, all: boolean): Omit<Skin, 'version'>;
     isStale(): boolean; // the mesh may have changed since the last skin: the next two must not be called
     cap(plane: Plane): Pick<Cap, 'vertices' | 'triangles'>;

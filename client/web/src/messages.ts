@@ -87,7 +87,8 @@ export interface Progress {
   updatesToGo: number; // bounds from above for this view: 0 when done
   remainingError: number; // field units
   remainingPixels: number;
-  done: boolean; // all that this view wants has come
+  skin: number; // version of the last one that was sent to the page
+  done: boolean; // all that this view wants has come, and that skin has it
   full: boolean; // ... that there is room for in memory
   volume: number; // of the mesh, in world units cubed
   volumeBound: number; // by how much refining the tetrahedra that a surface passes can change that

@@ -74,6 +74,7 @@ class Session {
   drawEverything(): void {
     this.all = true;
     this.changed = true;
+    this.tellProgress(true);
     this.plan();
   }
 
@@ -220,7 +221,7 @@ class Session {
     const done = progress.done && !this.changed; // not before the page was sent the skin with all of it
     report({
       type: 'progress',
-      progress: { ...progress, done, memory: this.core.HEAPU8.byteLength, busy: { ...this.busy } },
+      progress: { ...progress, done, skin: this.version, memory: this.core.HEAPU8.byteLength, busy: { ...this.busy } },
     });
   }
 
