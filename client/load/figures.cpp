@@ -57,10 +57,12 @@ std::optional<Percentiles> percentiles_of(std::vector<double> samples) {
 void LoadFigures::add(LoadFigures&& other) {
   for (const auto member :
        {&LoadFigures::connected, &LoadFigures::failed, &LoadFigures::updates, &LoadFigures::bytes, &LoadFigures::views, &LoadFigures::late_views,
-        &LoadFigures::unanswered_views, &LoadFigures::done_views, &LoadFigures::complete, &LoadFigures::protocol_closes}) {
+        &LoadFigures::unanswered_views, &LoadFigures::done_views, &LoadFigures::complete, &LoadFigures::protocol_closes, &LoadFigures::reconnects,
+        &LoadFigures::repeated_updates, &LoadFigures::repeated_bytes, &LoadFigures::resume_bytes}) {
     this->*member += other.*member;
   }
-  for (const auto member : {&LoadFigures::first_mesh_ms, &LoadFigures::first_mesh_bytes, &LoadFigures::view_change_ms, &LoadFigures::stale_bytes}) {
+  for (const auto member : {&LoadFigures::first_mesh_ms, &LoadFigures::first_mesh_bytes, &LoadFigures::view_change_ms, &LoadFigures::stale_bytes,
+                            &LoadFigures::resume_ms}) {
     append(this->*member, std::move(other.*member));
   }
   for (const auto& [text, count] : other.errors) errors[text] += count;
@@ -89,7 +91,12 @@ Json to_json(const LoadReport& report) {
             {"threads", report.threads},
             {"own_cpu_share", rounded(report.own_cpu_share)},
             {"busiest_thread", rounded(report.busiest_thread)},
-            {"protocol_closes", f.protocol_closes}};
+            {"protocol_closes", f.protocol_closes},
+            {"reconnects", f.reconnects},
+            {"resume_ms", to_json(f.resume_ms)},
+            {"resume_bytes", f.resume_bytes},
+            {"repeated_updates", f.repeated_updates},
+            {"repeated_bytes", f.repeated_bytes}};
   if (report.verified) {
     json["verified"] = *report.verified;
     json["differing"] = report.differing;
@@ -113,6 +120,11 @@ std::string to_text(const LoadReport& report) {
       "{} views, {} served to the end, {} sent late, {} unanswered; this harness took {:.0f} % of the machine, and its busiest thread {:.0f} % of a "
       "core\n",
       f.views, f.done_views, f.late_views, f.unanswered_views, 100 * report.own_cpu_share, 100 * report.busiest_thread);
+  if (f.reconnects > 0) {
+    text += line_of("resumed within", f.resume_ms, "ms");
+    text += fmt::format("{} sessions resumed; {} sent to say what clients had; {} updates, and {} in all, came twice\n", f.reconnects,
+                        human_bytes(f.resume_bytes), f.repeated_updates, human_bytes(f.repeated_bytes));
+  }
   if (report.verified) text += fmt::format("{} meshes compared, {} differ\n", *report.verified, report.differing);
   for (const auto& [what, count] : f.errors) text += fmt::format("{} x {}\n", count, what);
   return text;

@@ -29,10 +29,15 @@ struct LoadFigures {
   std::uint64_t done_views = 0;        // Done messages
   std::uint64_t complete = 0;          // clients that the whole of their last view had come to
   std::uint64_t protocol_closes = 0;   // sessions that the server ended
+  std::uint64_t reconnects = 0;        // sessions after a client's first, that were opened
+  std::uint64_t repeated_updates = 0;  // that came to a client that had them
+  std::uint64_t repeated_bytes = 0;    // of messages that said nothing new, such as each session's description after the first
+  std::uint64_t resume_bytes = 0;      // of messages sent to say what clients have
   std::vector<double> first_mesh_ms;
   std::vector<double> first_mesh_bytes;
   std::vector<double> view_change_ms;
   std::vector<double> stale_bytes;  // of each view: what came of older ones before it was served
+  std::vector<double> resume_ms;    // of each reconnect: from when the server was seen to be lost to the first batch or end of a view
   std::map<std::string, std::uint64_t> errors;
 
   void add(LoadFigures&& other);

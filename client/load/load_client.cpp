@@ -1,4 +1,5 @@
-// Two coroutines a client: the reader takes messages and measures, the writer sends credit and views as they are due, and alone closes.
+// Two coroutines a session: the reader takes messages and measures, the writer sends credit and views as they are due, and alone closes. A client has
+// one session after the other, as long as servers are lost and found again.
 #include "client/load/load_client.h"
 
 #include <boost/asio/as_tuple.hpp>
@@ -19,6 +20,7 @@
 #include <variant>
 #include <vector>
 
+#include "client/core/backoff.h"
 #include "client/core/grants.h"
 #include "client/net/connection.h"
 #include "client/net/line.h"
@@ -41,6 +43,11 @@ double milliseconds(LoadClock::duration time) { return std::chrono::duration<dou
 
 std::uint64_t seed_of(std::uint64_t run, unsigned client) { return std::uint64_t(random_fraction(run, client) * 0x1p53); }
 
+// Close codes after which another server, or this one later, may go on.
+bool is_to_be_found_again(unsigned code) {
+  return code == static_cast<unsigned>(CloseCode::going_away) || code == static_cast<unsigned>(CloseCode::internal);
+}
+
 // A view whose answer is waited for.
 struct Pending {
   std::uint64_t epoch = 0;
@@ -52,7 +59,8 @@ class LoadClient {
  public:
   LoadClient(asio::io_context& io, const tcp::resolver::results_type& endpoints, const LoadPlan& plan, unsigned number, LoadFigures& figures,
              LoadProgress& progress)
-      : ws_(io),
+      : io_(io),
+        ws_(std::in_place, io),
         wake_(io),
         line_(io),
         endpoints_(endpoints),
@@ -76,8 +84,11 @@ class LoadClient {
 
  private:
   asio::awaitable<bool> connect();
+  asio::awaitable<bool> find_again();
+  asio::awaitable<void> converse();
   asio::awaitable<void> read_messages();
   asio::awaitable<void> write_messages();
+  asio::awaitable<bool> greet();
   asio::awaitable<bool> send(const protocol::ClientMessage& message);
   asio::awaitable<void> pass_line(std::size_t bytes);
   void receive(std::size_t size);
@@ -91,16 +102,18 @@ class LoadClient {
   void serve(std::uint64_t epoch);
   void close_if_answered();
   void lost(beast::error_code error);
+  void lose(const std::string& what);
   void fail(const std::string& what);
   void cut_off();
   void report_rest();
   [[nodiscard]] Time due(std::uint64_t view) const {
     return first_view_ + std::chrono::duration_cast<LoadClock::duration>(std::chrono::duration<double>(double(view) / path_.views_per_second));
   }
-  [[nodiscard]] protocol::View view() const;
+  [[nodiscard]] protocol::View view();
   [[nodiscard]] std::optional<protocol::View> due_view();
 
-  websocket::stream<Stream> ws_;
+  asio::io_context& io_;
+  std::optional<websocket::stream<Stream>> ws_;  // never empty; another one for each session
   beast::flat_buffer buffer_;
   asio::steady_timer wake_;  // the writer sleeps on it
   asio::steady_timer line_;  // the reader does, where the rate is limited
@@ -124,6 +137,10 @@ class LoadClient {
   std::uint64_t sequence_ = 0;    // of the next batch
   std::uint64_t updates_ = 0;
   std::uint64_t bytes_ = 0;
+  std::uint64_t received_ = 0;   // updates, in all sessions
+  std::uint64_t forgotten_ = 0;  // of those
+  std::string complaint_;        // why there is no connection
+  std::optional<Time> lost_at_;  // when the server was seen to be lost, until another has served a view
   bool connected_ = false;
   bool opened_ = false;
   bool has_mesh_ = false;    // or knows that none will come
@@ -132,33 +149,40 @@ class LoadClient {
   bool views_over_ = false;  // no more views are sent
   bool closing_ = false;     // what comes counts no more
   bool gone_ = false;        // the connection is over
+  bool lost_ = false;        // ... and another is looked for
+  bool over_ = false;        // ... and none is
   bool failed_ = false;
 };
 
 asio::awaitable<void> LoadClient::run() {
-  using namespace asio::experimental::awaitable_operators;
   wake_.expires_at(start_);
   co_await wake_.async_wait(kAwait);
   if (co_await connect()) {
-    connected_ = true;
     ++figures_.connected;
-    ++progress_.connected;
     first_view_ = LoadClock::now();
-    co_await (read_messages() && write_messages());
-    --progress_.connected;
+    if (path_.scenario == Scenario::full) pending_.push_back({1, first_view_});
+    ++figures_.views;
+    co_await converse();
+    while (lost_) {
+      const bool found = co_await find_again();
+      if (!found) break;
+      co_await converse();
+    }
+  } else {
+    fail(complaint_);
   }
   report_rest();
 }
 
 asio::awaitable<bool> LoadClient::connect() {
-  auto& stream = beast::get_lowest_layer(ws_);
+  auto& stream = beast::get_lowest_layer(*ws_);
   // Until the WebSocket's own deadlines hold.
-  asio::steady_timer deadline(ws_.get_executor(), plan_.patience);
+  asio::steady_timer deadline(io_, plan_.patience);
   deadline.async_wait([&stream](beast::error_code error) {
     if (!error) stream.close();
   });
   if (const auto [error, endpoint] = co_await asio::async_connect(stream.socket(), endpoints_, kAwait); error) {
-    fail("cannot connect to " + plan_.url.authority() + ": " + error.message());
+    complaint_ = "cannot connect to " + plan_.url.authority() + ": " + error.message();
     co_return false;
   }
   beast::error_code ignored;
@@ -166,39 +190,92 @@ asio::awaitable<bool> LoadClient::connect() {
   if (plan_.tls) {
     stream.use_tls(plan_.tls, plan_.url.host);
     if (const auto [error] = co_await stream.async_handshake(kAwait); error) {
-      fail(tls_failure(stream, plan_.url, error));
+      complaint_ = tls_failure(stream, plan_.url, error);
       co_return false;
     }
   }
   deadline.cancel();
-  ws_.set_option(websocket::stream_base::timeout{plan_.patience, kSilenceTime, true});
-  ws_.set_option(websocket::stream_base::decorator([this](websocket::request_type& request) {
+  ws_->set_option(websocket::stream_base::timeout{plan_.patience, kSilenceTime, true});
+  ws_->set_option(websocket::stream_base::decorator([this](websocket::request_type& request) {
     if (plan_.url.access.token) request.set(http::field::authorization, "Bearer " + *plan_.url.access.token);
     request.set(http::field::user_agent, "intervale-load/" INTERVALE_VERSION);
     request.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
   }));
-  ws_.read_message_max(protocol::kMaxServerMessage);
-  ws_.auto_fragment(false);
-  ws_.binary(true);
-  if (const auto [error] = co_await ws_.async_handshake(plan_.url.authority(), protocol::kPath, kAwait); error) {
-    fail("no WebSocket to " + plan_.url.authority() + ": " + error.message());
+  ws_->read_message_max(protocol::kMaxServerMessage);
+  ws_->auto_fragment(false);
+  ws_->binary(true);
+  if (const auto [error] = co_await ws_->async_handshake(plan_.url.authority(), protocol::kPath, kAwait); error) {
+    complaint_ = "no WebSocket to " + plan_.url.authority() + ": " + error.message();
     co_return false;
   }
   co_return true;
 }
 
-asio::awaitable<void> LoadClient::write_messages() {
-  // Open, the first grant and the first view go out together, to save a round trip. Messages have names: g++ 12 destroys temporaries in a co_await
-  // twice.
-  const protocol::ClientMessage open = protocol::Open{plan_.url.name, "intervale-load " INTERVALE_VERSION, grants_.take_all(), {}};
-  const protocol::ClientMessage first = view();
-  if (path_.scenario == Scenario::full) pending_.push_back({1, first_view_});
-  ++figures_.views;
+// Another connection, with a session still to begin. False: the time for that is over, or the client's.
+asio::awaitable<bool> LoadClient::find_again() {
+  const Time deadline = LoadClock::now() + *plan_.reconnect;
+  const std::string why = complaint_;
+  Backoff backoff(path_.seed);
+  while (!over_) {
+    const Time next = LoadClock::now() + backoff.next();
+    if (next > deadline) {
+      fail(why);
+      break;
+    }
+    wake_.expires_at(next);
+    co_await wake_.async_wait(kAwait);
+    if (over_) break;
+    ws_.emplace(io_);
+    gone_ = lost_ = opened_ = done_ = false;
+    sequence_ = credit_due_ = 0;
+    grants_.forget_outstanding();
+    if (co_await connect()) {
+      ++figures_.reconnects;
+      co_return true;
+    }
+  }
+  co_return false;
+}
+
+asio::awaitable<void> LoadClient::converse() {
+  using namespace asio::experimental::awaitable_operators;
+  connected_ = true;
+  ++progress_.connected;
+  co_await (read_messages() && write_messages());
+  --progress_.connected;
+  connected_ = false;
+}
+
+// Open, the first grant, what the client has, and a view go out together, to save a round trip. Messages have names: g++ 12 destroys temporaries in a
+// co_await twice.
+asio::awaitable<bool> LoadClient::greet() {
+  protocol::Open open{plan_.url.name, "intervale-load " INTERVALE_VERSION, grants_.take_all(), {}};
+  std::vector<SlotGroup> splits;
+  if (mesh_) {
+    open.resume = plan_.description.content_hash;
+    splits = mesh_->resume();
+  }
   asked_ = LoadClock::now();
-  if (!co_await send(open) || !co_await send(first)) co_return;
+  const protocol::ClientMessage opening = open;
+  if (!co_await send(opening)) co_return false;
+  for (std::size_t first = 0; first < splits.size(); first += protocol::kMaxHave) {
+    const auto some = splits.begin() + std::ptrdiff_t(first);
+    const auto end = some + std::ptrdiff_t(std::min(protocol::kMaxHave, splits.size() - first));
+    const protocol::ClientMessage have = protocol::Have{{some, end}};
+    figures_.resume_bytes += protocol::encode(have).size();
+    if (!co_await send(have)) co_return false;
+  }
+  const auto newer = due_view();
+  const protocol::ClientMessage first = newer ? *newer : view();
+  const bool sent = co_await send(first);
+  co_return sent;
+}
+
+asio::awaitable<void> LoadClient::write_messages() {
+  if (!co_await greet()) co_return;
   while (!gone_) {
     if (closing_) {
-      co_await ws_.async_close(websocket::close_code::normal, kAwait);  // within the plan's patience; an error is a server that left first
+      co_await ws_->async_close(websocket::close_code::normal, kAwait);  // within the plan's patience; an error is a server that left first
       co_return cut_off();
     }
     if (const std::uint64_t bytes = std::exchange(credit_due_, 0); bytes != 0) {
@@ -216,15 +293,16 @@ asio::awaitable<void> LoadClient::write_messages() {
 
 asio::awaitable<bool> LoadClient::send(const protocol::ClientMessage& message) {
   const auto bytes = protocol::encode(message);
-  const auto [error, size] = co_await ws_.async_write(asio::buffer(bytes), kAwait);
+  const auto [error, size] = co_await ws_->async_write(asio::buffer(bytes), kAwait);
   if (error) lost(error);
   co_return !error;
 }
 
-// The last one asked for.
-protocol::View LoadClient::view() const {
+// The last one asked for, to be sent.
+protocol::View LoadClient::view() {
   protocol::View view{view_ + 1, view_of(path_, view_)};
   if (plan_.budget.max_updates != UINT64_MAX) view.room = plan_.budget.max_updates;
+  if (mesh_) view.forget = mesh_->give_up(view.epoch, protocol::kMaxHave);
   return view;
 }
 
@@ -241,18 +319,16 @@ std::optional<protocol::View> LoadClient::due_view() {
   }
   done_ = false;
   look();
-  protocol::View view = this->view();
-  if (mesh_) view.forget = mesh_->give_up(view.epoch, protocol::kMaxHave);
-  return view;
+  return view();
 }
 
 asio::awaitable<void> LoadClient::read_messages() {
   while (!gone_) {
     buffer_.clear();
-    const auto [error, size] = co_await ws_.async_read(buffer_, kAwait);
+    const auto [error, size] = co_await ws_->async_read(buffer_, kAwait);
     if (error) co_return lost(error);
     if (plan_.rate) co_await pass_line(buffer_.size());
-    if (!closing_) receive(buffer_.size());
+    if (!closing_ && !gone_) receive(buffer_.size());
   }
 }
 
@@ -267,7 +343,7 @@ asio::awaitable<void> LoadClient::pass_line(std::size_t bytes) {
 
 void LoadClient::receive(std::size_t size) {
   now_ = LoadClock::now();
-  if (ws_.got_text()) return fail("the server sent text");
+  if (ws_->got_text()) return fail("the server sent text");
   auto message = protocol::decode_server_message({static_cast<const std::uint8_t*>(buffer_.data().data()), size});
   if (!message) return fail("the server sent a " + message.error().message);
   bytes_ += size;
@@ -282,6 +358,11 @@ void LoadClient::take(protocol::Opened opened) {
   if (std::exchange(opened_, true)) return fail("the server sent nonsense: a second description");
   grants_.round_trip(now_ - asked_);
   if (opened.description.content_hash != plan_.description.content_hash) return fail("the server sent nonsense: another volume than before");
+  if (mesh_) {
+    if (!opened.resumed) return fail("the server sent nonsense: it has the same volume, and does not resume");
+    figures_.repeated_bytes += buffer_.size();
+    return;
+  }
   if (!plan_.verify) return;
   auto client = StreamClient::start(std::move(opened.description), plan_.budget);
   if (!client) return fail("the server sent nonsense: " + client.error().message);
@@ -300,6 +381,7 @@ void LoadClient::look() {
 void LoadClient::give_up(std::uint64_t epoch) {
   if (!mesh_) return;
   mesh_->arrived(epoch);
+  forgotten_ += updates_ - mesh_->updates();
   updates_ = mesh_->updates();
 }
 
@@ -311,6 +393,7 @@ void LoadClient::take(const protocol::Batch& batch) {
   epoch_ = batch.epoch;
   give_up(batch.epoch);
   updates_ += batch.updates;
+  received_ += batch.updates;
   if (now_ <= plan_.end()) {
     figures_.updates += batch.updates;
     progress_.updates += batch.updates;
@@ -357,7 +440,9 @@ void LoadClient::take(const protocol::Fault& fault) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';  // it goes to a terminal
   }
   ++figures_.protocol_closes;
-  fail("the server ended the session: " + text + " (code " + std::to_string(static_cast<unsigned>(fault.code)) + ")");
+  const std::string what = "the server ended the session: " + text + " (code " + std::to_string(static_cast<unsigned>(fault.code)) + ")";
+  if (is_to_be_found_again(static_cast<unsigned>(fault.code))) return lose(what);
+  fail(what);
 }
 
 void LoadClient::note_mesh() {
@@ -368,6 +453,7 @@ void LoadClient::note_mesh() {
 
 // Views up to this epoch are answered.
 void LoadClient::serve(std::uint64_t epoch) {
+  if (lost_at_) figures_.resume_ms.push_back(milliseconds(now_ - *std::exchange(lost_at_, {})));
   for (; !pending_.empty() && pending_.front().epoch <= epoch; pending_.pop_front()) {
     figures_.view_change_ms.push_back(milliseconds(now_ - pending_.front().due));
     if (pending_.front().epoch > 1) figures_.stale_bytes.push_back(double(pending_.front().stale_bytes));  // the first one replaces none
@@ -385,7 +471,7 @@ void LoadClient::close_if_answered() {
 
 void LoadClient::leave() {
   closing_ = true;
-  if (!connected_ && !gone_) fail("not connected before the end");
+  if (!connected_ && !over_) fail(lost_at_ ? complaint_ + ", and not found again before the end" : "not connected before the end");
   wake_.cancel();
   line_.cancel();
 }
@@ -393,13 +479,25 @@ void LoadClient::leave() {
 // The connection is over. In order, if it was to be.
 void LoadClient::lost(beast::error_code error) {
   if (closing_ || gone_) return cut_off();
-  if (error != websocket::error::closed) return fail("lost the server: " + error.message());
+  if (error != websocket::error::closed) return lose("lost the server: " + error.message());
   ++figures_.protocol_closes;
-  fail("the server closed the session with code " + std::to_string(ws_.reason().code));
+  const std::string what = "the server closed the session with code " + std::to_string(ws_->reason().code);
+  if (is_to_be_found_again(ws_->reason().code)) return lose(what);
+  fail(what);
+}
+
+// There may be another server.
+void LoadClient::lose(const std::string& what) {
+  if (!plan_.reconnect) return fail(what);
+  complaint_ = what;
+  if (!lost_at_) lost_at_ = LoadClock::now();
+  lost_ = true;
+  cut_off();
 }
 
 void LoadClient::fail(const std::string& what) {
-  if (gone_) return;
+  if (over_) return;
+  over_ = true;
   failed_ = true;
   ++figures_.failed;
   ++figures_.errors[what];
@@ -408,7 +506,7 @@ void LoadClient::fail(const std::string& what) {
 
 void LoadClient::cut_off() {
   gone_ = true;
-  beast::get_lowest_layer(ws_).close();
+  beast::get_lowest_layer(*ws_).close();
   wake_.cancel();
   line_.cancel();
 }
@@ -416,11 +514,12 @@ void LoadClient::cut_off() {
 // What was still waited for counts with its time so far; a client that failed says so, and its times would be shorter than the truth.
 void LoadClient::report_rest() {
   figures_.unanswered_views += pending_.size();
+  if (mesh_) figures_.repeated_updates += received_ - forgotten_ - mesh_->updates();
   if (failed_) return;
   if (done_ && !full_) ++figures_.complete;
   now_ = LoadClock::now();
   if (!has_mesh_) figures_.first_mesh_ms.push_back(milliseconds(now_ - start_));
-  if (!pending_.empty()) serve(UINT64_MAX);
+  if (!pending_.empty() || lost_at_) serve(UINT64_MAX);
 }
 
 asio::awaitable<void> end_in_time(asio::steady_timer& timer, const LoadPlan& plan, std::vector<std::unique_ptr<LoadClient>>& clients) {

@@ -4,6 +4,8 @@
 // opened, however slow the server is, and its latency counts from that time, not from when it could be sent. A view that is replaced before it was
 // served counts until the first message for a view as new or newer. What is unanswered when the duration is over is waited for kGrace more, and then
 // counts with the time it has waited.
+//
+// A client that has lost its server, if the plan says so, looks for one again and resumes with what it has; its views go on being due meanwhile.
 #pragma once
 
 #include <atomic>
@@ -42,6 +44,9 @@ struct LoadPlan {
   LoadClock::duration patience{};       // to be connected, for the WebSocket's handshake and for closing: each
   bool verify = false;                  // apply what comes
   Budget budget;                        // each client's, if it applies
+  // How long a client looks for a server again that it has lost; off: it has failed. Wants verify: one that applies nothing has nothing to resume
+  // with.
+  std::optional<LoadClock::duration> reconnect;
   [[nodiscard]] LoadClock::time_point end() const { return start + duration; }
 };
 

@@ -130,6 +130,11 @@ void add_load_command(Program& program) {
              "ends"),
          0, 1e15, "N")
       ->needs(verify);
+  within(app.add_option_function<double>(
+             "--reconnect", [&load](double seconds) { load.reconnect = std::chrono::duration<double>(seconds); },
+             "With --verify: a client that has lost its server looks for it again that long, and resumes with what it has; default: it has failed"),
+         0.1, 1e6, "SECONDS")
+      ->needs(verify);
   add_access_options(app, options->access);
   add_json_flag(app, options->json);
 }

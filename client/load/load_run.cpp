@@ -92,6 +92,7 @@ LoadPlan plan_of(const ServerUrl& url, const LoadOptions& options, const Descrip
   plan.patience = ticks(options.patience);
   plan.verify = options.verify;
   plan.budget = options.budget;
+  if (options.reconnect) plan.reconnect = ticks(*options.reconnect);
   plan.start = LoadClock::now() + kThreadsStart;
   return plan;
 }

@@ -26,8 +26,9 @@ struct LoadOptions {
   std::optional<std::uint64_t> window;         // off: goes by the line
   std::chrono::duration<double> patience{10};  // to be connected, and then for the WebSocket's handshake
   unsigned threads = 1;
-  bool verify = false;  // keeps a mesh for each client, and compares them all at the end: see verify_meshes
-  Budget budget;        // of each of those
+  bool verify = false;                                     // keeps a mesh for each client, and compares them all at the end: see verify_meshes
+  Budget budget;                                           // of each of those
+  std::optional<std::chrono::duration<double>> reconnect;  // see LoadPlan
 };
 
 // Asks the server about the data set, runs the clients, and compares. Blocks for the duration and a little. Fails where the run could not be made: no

@@ -8,8 +8,9 @@
 #include <utility>
 #include <variant>
 
-#include "client/net/connection.h"
+#include "client/core/backoff.h"
 #include "client/core/grants.h"
+#include "client/net/connection.h"
 
 namespace intervale {
 namespace {
@@ -18,21 +19,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::uint64_t kDoneBytes = 128;  // more than a Done message takes
 constexpr std::uint64_t kEpoch = 1;        // one view for the whole stream
-
-// Waits between attempts, so that many clients of one server do not come back all at once.
-class Backoff {
- public:
-  [[nodiscard]] std::chrono::milliseconds next() {
-    const double share = std::uniform_real_distribution<double>(0.5, 1.0)(random_);
-    const auto wait = std::chrono::milliseconds(long(double(wait_.count()) * share));
-    wait_ = std::min(2 * wait_, std::chrono::milliseconds(3000));
-    return wait;
-  }
-
- private:
-  std::mt19937 random_{std::random_device{}()};
-  std::chrono::milliseconds wait_{100};
-};
 
 class Fetch {
  public:
@@ -78,7 +64,7 @@ Result<void> Fetch::run() {
   while (!done && client_ && connection_ && connection_->is_lost() && options_.reconnect.count() > 0) {
     if (events_.on_notice) events_.on_notice(done.error().message + "; connecting again");
     const auto deadline = Clock::now() + options_.reconnect;
-    Backoff backoff;
+    Backoff backoff(std::random_device{}());
     const auto first_error = done.error();
     count();
     bytes_before_ = figures_.bytes_received;

@@ -150,6 +150,20 @@ TEST(Load, AServerThatDiesIsStatus1WithFigures) {
   }
 }
 
+TEST(Load, AServerThatIsNotFoundAgainInTimeIsLost) {
+  ServerProgram server;
+  Process load(command(server.url("buckyball"),
+                       {"--clients", "4", "--duration", "60", "--ramp", "0", "--pixel-error", "0.5", "--verify", "--reconnect", "0.5", "--json"}));
+  ASSERT_TRUE(server.process().wait_for("session 6 "));  // after those that ask about the data set and take it
+  server.process().signal(SIGKILL);
+  const Finished finished = load.wait();
+  EXPECT_EQ(finished.status, 1);
+  EXPECT_THAT(finished.err, StartsWith("intervale-load: 4 of 4 clients failed: lost the server"));
+  const auto figures = nlohmann::json::parse(finished.out, nullptr, false);
+  EXPECT_EQ(figures.at("failed"), 4) << finished.out;
+  EXPECT_EQ(figures.at("reconnects"), 0) << finished.out;
+}
+
 TEST(Load, ServersThatCannotBeLoadedAreOneLine) {
   expect_complaint(run(command("ws://127.0.0.1:1/x", {"--clients", "1", "--duration", "1"})), 1, "cannot connect to 127.0.0.1:1");
   ServerProgram server;
@@ -174,6 +188,7 @@ TEST(Load, WrongUsageIsStatus2) {
   expect_complaint(run(command(url, with({"--scenario", "dance"}))), 2, "orbit");
   expect_complaint(run(command(url, with({"--rate", "1"}))), 2, "--rate");
   expect_complaint(run(command(url, with({"--views-per-second", "0"}))), 2, "--views-per-second");
+  expect_complaint(run(command(url, with({"--reconnect", "5"}))), 2, "--verify");
   expect_complaint(run(command("ws://127.0.0.1:1", good)), 2, "NAME");
   expect_complaint(run(command("http://127.0.0.1:1/x", good)), 2, "ws://");
 }

@@ -1,0 +1,27 @@
+// How long to wait before a lost server is tried again.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <random>
+
+namespace intervale {
+
+// From 0.1 s doubling to 3 s, each cut by up to a half at random, so that many clients of one server do not come back all at once.
+class Backoff {
+ public:
+  explicit Backoff(std::uint64_t seed) : random_(seed) {}
+  [[nodiscard]] std::chrono::milliseconds next() {
+    const double share = std::uniform_real_distribution<double>(0.5, 1.0)(random_);
+    const auto wait = std::chrono::milliseconds(long(double(wait_.count()) * share));
+    wait_ = std::min(2 * wait_, std::chrono::milliseconds(3000));
+    return wait;
+  }
+
+ private:
+  std::mt19937_64 random_;
+  std::chrono::milliseconds wait_{100};
+};
+
+}  // namespace intervale
