@@ -1,6 +1,6 @@
 // Where one looks from, and how it moves: pure functions. A camera looks from eye to lookAt; up need not be perpendicular to that.
 import type { Box, Vec3 } from './messages';
-import { add, along, cross, diagonal, dot, length, middle, scale, sub, turned, unit } from './vec';
+import { add, along, corners, cross, dot, length, middle, scale, sub, turned, unit } from './vec';
 
 export interface Pose {
   eye: Vec3;
@@ -10,6 +10,7 @@ export interface Pose {
 }
 
 export const kFov = 30;
+const kFill = 0.94; // of the picture, by the box
 
 // Right, up and back, perpendicular and of length 1.
 export function axes(pose: Pose): { right: Vec3; up: Vec3; back: Vec3 } {
@@ -21,12 +22,16 @@ export function axes(pose: Pose): { right: Vec3; up: Vec3; back: Vec3 } {
 
 // The whole box in the picture, seen from above one of its corners. aspect: width over height.
 export function fitted(box: Box, aspect: number, towards: Vec3 = [0.62, -1, 0.52]): Pose {
-  const half = Math.tan((kFov * Math.PI) / 360) * Math.min(1, aspect);
-  const radius = diagonal(box) / 2 || 1;
+  const half = Math.tan((kFov * Math.PI) / 360) * kFill;
   const lookAt = middle(box);
-  const distance = (0.92 * radius) / Math.sin(Math.atan(half));
   const back = unit(towards);
-  return { eye: along(lookAt, back, distance), lookAt, up: Math.abs(back[2]) > 0.99 ? [0, 1, 0] : [0, 0, 1], fov: kFov };
+  const pose: Pose = { eye: add(lookAt, back), lookAt, up: Math.abs(back[2]) > 0.99 ? [0, 1, 0] : [0, 0, 1], fov: kFov };
+  const a = axes(pose);
+  const distances = corners(box).map((corner) => {
+    const c = sub(corner, lookAt);
+    return dot(back, c) + Math.max(Math.abs(dot(a.right, c)) / aspect, Math.abs(dot(a.up, c))) / half;
+  });
+  return { ...pose, eye: along(lookAt, back, Math.max(...distances) || 1) };
 }
 
 // World units that one pixel is at the distance of lookAt.

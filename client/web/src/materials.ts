@@ -31,6 +31,7 @@ export const shared = {
   levels: { value: 1 },
   depths: { value: new Vector2(0, 1) },
   shrink: { value: 0.8 },
+  pixelScale: { value: 1 }, // pixels of one unit across, one unit ahead
   outline: { value: 0.4 },
   alpha: { value: new Vector3() },
   beta: { value: new Vector3() },
@@ -100,7 +101,7 @@ export function setLooks(materials: SurfaceMaterials, looks: Record<SurfaceName,
     materials.veil[i]!.visible = !solid && opacity > 0.005;
     materials.veil[i]!.uniforms['opacity']!.value = opacity;
     materials.edges[i]!.visible = opacity > 0.005;
-    materials.edges[i]!.uniforms['ink']!.value.set(r * 0.25, g * 0.25, b * 0.25, solid ? 0.7 : 0.15 + 0.4 * opacity);
+    materials.edges[i]!.uniforms['ink']!.value.set(r * 0.25, g * 0.25, b * 0.25, solid ? 0.75 : 0.15 + 0.4 * opacity);
   });
 }
 

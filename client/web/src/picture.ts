@@ -4,12 +4,13 @@ import { type Pose, rayThrough } from './camera';
 import { type Frame, planeToDrawing, shiftOf, toDrawing } from './frame';
 import { Guides } from './guides';
 import { setLooks, shared, surfaceMaterials } from './materials';
-import type { Box, Cap, Tets, Vec3 } from './messages';
+import type { Box, Cap, Vec3 } from './messages';
 import { SkinView } from './skin';
 import { Pick } from './pick';
 import { CapView, TetsView } from './solids';
 import type { ViewState } from './state';
 import { Thickness } from './thickness';
+import { Uploader } from './upload';
 import { Veil } from './veil';
 import { along, corners, dot, length, sub, unit } from './vec';
 
@@ -21,8 +22,9 @@ export class Picture {
   readonly skin: SkinView;
   readonly guides = new Guides();
   readonly thickness: Thickness;
-  readonly cap = new CapView();
-  readonly tets = new TetsView();
+  readonly uploader: Uploader;
+  readonly cap: CapView;
+  readonly tets: TetsView;
   private materials = surfaceMaterials();
   private veil = new Veil();
   private pick = new Pick();
@@ -38,11 +40,14 @@ export class Picture {
     this.renderer.autoClear = false;
     this.renderer.outputColorSpace = LinearSRGBColorSpace; // the shaders write sRGB themselves
     this.warmUp();
-    this.skin = new SkinView(this.renderer, this.materials);
+    this.uploader = new Uploader(this.renderer);
+    this.skin = new SkinView(this.uploader, this.materials);
+    this.cap = new CapView(this.uploader);
+    this.tets = new TetsView(this.uploader);
     this.thickness = new Thickness(this.renderer);
     this.skinScene.add(this.skin.faces);
     this.edgeScene.add(this.skin.edges);
-    this.solidScene.add(this.cap.mesh, this.tets.mesh);
+    this.solidScene.add(this.cap.mesh, this.tets.group);
     for (const scene of [this.skinScene, this.edgeScene, this.solidScene]) scene.matrixWorldAutoUpdate = false;
   }
 
@@ -79,10 +84,9 @@ export class Picture {
     shared.clip.value.set(...normal, offset);
   }
 
-  // tets: null where none are shown; its box hides the skin.
-  setTets(frame: Frame, tets: Tets | null): void {
-    this.tets.show(tets);
-    const hidden: Box | null = tets?.box ?? null;
+  // Shows the tetrahedra that have been uploaded, in a box where the skin is hidden; null: there is none.
+  showTets(frame: Frame, hidden: Box | null): void {
+    this.tets.swap();
     shared.hiddenMin.value.set(...(hidden ? toDrawing(frame, hidden.min) : kNowhere.max));
     shared.hiddenMax.value.set(...(hidden ? toDrawing(frame, hidden.max) : kNowhere.min));
   }
@@ -135,7 +139,7 @@ export class Picture {
   private solids(skin: Material | Material[], cap: Material, tets: Material): void {
     this.faces(skin);
     this.cap.mesh.material = cap;
-    this.tets.mesh.material = tets;
+    this.tets.use(tets);
     this.renderer.render(this.solidScene, this.camera);
   }
 
@@ -144,11 +148,10 @@ export class Picture {
     const outside = dot([x, y, z], toDrawing(frame, pose.eye)) > w;
     this.cap.thickness.uniforms['capFacing']!.value = outside ? 1 : -1;
     this.faces(this.thickness.material); // of all surfaces, also of those that are not shown
-    const { visible } = this.tets.mesh;
-    this.tets.mesh.visible = false;
+    this.tets.group.visible = false;
     this.cap.mesh.material = this.cap.thickness;
     this.renderer.render(this.solidScene, this.camera);
-    this.tets.mesh.visible = visible;
+    this.tets.group.visible = true;
   }
 
   private aim(frame: Frame, pose: Pose): void {
@@ -159,6 +162,7 @@ export class Picture {
     const far = farthest > 0 ? farthest : length(sub(pose.lookAt, pose.eye));
     const near = Math.max(Math.min(...depths) * 0.98, far * 5e-4);
     shared.depths.value.set(near, far);
+    shared.pixelScale.value = this.canvas.height / 2 / Math.tan((pose.fov * Math.PI) / 360);
     camera.fov = pose.fov;
     camera.aspect = this.canvas.width / this.canvas.height;
     camera.near = near;

@@ -34,7 +34,7 @@ export function watchProgress(live: Store<Live>): void {
     bar.className = waiting ? 'waiting' : done ? 'done' : '';
     bar.setAttribute('aria-valuenow', String(Math.round(100 * share)));
     element('bar-fill').style.transform = `scaleX(${share.toFixed(4)})`;
-    line(progress);
+    line(value);
     facts(value);
   };
   live.watch([], () => {
@@ -43,12 +43,19 @@ export function watchProgress(live: Store<Live>): void {
   show();
 }
 
-function line(p: Progress | null): void {
+// What is left of the error in the field, where it is known: of a view that is done by pixels it is not.
+function fieldError({ progress: p, dataset }: Readonly<Live>): string | null {
+  return p && (p.remainingError > 0 || !dataset || p.updatesShown >= dataset.updates) ? short(p.remainingError) : null;
+}
+
+function line(live: Readonly<Live>): void {
+  const p = live.progress;
+  const field = fieldError(live);
   const target = element('figures');
   const parts: [string, string][] = p
     ? [
         [pixels(p), 'error'],
-        [`± ${short(p.remainingError)}`, 'in the field'],
+        ...(field === null ? [] : [[`± ${field}`, 'in the field'] as [string, string]]),
         [bytes(p.bytes), ''],
         [count(p.updates), 'updates'],
         [count(p.tets), 'tetrahedra'],
@@ -66,12 +73,14 @@ function line(p: Progress | null): void {
 
 const pixels = (p: Progress): string => `${short(p.remainingPixels)} px`;
 
-function facts({ progress: p, dataset }: Readonly<Live>): void {
+function facts(live: Readonly<Live>): void {
+  const { progress: p, dataset } = live;
+  const field = fieldError(live);
   const rows: [string, string][] = p
     ? [
         ['Volume', `${bounded(p.volume, p.volumeBound)} units³`],
         ['Error on screen', pixels(p)],
-        ['Error in the field', dataset && dataset.maxError > 0 ? `${short(p.remainingError)} (${short((100 * p.remainingError) / dataset.maxError)} %)` : short(p.remainingError)],
+        ...(field === null ? [] : [['Error in the field', dataset && dataset.maxError > 0 ? `${field} (${short((100 * p.remainingError) / dataset.maxError)} %)` : field] as [string, string]]),
         ['Tetrahedra', count(p.tets)],
         ['Triangles', count(p.triangles)],
         ['Updates', p.updatesShown < p.updates ? `${count(p.updates)}, ${count(p.updatesShown)} shown` : count(p.updates)],

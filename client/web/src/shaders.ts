@@ -51,13 +51,13 @@ vec3 lit(vec3 color, vec3 n, vec3 p) {
 }
 `;
 
-// Levels of detail: from fine and dark to coarse and light, even in lightness, told apart without red and green (after viridis).
+// Levels of detail: from fine and light to coarse and dark, even in lightness, told apart without red and green (after viridis).
 export const kRamp: readonly [number, number, number][] = [
-  [0.3, 0.17, 0.5],
-  [0.23, 0.35, 0.6],
-  [0.13, 0.57, 0.55],
-  [0.45, 0.78, 0.35],
-  [0.99, 0.9, 0.2],
+  [0.98, 0.88, 0.2],
+  [0.45, 0.78, 0.36],
+  [0.14, 0.58, 0.56],
+  [0.23, 0.36, 0.6],
+  [0.32, 0.17, 0.5],
 ];
 const kLevels = `
 uniform float byLevel, levels; // 1 where colours are the levels'; the coarsest level
@@ -115,11 +115,14 @@ export const kEdgeFragment = `${kPrecision}
 in vec3 normal;
 flat in float level;
 uniform vec4 ink;
+uniform vec3 spacing;
+uniform float pixelScale;
 ${kCut}
 out vec4 picture;
 void main() {
   cut();
-  picture = ink;
+  float pixels = exp2(level) * min(spacing.x, min(spacing.y, spacing.z)) * pixelScale * gl_FragCoord.w; // about an edge's length
+  picture = vec4(ink.rgb, ink.a * clamp(pixels / 8.0, 0.12, 1.0)); // many thin lines in a place would be but dark
 }`;
 
 export const kCapVertex = `${kPrecision}
@@ -157,7 +160,7 @@ void main() {
 }`;
 
 export const kTetsVertex = `${kPrecision}
-in uvec3 corner;
+in uvec3 position;
 in uvec3 center;
 in uint kind; // surface and level
 uniform float shrink;
@@ -167,7 +170,7 @@ out vec2 share; // how many corners are on alpha and on beta, over the triangle
 ${kPlace}
 void main() {
   vec3 c = unpacked(center);
-  whole = unpacked(corner);
+  whole = unpacked(position);
   put(c + (whole - c) * shrink);
   uint surface = kind & 255u;
   share = vec2(surface == 1u, surface == 2u);
@@ -264,8 +267,8 @@ void main() { picture = ink; }`;
 
 // Draws nothing; but what is given to it to draw is uploaded.
 export const kStagingVertex = `${kPrecision}
-in uvec4 position;
-void main() { gl_Position = vec4(uintBitsToFloat(position.xyz), 0.0); }`;
+in uvec3 position;
+void main() { gl_Position = vec4(uintBitsToFloat(position), 0.0); }`;
 
 export const kStagingFragment = `${kPrecision}
 out vec4 picture;

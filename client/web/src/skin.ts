@@ -1,9 +1,10 @@
 // The skin's pieces on the graphics card. A new skin is taken as a whole: its pieces are uploaded a few at a time, between pictures, and only then
 // take the place of the old ones, all at once. Nothing here looks at single vertices.
-import { BufferAttribute, BufferGeometry, Camera, Group, LineSegments, type Material, Mesh, Scene, Sphere, Vector3, type WebGLRenderer, WebGLRenderTarget } from 'three';
+import { BufferAttribute, BufferGeometry, Group, LineSegments, type Material, Mesh, Sphere, Vector3 } from 'three';
 import { type Frame, toDrawing } from './frame';
-import { stagingMaterial, type SurfaceMaterials } from './materials';
+import type { SurfaceMaterials } from './materials';
 import type { Piece, Skin, Vec3 } from './messages';
+import type { Uploader } from './upload';
 import { add, diagonal, middle } from './vec';
 
 interface Drawn {
@@ -13,34 +14,19 @@ interface Drawn {
   triangles: number;
 }
 
-const kUploadMs = 4; // a stretch of uploading, and
-const kUploadBytes = 4e6; // ... at most so many, which may take longer than the call
-
 export class SkinView {
   readonly faces = new Group();
   readonly edges = new Group();
   version = 0; // of what is shown; 0: nothing yet
   triangles = 0;
   bytes = 0; // of buffers
-  coarsest = 1;
   private pieces = new Map<number, Drawn>();
   private waiting: Skin[] = [];
   private staged: { id: number; drawn: Drawn }[] = [];
   private uploaded = 0; // pieces of the first that waits
-  private stage = new Scene();
-  private stageTarget = new WebGLRenderTarget(1, 1);
-  private stageMesh = new Mesh(new BufferGeometry(), stagingMaterial());
-  private nobody = new Camera();
 
-  constructor(private renderer: WebGLRenderer, private materials: SurfaceMaterials) {
+  constructor(private uploader: Uploader, private materials: SurfaceMaterials) {
     for (const group of [this.faces, this.edges]) group.matrixAutoUpdate = false;
-    this.stageMesh.frustumCulled = false;
-    this.stage.add(this.stageMesh);
-    const nothing = new BufferGeometry(); // once, so that the first piece finds the shader ready
-    nothing.setAttribute('position', new BufferAttribute(new Uint32Array(4), 4));
-    nothing.setIndex(new BufferAttribute(new Uint32Array(3), 1));
-    this.send(nothing);
-    nothing.dispose();
   }
 
   get busy(): boolean {
@@ -51,19 +37,16 @@ export class SkinView {
     this.waiting.push(skin);
   }
 
-  // Uploads for a few milliseconds. Whether a skin is complete: then `swap` is due.
+  // Uploads while the uploader is open. Whether a skin is complete: then `swap` is due.
   upload(frame: Frame): boolean {
     const skin = this.waiting[0];
     if (!skin) return false;
-    const end = performance.now() + kUploadMs;
-    let bytes = 0;
-    while (this.uploaded < skin.pieces.length && performance.now() < end && bytes < kUploadBytes) {
+    while (this.uploaded < skin.pieces.length && this.uploader.open) {
       const piece = skin.pieces[this.uploaded++]!;
       const drawn = this.made(piece, frame);
-      this.send(drawn.mesh.geometry);
-      if (drawn.lines) this.send(drawn.lines.geometry);
+      this.uploader.send(drawn.mesh.geometry, drawn.bytes);
+      if (drawn.lines) this.uploader.send(drawn.lines.geometry, 0); // counted already
       this.staged.push({ id: piece.id, drawn });
-      bytes += drawn.bytes;
     }
     return this.uploaded === skin.pieces.length;
   }
@@ -135,16 +118,6 @@ export class SkinView {
       bytes: piece.vertices.byteLength + piece.indices.byteLength + (piece.edges?.byteLength ?? 0),
       triangles: piece.triangles[0] + piece.triangles[1] + piece.triangles[2],
     };
-  }
-
-  // three.js uploads what it is to draw: so it draws nothing of it.
-  private send(geometry: BufferGeometry): void {
-    geometry.setDrawRange(0, 0);
-    this.stageMesh.geometry = geometry;
-    this.renderer.setRenderTarget(this.stageTarget);
-    this.renderer.render(this.stage, this.nobody);
-    this.renderer.setRenderTarget(null);
-    geometry.setDrawRange(0, Infinity);
   }
 }
 

@@ -39,7 +39,7 @@ export class Viewer {
   onResize: () => void = () => {};
   onContext: (lost: boolean) => void = () => {};
   private coarsest = 1;
-  private cap: Cap | null = null; // that waits for its skin
+  private cap: Cap | null = null; // that waits to be shown
   private dirty = true;
   private asked = false;
   private lost = false;
@@ -76,7 +76,8 @@ export class Viewer {
     this.frame = frameOf(dataset);
     this.picture.setFrame(this.frame);
     this.picture.setCap(this.frame, null);
-    this.picture.setTets(this.frame, null);
+    this.picture.tets.clear();
+    this.picture.showTets(this.frame, null);
     this.coarsest = Math.max(1, Math.ceil(Math.log2(Math.max(...dataset.dims) - 1)) - 1);
     this.picture.resize();
     this.applyLooks();
@@ -96,17 +97,13 @@ export class Viewer {
 
   // A cap of a skin that is still to be shown waits for it.
   takeCap(cap: Cap): void {
-    if (cap.version > this.picture.skin.version && this.picture.skin.busy) this.cap = cap;
-    else this.timed(() => this.showCap(cap));
-    this.changed();
+    this.cap = cap;
+    this.ask();
   }
 
   takeTets(tets: Tets): void {
-    if (!this.frame) return;
-    const frame = this.frame;
-    this.timed(() => this.picture.setTets(frame, tets.box ? tets : null));
-    this.stats.tets = tets.box ? tets.count : 0;
-    this.changed();
+    this.picture.tets.take(tets);
+    this.ask();
   }
 
   changed(): void {
@@ -142,24 +139,39 @@ export class Viewer {
     if (this.lost) return;
     if (this.drawing()) return this.ask();
     const { skin } = this.picture;
-    let shown = 0;
-    if (skin.busy && this.frame) {
-      const frame = this.frame;
-      this.timed(() => {
-        if (!skin.upload(frame)) return;
-        skin.swap();
-        shown = skin.version;
-        if (this.cap && this.cap.version <= shown) this.showCap(this.cap);
-      });
-      if (shown > 0) this.dirty = true;
-    }
+    const shown = this.frame && this.waiting() ? this.timed(() => this.upload(this.frame!)) : 0;
     if (this.dirty) this.draw();
     if (shown > 0) {
       Object.assign(this.stats, { skinVersion: shown, skinTriangles: skin.triangles, skinBytes: skin.bytes });
       if (this.stats.firstMeshMs === 0 && skin.triangles > 0) this.stats.firstMeshMs = performance.mark('intervale: first mesh').startTime;
       this.onShown(shown);
     }
-    if (skin.busy || this.dirty) this.ask();
+    if (this.waiting() || this.dirty) this.ask();
+  }
+
+  private waiting(): boolean {
+    return this.picture.skin.busy || this.picture.tets.busy || this.cap !== null;
+  }
+
+  // Goes on with what waits to be uploaded. The version of the skin that is complete now; 0: none.
+  private upload(frame: Frame): number {
+    const { skin, tets, uploader } = this.picture;
+    uploader.begin();
+    let shown = 0;
+    if (skin.upload(frame)) {
+      if (this.cap && !uploader.open) return 0; // both in the next stretch
+      skin.swap();
+      shown = skin.version;
+      this.dirty = true;
+    }
+    if (this.cap && (!skin.busy || this.cap.version <= skin.version)) this.showCap(this.cap);
+    const complete = skin.busy ? null : tets.upload();
+    if (complete) {
+      this.picture.showTets(frame, complete.box);
+      this.stats.tets = complete.box ? complete.count : 0;
+      this.dirty = true;
+    }
+    return shown;
   }
 
   private draw(withGuides = true): void {
@@ -195,6 +207,7 @@ export class Viewer {
 
   private showCap(cap: Cap): void {
     this.cap = null;
+    this.dirty = true;
     if (this.frame) this.picture.setCap(this.frame, cap);
     this.stats.capTriangles = cap.plane ? cap.triangles : 0;
   }
@@ -203,9 +216,10 @@ export class Viewer {
     this.picture.setLooks(this.view.value, this.coarsest);
   }
 
-  private timed(work: () => void): void {
+  private timed<T>(work: () => T): T {
     const start = performance.now();
-    work();
+    const made = work();
     this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
+    return made;
   }
 }
