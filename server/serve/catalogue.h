@@ -1,12 +1,10 @@
 // The data sets a server offers, by name.
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "common/interval_volume.h"
 #include "common/result.h"
@@ -17,9 +15,6 @@ namespace intervale {
 class Catalogue {
  public:
   using Volume = std::shared_ptr<const IntervalVolume>;
-
-  // Files, and the *.ivm in folders (not in folders within). See serve().
-  static Result<Catalogue> load(const std::vector<std::filesystem::path>& inputs);
 
   // Under its description's name. Failure: the name is taken, or unfit for a URL's path.
   Result<void> add(Volume volume);

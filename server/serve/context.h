@@ -17,11 +17,11 @@
 
 namespace intervale {
 
-// Outlives every session. The catalogue, the viewer and the options do not change while serving.
+// Outlives every session. The viewer and the options do not change while serving.
 struct ServerContext {
   explicit ServerContext(const ServeOptions& wanted) : options(wanted), outbox(wanted.max_queued_bytes), turnstile(wanted.threads) {}
-  const ServeOptions options;  // threads is not 0
-  Catalogue catalogue;
+  const ServeOptions options;        // threads is not 0
+  Replaceable<Catalogue> catalogue;  // nullptr until it is loaded
   StaticFiles viewer;
   Metrics metrics;
   Replaceable<Tokens> tokens;   // nullptr: whoever comes may see everything

@@ -106,6 +106,18 @@ HttpAnswer short_answer(unsigned status, std::string line) {
   return {.status = status, .body = std::make_shared<const std::string>(std::move(line) + "\n")};
 }
 
+const char* text_of(Readiness readiness) {
+  switch (readiness) {
+    case Readiness::loading:
+      return "loading";
+    case Readiness::draining:
+      return "draining";
+    case Readiness::ready:
+      break;
+  }
+  return "ok";
+}
+
 HttpAnswer unauthorized() {
   HttpAnswer answer = short_answer(401, "a token is wanted: Authorization: Bearer TOKEN");
   answer.headers.emplace_back("WWW-Authenticate", "Bearer");
@@ -125,9 +137,12 @@ HttpAnswer answer(const HttpRequest& request, const HttpState& state) {
     if (request.scope == nullptr) return unauthorized();
     if (!request.scope->is_everything()) return short_answer(403, "metrics tell of every data set, and this token does not open them all");
   }
-  if (*path == "/metrics") return with_body(kPrometheus, state.metrics.text(state.catalogue, state.queued_bytes));
+  if (*path == "/metrics")
+    return with_body(
+        kPrometheus,
+        state.metrics.text({.catalogue = state.catalogue, .queued_bytes = state.queued_bytes, .certificate_expires = state.certificate_expires}));
   if (*path == "/healthz") return short_answer(200, "ok");
-  if (*path == "/readyz") return state.ready ? short_answer(200, "ok") : short_answer(503, "draining");
+  if (*path == "/readyz") return short_answer(state.readiness == Readiness::ready ? 200 : 503, text_of(state.readiness));
   if (file != nullptr) return file_answer(request, *file);
   return with_body(kHtml, front_page(state.catalogue, request.scope));
 }

@@ -1,8 +1,10 @@
 // What the server answers over HTTP: a pure function of the request. No I/O.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -42,6 +44,10 @@ struct HttpAnswer {
 // What a port is for: everything, or nothing but /metrics, /healthz and /readyz.
 enum class Door { all, metrics };
 
+// loading: before there is a catalogue. draining: nobody new is taken.
+enum class Readiness { loading, ready, draining };
+[[nodiscard]] const char* text_of(Readiness readiness);
+
 struct HttpState {
   const Catalogue& catalogue;
   const Metrics& metrics;
@@ -49,7 +55,8 @@ struct HttpState {
   std::uint64_t queued_bytes = 0;
   Door door = Door::all;
   bool has_metrics_door = false;  // then /metrics is answered there only
-  bool ready = true;              // false while draining
+  std::optional<std::chrono::system_clock::time_point> certificate_expires = {};
+  Readiness readiness = Readiness::ready;
 };
 
 // GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists

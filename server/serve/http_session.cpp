@@ -78,6 +78,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   void start() {
     context_.metrics.connections.Increment();
+    late_ = context_.connections.draining();
     membership_ = context_.connections.join(shared_from_this());
     asio::co_spawn(strand_, run(shared_from_this()), [](const std::exception_ptr& failure) { report(failure); });
   }
@@ -89,7 +90,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void go_away() override {
     asio::post(strand_, [self = shared_from_this()] {
       self->leaving_ = true;
-      if (self->waiting_) self->stream_.socket().cancel();  // an answer under way is finished
+      if (self->waiting_ && !self->late_) self->stream_.socket().cancel();  // an answer under way is finished
     });
   }
 
@@ -106,7 +107,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   // Whatever ends this coroutine ends the connection, but for an upgrade, which takes the socket along. `self` keeps the object.
   asio::awaitable<void> run([[maybe_unused]] std::shared_ptr<HttpSession> self) {
     if (!co_await begin_tls()) co_return;
-    for (std::chrono::milliseconds patience = context_.options.handshake_time; !leaving_; patience = kKeepAliveTime) {
+    std::chrono::milliseconds patience = context_.options.handshake_time;
+    for (bool first = true; !leaving_ || (first && late_); first = false, patience = kKeepAliveTime) {
       http::request_parser<http::empty_body> parser;
       parser.header_limit(kMaxHeader);
       expire_after(patience);
@@ -164,23 +166,27 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   HttpAnswer answer_to(const Request& request) const {
     if (door_ == Door::all && request.target() == protocol::kPath) return short_answer(426, "this is where WebSocket sessions are opened");
     const auto scope = scope_for(request);
+    const auto catalogue = context_.catalogue.get();
+    const auto tls = context_.tls.get();
+    static const Catalogue kNothingYet;
     const HttpRequest asked{.method = request.method_string(),
                             .target = request.target(),
                             .host = request[http::field::host],
                             .accept_encoding = request[http::field::accept_encoding],
                             .if_none_match = request[http::field::if_none_match],
                             .scope = scope.get()};
-    return intervale::answer(asked, {.catalogue = context_.catalogue,
+    return intervale::answer(asked, {.catalogue = catalogue ? *catalogue : kNothingYet,
                                      .metrics = context_.metrics,
                                      .viewer = context_.viewer,
                                      .queued_bytes = context_.outbox.bytes(),
                                      .door = door_,
                                      .has_metrics_door = context_.options.metrics_listen.has_value(),
-                                     .ready = !leaving_});
+                                     .certificate_expires = tls ? std::optional(tls->expires()) : std::nullopt,
+                                     .readiness = readiness()});
   }
 
   std::optional<HttpAnswer> unfit_for_session(const Request& request) const {
-    if (leaving_) return short_answer(503, "draining");
+    if (const auto state = readiness(); state != Readiness::ready) return short_answer(503, text_of(state));
     if (!offers_our_subprotocol(request)) return short_answer(400, "the subprotocol intervale.v1 is not offered");
     const std::string_view origin = request[http::field::origin], host = request[http::field::host];
     if (!is_allowed_origin(origin, host, context_.options.allowed_origins)) {
@@ -193,6 +199,11 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     const auto& memory = context_.options.max_memory;
     if (memory && resident_bytes() > *memory) return refused(Refusal::memory, full());
     return {};
+  }
+
+  [[nodiscard]] Readiness readiness() const {
+    if (context_.connections.draining()) return Readiness::draining;
+    return context_.catalogue.get() ? Readiness::ready : Readiness::loading;
   }
 
   [[nodiscard]] HttpAnswer refused(Refusal reason, HttpAnswer answer) const {
@@ -240,6 +251,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   beast::flat_buffer buffer_{2 * kMaxHeader};
   bool waiting_ = false;  // for a request
   bool leaving_ = false;
+  bool late_ = false;  // came while the server drains: gets one answer, that it does
   Connections::Membership membership_;
 };
 

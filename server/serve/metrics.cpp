@@ -82,13 +82,18 @@ void Metrics::closed(unsigned code) {
   closes_.Add({{"code", code == 0 ? "none" : known ? std::to_string(code) : "other"}}).Increment();
 }
 
-std::string Metrics::text(const Catalogue& catalogue, std::uint64_t queued_bytes) const {
+std::string Metrics::text(const Now& now) const {
   std::vector<MetricFamily> families = registry_.Collect();
   std::vector<prometheus::ClientMetric> memory;
-  for (const auto& [name, volume] : catalogue.volumes()) memory.push_back(value(double(volume->memory_bytes()), {{"dataset", name}}));
-  families.push_back(gauges("intervale_queued_bytes", "Bytes of streaming messages that are leaving.", {value(double(queued_bytes))}));
-  families.push_back(gauges("intervale_datasets", "Data sets that are served.", {value(double(catalogue.volumes().size()))}));
+  for (const auto& [name, volume] : now.catalogue.volumes()) memory.push_back(value(double(volume->memory_bytes()), {{"dataset", name}}));
+  families.push_back(gauges("intervale_queued_bytes", "Bytes of streaming messages that are leaving.", {value(double(now.queued_bytes))}));
+  families.push_back(gauges("intervale_datasets", "Data sets that are served.", {value(double(now.catalogue.volumes().size()))}));
   families.push_back(gauges("intervale_dataset_memory_bytes", "Memory that a data set takes.", std::move(memory)));
+  if (now.certificate_expires) {
+    const std::chrono::duration<double> time = now.certificate_expires->time_since_epoch();
+    families.push_back(
+        gauges("intervale_certificate_expiry_timestamp_seconds", "When the certificate expires, in Unix time.", {value(time.count())}));
+  }
   families.push_back(gauges("intervale_resident_memory_bytes", "Memory that the server takes in all.", {value(double(resident_bytes()))}));
   return prometheus::TextSerializer().Serialize(families);
 }

@@ -9,6 +9,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "server/serve/catalogue.h"
@@ -45,9 +46,14 @@ class Metrics {
   void refused(Refusal reason);
   void closed(unsigned code);  // a session has ended so; 0: its connection broke
 
-  // In Prometheus' text format, version 0.0.4. What is served is told as of now, and queued_bytes, of
-  // WebSocket messages that are leaving.
-  [[nodiscard]] std::string text(const Catalogue& catalogue, std::uint64_t queued_bytes) const;
+  // What others know, as of now.
+  struct Now {
+    const Catalogue& catalogue;
+    std::uint64_t queued_bytes = 0;  // of WebSocket messages that are leaving
+    std::optional<std::chrono::system_clock::time_point> certificate_expires = {};
+  };
+  // In Prometheus' text format, version 0.0.4.
+  [[nodiscard]] std::string text(const Now& now) const;
 
  private:
   static void observe(prometheus::Histogram& histogram, Duration time) { histogram.Observe(std::chrono::duration<double>(time).count()); }

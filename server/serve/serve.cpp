@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "server/serve/catalogue_watch.h"
 #include "server/serve/server.h"
 
 namespace intervale {
@@ -93,15 +94,24 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
 
   ServeOptions options = wanted;
   if (!options.viewer) options.viewer = viewer_beside_the_program();
-  auto catalogue = Catalogue::load(inputs);
+  auto server = Server::start(options);
+  if (!server) return tl::unexpected(server.error());
+  CatalogueWatch watch(inputs, options.max_memory);
+  auto catalogue = watch.load([&] {
+    signals.poll();
+    return signal == 0;
+  });
   if (!catalogue) return tl::unexpected(catalogue.error());
   const std::size_t count = catalogue->volumes().size();
-  auto server = Server::start(options, std::move(*catalogue));
-  if (!server) return tl::unexpected(server.error());
+  (*server)->offer(std::move(*catalogue));
   spdlog::info("serving {} data set{}{}{}", count, count == 1 ? "" : "s", options.viewer ? "; the viewer is at " : " at ", (*server)->url());
 
-  repeat(timer, [&server] { (*server)->refresh(); });
+  repeat(timer, [&] {
+    (*server)->refresh();
+    if (auto changed = watch.look()) (*server)->offer(std::move(*changed));
+  });
   signals.run();
+  ending.clear();  // a second signal ends it at once
   spdlog::info("{}: draining", signal == SIGINT ? "SIGINT" : "SIGTERM");
   (*server)->stop();
   spdlog::info("stopped");

@@ -55,11 +55,10 @@ Server::Server(std::unique_ptr<Running> running) : running_(std::move(running)) 
 
 Server::~Server() { stop(); }
 
-Result<std::unique_ptr<Server>> Server::start(const ServeOptions& wanted, Catalogue catalogue) {
+Result<std::unique_ptr<Server>> Server::start(const ServeOptions& wanted) {
   ServeOptions options = wanted;
   if (options.threads == 0) options.threads = std::max(1U, std::thread::hardware_concurrency());
   auto running = std::make_unique<Running>(options);
-  running->context.catalogue = std::move(catalogue);
   if (options.viewer) {
     auto viewer = StaticFiles::load(*options.viewer);
     if (!viewer) return fail("no viewer: " + viewer.error().message);
@@ -82,6 +81,14 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& wanted, Catalo
   }
   return std::unique_ptr<Server>(new Server(std::move(running)));
 }
+
+Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catalogue catalogue) {
+  auto server = start(options);
+  if (server) (*server)->offer(std::move(catalogue));
+  return server;
+}
+
+void Server::offer(Catalogue catalogue) { running_->context.catalogue.set(std::make_shared<const Catalogue>(std::move(catalogue))); }
 
 void Server::refresh() {
   const auto tell = [](const Result<bool>& loaded, const char* what) {
@@ -106,8 +113,6 @@ std::string Server::url() const {
 
 void Server::stop() {
   if (std::exchange(running_->stopped, true)) return;
-  running_->listener->close();
-  if (running_->metrics_listener) running_->metrics_listener->close();
   running_->context.connections.go_away();
   if (!running_->context.connections.wait_until_empty(running_->context.options.drain_time)) {
     spdlog::warn("{} connections did not take their leave in time and are cut off", running_->context.connections.size());

@@ -13,10 +13,13 @@ namespace intervale {
 
 class Server {
  public:
-  // Listens, and serves on threads of its own from then on. Failures: an address that cannot be read, or cannot be
-  // had; a viewer, tokens or a certificate that cannot be read.
-  static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);
-  ~Server();  // stops
+  // Listens, and answers on threads of its own from then on: that it is not ready, until there is something to offer. Failures: an address that
+  // cannot be read, or cannot be had; a viewer, tokens or a certificate that cannot be read.
+  static Result<std::unique_ptr<Server>> start(const ServeOptions& options);
+  static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);  // and offers that
+
+  void offer(Catalogue catalogue);  // from now on; sessions keep what they opened. Any thread.
+  ~Server();                        // stops
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
@@ -28,8 +31,8 @@ class Server {
   [[nodiscard]] std::uint16_t metrics_port() const;  // port() if it has none of its own
   [[nodiscard]] std::string url() const;             // "http://127.0.0.1:8080/"
 
-  // Drains: not ready, nobody new, WebSocket sessions closed with 1001; returns once all are gone, after options.drain_time at the latest, when
-  // what is left is cut off. A second call does nothing. Not from a thread of the server's own.
+  // Drains: not ready, which those who ask are told, no new sessions, running ones closed with 1001; returns once all are gone, after
+  // options.drain_time at the latest, when what is left is cut off. A second call does nothing. Not from a thread of the server's own.
   void stop();
 
  private:

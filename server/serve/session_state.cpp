@@ -21,7 +21,8 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   if (opened()) return fault(CloseCode::out_of_order, "Open came twice");
   // Before it is looked for: what is there is no one's business who may not see it.
   if (!scope_ || !scope_->allows(open.dataset)) return fault(CloseCode::forbidden, "this token does not open that data set");
-  volume_ = catalogue_.find(open.dataset);
+  const auto catalogue = catalogue_.get();
+  if (catalogue) volume_ = catalogue->find(open.dataset);
   if (!volume_) return fault(CloseCode::no_such_dataset, "no such data set; see /api/datasets");
   dataset_ = open.dataset;
   plan_.emplace(volume_);

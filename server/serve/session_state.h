@@ -11,15 +11,16 @@
 #include "protocol/messages.h"
 #include "server/serve/access.h"
 #include "server/serve/catalogue.h"
+#include "server/serve/replaceable.h"
 #include "server/serve/stream_plan.h"
 
 namespace intervale {
 
-// One thread at a time. `catalogue` must outlive it.
+// One thread at a time. `catalogue` must outlive it; what was opened stays, whatever becomes of that.
 class SessionState {
  public:
   // scope: what may be opened; nullptr: nothing.
-  SessionState(const Catalogue& catalogue, std::shared_ptr<const Scope> scope) : catalogue_(catalogue), scope_(std::move(scope)) {}
+  SessionState(const Replaceable<Catalogue>& catalogue, std::shared_ptr<const Scope> scope) : catalogue_(catalogue), scope_(std::move(scope)) {}
 
   // Takes a client's message. A fault ends the session: nothing else may be called after.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
@@ -45,7 +46,7 @@ class SessionState {
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
   std::optional<protocol::ServerMessage> next_batch_or_done(std::size_t max_payload);
 
-  const Catalogue& catalogue_;
+  const Replaceable<Catalogue>& catalogue_;
   std::shared_ptr<const Scope> scope_;
   Catalogue::Volume volume_;
   std::string dataset_;

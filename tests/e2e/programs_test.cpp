@@ -310,6 +310,23 @@ TEST(Programs, TokensLetInAndAreNeverTold) {
   EXPECT_THAT(served.err, testing::AllOf(HasSubstr("session 1 "), Not(HasSubstr("hush")), Not(HasSubstr("wrong-"))));
 }
 
+TEST(Programs, AServedFolderIsLookedAtAgain) {
+  const TempDir folder;
+  std::filesystem::copy_file(buckyball(), folder / "one.ivm");
+  ServerProgram server(folder.path().string());
+  const auto names = [&server] { return run({client(), "list", server.url()}).out; };
+  EXPECT_THAT(names(), StartsWith("one: "));
+  std::filesystem::copy_file(buckyball(), folder / "two.ivm");
+  EXPECT_TRUE(server.process().wait_for("two.ivm was read"));
+  EXPECT_EQ(run({client(), "fetch", server.url("two"), "--error-percent", "50"}).status, 0);
+  folder.file("one.ivm", "damaged");
+  EXPECT_TRUE(server.process().wait_for("what was read before stays"));
+  EXPECT_EQ(run({client(), "fetch", server.url("one"), "--error-percent", "50"}).status, 0);
+  std::filesystem::remove(folder / "one.ivm");
+  EXPECT_TRUE(server.process().wait_for("one.ivm has gone"));
+  EXPECT_THAT(names(), StartsWith("two: "));
+}
+
 TEST(Programs, SighupChangesWhatTheServerSays) {
   ServerProgram server;
   const auto fetch = [&server] { return run({program("intervale-client"), "fetch", server.url("buckyball"), "--error-percent", "50"}).status; };

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "protocol/codec.h"
+#include "server/serve/catalogue_watch.h"
 #include "tests/e2e/support/programs.h"
 #include "tests/e2e/support/raw_client.h"
 #include "tests/support/temp_dir.h"
@@ -35,7 +36,7 @@ std::unique_ptr<Server> start(const ServeOptions& wanted = {}) {
   ServeOptions options = wanted;
   options.listen = "127.0.0.1:0";
   options.threads = 2;
-  auto server = Server::start(options, Catalogue::load({buckyball()}).value());
+  auto server = Server::start(options, CatalogueWatch({buckyball()}).load().value());
   if (!server) throw std::runtime_error(server.error().message);
   return std::move(*server);
 }
@@ -277,6 +278,53 @@ TEST(Server, StopClosesSessionsWithGoingAway) {
   stopping.join();
 }
 
+TEST(Server, IsNotReadyBeforeThereIsSomethingToOffer) {
+  ServeOptions options;
+  options.listen = "127.0.0.1:0";
+  const auto server = Server::start(options).value();
+  EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(get(server->port(), "/readyz"), testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading")));
+  EXPECT_THAT(get(server->port(), "/api/datasets"), HasSubstr("\"datasets\":[]"));
+  EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
+  server->offer(CatalogueWatch({buckyball()}).load().value());
+  EXPECT_THAT(get(server->port(), "/readyz"), StartsWith("HTTP/1.1 200"));
+  RawClient client(server->port());
+  client.send(kOpen);
+  (void)client.expect<Opened>();
+}
+
+TEST(Server, SessionsKeepWhatTheyOpenedWhenItIsGone) {
+  const auto server = start();
+  Waiting before(server->port());
+  RawClient late(server->port());
+  server->offer({});
+  EXPECT_GT(before.finish(), 10000u);
+  late.send(kOpen);
+  EXPECT_EQ(late.end().code, static_cast<unsigned>(CloseCode::no_such_dataset));
+}
+
+// A client that does not leave keeps the server draining until the test is through.
+TEST(Server, SaysThatItDrainsWhileItDoes) {
+  ServeOptions options;
+  options.drain_time = std::chrono::seconds(30);
+  const auto server = start(options);
+  auto deaf = std::make_unique<Waiting>(server->port());
+  std::thread stopping([&server] { server->stop(); });
+  std::string ready;
+  do {
+    ready = get(server->port(), "/readyz");
+  } while (ready.starts_with("HTTP/1.1 200"));  // until it has begun
+  EXPECT_THAT(ready, testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("draining")));
+  EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
+  EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
+  const auto end = deaf->client.end();
+  EXPECT_EQ(end.code, static_cast<unsigned>(CloseCode::going_away));
+  ASSERT_TRUE(end.fault);
+  EXPECT_EQ(end.fault->code, CloseCode::going_away);
+  deaf.reset();
+  stopping.join();
+}
+
 TEST(Server, StopDoesNotWaitForClientsThatDoNotLeave) {
   ServeOptions options;
   options.drain_time = std::chrono::milliseconds(50);
@@ -301,7 +349,6 @@ TEST(Server, TurnsSessionsAwayAtItsLimits) {
   options.max_sessions = 1;
   {
     const auto server = start(options);
-    EXPECT_EQ(upgrade_status(server->port(), {}), 101u);
     const Waiting only(server->port());
     EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
     EXPECT_THAT(get(server->port(), "/metrics"), HasSubstr("intervale_refused_total{reason=\"sessions\"} 1\n"));

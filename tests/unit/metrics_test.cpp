@@ -23,7 +23,7 @@ TEST(Metrics, SayWhatWasCounted) {
   metrics.chose(20s);
   metrics.first_answer(30ms);
   metrics.answered_view(30ms);
-  const std::string text = metrics.text({}, 100);
+  const std::string text = metrics.text({.catalogue = {}, .queued_bytes = 100});
   for (const char* line :
        {"# TYPE intervale_sessions gauge", "intervale_sessions 1", "intervale_updates_sent_total 1000000000", "intervale_queued_bytes 100",
         "# TYPE intervale_selection_seconds histogram", "intervale_selection_seconds_bucket{le=\"0.0025\"} 1",
@@ -38,9 +38,9 @@ TEST(Metrics, SayWhatWasCounted) {
 // A client chooses the code it closes with, and may not make the list of series grow.
 TEST(Metrics, CountClosesByCodesThatAreKnown) {
   Metrics metrics;
-  EXPECT_THAT(metrics.text({}, 0), HasSubstr("intervale_session_closes_total{code=\"4404\"} 0\n"));
+  EXPECT_THAT(metrics.text({.catalogue = {}}), HasSubstr("intervale_session_closes_total{code=\"4404\"} 0\n"));
   const auto lines = [&metrics] {
-    const std::string text = metrics.text({}, 0);
+    const std::string text = metrics.text({.catalogue = {}});
     return std::count(text.begin(), text.end(), '\n');
   };
   metrics.closed(3000);
@@ -48,8 +48,8 @@ TEST(Metrics, CountClosesByCodesThatAreKnown) {
   const auto before = lines();
   for (unsigned code = 0; code <= 5000; ++code) metrics.closed(code);
   EXPECT_EQ(lines(), before);
-  EXPECT_THAT(metrics.text({}, 0), HasSubstr("{code=\"1000\"} 1\n"));
-  EXPECT_THAT(metrics.text({}, 0), HasSubstr("{code=\"none\"} 2\n"));
+  EXPECT_THAT(metrics.text({.catalogue = {}}), HasSubstr("{code=\"1000\"} 1\n"));
+  EXPECT_THAT(metrics.text({.catalogue = {}}), HasSubstr("{code=\"none\"} 2\n"));
 }
 
 }  // namespace

@@ -1,0 +1,151 @@
+#include "server/serve/catalogue_watch.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <exception>
+#include <system_error>
+#include <utility>
+
+#include "common/ivm_file.h"
+#include "server/serve/guard.h"
+
+namespace intervale {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<std::vector<fs::path>> files_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    std::error_code ignored;
+    if (at->path().extension() == ".ivm" && at->is_regular_file(ignored)) files.push_back(at->path());
+  }
+  if (error) return fail("cannot read the folder " + folder.string() + ": " + error.message());
+  std::sort(files.begin(), files.end());  // the log goes by name, not by the file system's order
+  return files;
+}
+
+// A file that promises more than there is memory for is damaged, most likely, and in any case no reason to end.
+Result<Catalogue::Volume> read(const fs::path& path) {
+  try {
+    return load_ivm(path);
+  } catch (const std::exception& exception) {
+    return fail(path.string() + ": could not be read: " + exception.what());
+  }
+}
+
+}  // namespace
+
+Result<Catalogue> CatalogueWatch::load(const std::function<bool()>& go_on) {
+  for (const fs::path& input : inputs_) {
+    if (!go_on()) break;
+    std::error_code ignored;
+    if (fs::is_directory(input, ignored)) {
+      if (auto loaded = load_folder(input, go_on); !loaded) return tl::unexpected(loaded.error());
+      continue;
+    }
+    auto volume = read(input);
+    if (!volume) return tl::unexpected(volume.error());
+    named_.emplace_back(input, std::move(*volume));
+  }
+  Catalogue catalogue;
+  const auto add = [&catalogue](const fs::path& path, const Catalogue::Volume& volume) -> Result<void> {
+    if (!volume) return {};
+    if (auto added = catalogue.add(volume); !added) return fail(added.error().message + " (" + path.string() + ")");
+    return {};
+  };
+  for (const auto& [path, volume] : named_) {
+    if (auto added = add(path, volume); !added) return tl::unexpected(added.error());
+  }
+  for (const auto& [path, file] : found_) {
+    if (auto added = add(path, file.volume); !added) return tl::unexpected(added.error());
+  }
+  return catalogue;
+}
+
+Result<void> CatalogueWatch::load_folder(const fs::path& folder, const std::function<bool()>& go_on) {
+  const auto paths = files_in(folder);
+  if (!paths) return tl::unexpected(paths.error());
+  for (const fs::path& path : *paths) {
+    if (!go_on()) break;
+    File file;
+    file.seen = stamp_of(path);  // at the start nothing is waited for
+    look_at(path, file);
+    found_[path] = std::move(file);
+  }
+  return {};
+}
+
+// Reads it if it is to be read. Whether it holds something else than before.
+bool CatalogueWatch::look_at(const fs::path& path, File& file) {
+  // Before it is read: what is written meanwhile is then seen as a change.
+  const auto stamp = stamp_of(path);
+  const bool settled = stamp == std::exchange(file.seen, stamp);
+  if (!stamp || stamp == file.stamp || !settled) return false;
+  if (max_memory_ && resident_bytes() > *max_memory_) {
+    if (!std::exchange(short_of_memory_, true)) spdlog::warn("{} is not read: the process has more memory than it may", path.string());
+    return false;
+  }
+  short_of_memory_ = false;
+  file.stamp = stamp;
+  auto volume = read(path);
+  if (!volume) {
+    spdlog::warn("{}: {}", file.volume ? "what was read before stays" : "left out", volume.error().message);
+    return false;
+  }
+  if (file.volume && file.volume->description() == (*volume)->description()) return false;  // which has a hash of the contents
+  file.volume = std::move(*volume);
+  return true;
+}
+
+std::optional<Catalogue> CatalogueWatch::look() {
+  bool changed = false;
+  std::map<fs::path, File> found;
+  for (const fs::path& input : inputs_) {
+    const bool is_file = std::any_of(named_.begin(), named_.end(), [&input](const auto& named) { return named.first == input; });
+    if (is_file) continue;
+    const auto paths = files_in(input);
+    if (!paths) {
+      // Gone for a while, perhaps: what came from there stays.
+      if (!std::exchange(unreadable_[input], true)) spdlog::warn("{}; what was read before stays", paths.error().message);
+      for (const auto& [path, file] : found_) {
+        if (path.parent_path() == input) found[path] = file;
+      }
+      continue;
+    }
+    unreadable_[input] = false;
+    for (const fs::path& path : *paths) {
+      const auto known = found_.find(path);
+      File file = known == found_.end() ? File() : known->second;
+      const bool had = file.volume != nullptr;
+      if (look_at(path, file)) {
+        changed = true;
+        spdlog::info("{} {}", path.string(), had ? "has changed and was read again" : "was read");
+      }
+      found[path] = std::move(file);
+    }
+  }
+  for (const auto& [path, file] : found_) {
+    if (found.contains(path) || !file.volume) continue;
+    changed = true;
+    spdlog::info("{} has gone", path.string());
+  }
+  found_ = std::move(found);
+  if (!changed) return {};
+  return catalogue();
+}
+
+Catalogue CatalogueWatch::catalogue() const {
+  Catalogue catalogue;
+  const auto add = [&catalogue](const fs::path& path, const Catalogue::Volume& volume) {
+    if (!volume) return;
+    if (auto added = catalogue.add(volume); !added) spdlog::warn("left out: {} ({})", added.error().message, path.string());
+  };
+  for (const auto& [path, volume] : named_) add(path, volume);
+  for (const auto& [path, file] : found_) add(path, file.volume);
+  return catalogue;
+}
+
+}  // namespace intervale

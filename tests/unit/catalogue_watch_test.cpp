@@ -1,0 +1,166 @@
+#include "server/serve/catalogue_watch.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/ivm_file.h"
+#include "server/build/field_hierarchy.h"
+#include "support/analytic_fields.h"
+#include "support/temp_dir.h"
+
+namespace intervale {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+void save(const std::filesystem::path& path, double low) {
+  const auto volume = FieldHierarchy(testing::gyroid({9, 7, 6}), {.range = {low, 0.4}}).compact();
+  ASSERT_TRUE(save_ivm(path, volume.value(), [](std::size_t count, const auto& body) {
+    for (std::size_t i = 0; i < count; ++i) body(i);
+  }));
+}
+
+std::vector<std::string> names(const Catalogue& catalogue) {
+  std::vector<std::string> names;
+  for (const auto& [name, volume] : catalogue.volumes()) names.push_back(name);
+  return names;
+}
+
+struct Watched : ::testing::Test {
+  Watched() { spdlog::set_level(spdlog::level::off); }
+  ~Watched() override { spdlog::set_level(spdlog::level::info); }
+  TempDir folder;
+  CatalogueWatch watch{{folder.path()}};
+};
+
+using CatalogueWatchTest = Watched;
+
+TEST_F(CatalogueWatchTest, TakesUpWhatAppearsOnceItStands) {
+  save(folder / "a.ivm", -0.3);
+  EXPECT_THAT(names(watch.load().value()), ElementsAre("a"));
+  EXPECT_FALSE(watch.look());
+  save(folder / "b.ivm", -0.3);
+  folder.file("c.txt", "no data set");
+  EXPECT_FALSE(watch.look()) << "it may be under way";
+  const auto both = watch.look();
+  ASSERT_TRUE(both);
+  EXPECT_THAT(names(*both), ElementsAre("a", "b"));
+  EXPECT_FALSE(watch.look());
+}
+
+TEST_F(CatalogueWatchTest, LeavesAFileAloneThatIsBeingWritten) {
+  save(folder / "whole.tmp", -0.3);
+  const std::string bytes = contents_of(folder / "whole.tmp");
+  EXPECT_THAT(names(watch.load().value()), IsEmpty());
+  for (std::size_t size = 1; size < 20; ++size) {
+    folder.file("a.ivm", bytes.substr(0, size));
+    EXPECT_FALSE(watch.look());
+  }
+  folder.file("a.ivm", bytes);
+  EXPECT_FALSE(watch.look());
+  EXPECT_TRUE(watch.look());
+}
+
+TEST_F(CatalogueWatchTest, WhatChangesIsReplacedAndWhoHasTheOldOneKeepsIt) {
+  save(folder / "a.ivm", -0.3);
+  const auto before = watch.load().value().find("a");
+  save(folder / "a.ivm", -0.2);
+  (void)watch.look();
+  const auto changed = watch.look();
+  ASSERT_TRUE(changed);
+  const auto after = changed->find("a");
+  EXPECT_NE(after->description().content_hash, before->description().content_hash);
+  EXPECT_EQ(before->description().range.alpha, -0.3);
+  // The same again, with another time: nobody needs to know.
+  save(folder / "a.ivm", -0.2);
+  EXPECT_FALSE(watch.look());
+  EXPECT_FALSE(watch.look());
+}
+
+TEST_F(CatalogueWatchTest, WhatGoesGoes) {
+  save(folder / "a.ivm", -0.3);
+  save(folder / "b.ivm", -0.3);
+  const Catalogue before = watch.load().value();
+  std::filesystem::remove(folder / "a.ivm");
+  const auto after = watch.look();
+  ASSERT_TRUE(after);
+  EXPECT_THAT(names(*after), ElementsAre("b"));
+  EXPECT_NE(before.find("a"), nullptr);
+}
+
+TEST_F(CatalogueWatchTest, DamageTouchesNoOneWhoIsServed) {
+  save(folder / "a.ivm", -0.3);
+  const std::string bytes = contents_of(folder / "a.ivm");
+  const auto volume = watch.load().value().find("a");
+  std::string flipped = bytes;
+  flipped[bytes.size() / 2] ^= 1;
+  for (const std::string& damaged : {std::string(), bytes.substr(0, bytes.size() / 2), flipped, bytes + "x", std::string(1000, '\xff')}) {
+    folder.file("a.ivm", damaged);
+    EXPECT_FALSE(watch.look());
+    EXPECT_FALSE(watch.look());
+    EXPECT_EQ(watch.look(), std::nullopt);
+  }
+  folder.file("b.ivm", "damaged");
+  (void)watch.look();
+  EXPECT_FALSE(watch.look()) << "and b is not there";
+  save(folder / "b.ivm", -0.2);
+  (void)watch.look();
+  const auto mended = watch.look();
+  ASSERT_TRUE(mended);
+  EXPECT_THAT(names(*mended), ElementsAre("a", "b"));
+  EXPECT_EQ(mended->find("a"), volume);
+}
+
+TEST_F(CatalogueWatchTest, AFolderThatIsAwayKeepsWhatItHad) {
+  std::filesystem::create_directory(folder / "in");
+  save(folder / "in/a.ivm", -0.3);
+  CatalogueWatch watch_in({folder / "in"});
+  ASSERT_TRUE(watch_in.load());
+  std::filesystem::rename(folder / "in", folder / "out");
+  EXPECT_FALSE(watch_in.look());
+  std::filesystem::rename(folder / "out", folder / "in");
+  EXPECT_FALSE(watch_in.look());
+  std::filesystem::remove(folder / "in/a.ivm");
+  EXPECT_TRUE(watch_in.look());
+}
+
+TEST_F(CatalogueWatchTest, OfTwoOfOneNameTheFirstStands) {
+  std::filesystem::create_directory(folder / "x");
+  std::filesystem::create_directory(folder / "y");
+  save(folder / "y/a.ivm", -0.3);
+  CatalogueWatch both({folder / "x", folder / "y"});
+  const auto first = both.load().value().find("a");
+  save(folder / "x/a.ivm", -0.2);
+  (void)both.look();
+  const auto changed = both.look();
+  ASSERT_TRUE(changed);
+  EXPECT_NE(changed->find("a"), first);
+  EXPECT_THAT(names(*changed), ElementsAre("a"));
+  const auto again = CatalogueWatch({folder / "x", folder / "y"}).load();
+  ASSERT_FALSE(again) << "at the start it is an error";
+  EXPECT_THAT(again.error().message, HasSubstr("two data sets are named 'a'"));
+}
+
+TEST_F(CatalogueWatchTest, WhereMemoryIsShortNothingMoreIsRead) {
+  CatalogueWatch poor({folder.path()}, 1);
+  save(folder / "a.ivm", -0.3);
+  EXPECT_THAT(names(poor.load().value()), IsEmpty());
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(poor.look());
+}
+
+TEST_F(CatalogueWatchTest, LoadingStopsWhenToldTo) {
+  save(folder / "a.ivm", -0.3);
+  save(folder / "b.ivm", -0.3);
+  int asked = 0;
+  EXPECT_THAT(names(watch.load([&] { return ++asked < 3; }).value()), ElementsAre("a"));
+}
+
+}  // namespace
+}  // namespace intervale
