@@ -1,6 +1,7 @@
 #include "server/serve/metrics.h"
 
 #include <prometheus/text_serializer.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <array>
@@ -49,6 +50,15 @@ MetricFamily gauges(const char* name, const char* help, std::vector<prometheus::
   return {name, help, MetricType::Gauge, std::move(metrics)};
 }
 
+prometheus::ClientMetric cpu_seconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) { return double(time.tv_sec) + 1e-6 * double(time.tv_usec); };
+  prometheus::ClientMetric metric;
+  metric.counter.value = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  return metric;
+}
+
 }  // namespace
 
 Metrics::Metrics()
@@ -95,6 +105,7 @@ std::string Metrics::text(const Now& now) const {
         gauges("intervale_certificate_expiry_timestamp_seconds", "When the certificate expires, in Unix time.", {value(time.count())}));
   }
   families.push_back(gauges("intervale_resident_memory_bytes", "Memory that the server takes in all.", {value(double(resident_bytes()))}));
+  families.push_back({"intervale_cpu_seconds_total", "Processor time that the server took.", MetricType::Counter, {cpu_seconds()}});
   return prometheus::TextSerializer().Serialize(families);
 }
 

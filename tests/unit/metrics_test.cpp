@@ -33,6 +33,7 @@ TEST(Metrics, SayWhatWasCounted) {
   }
   EXPECT_THAT(text, HasSubstr("intervale_resident_memory_bytes "));
   EXPECT_THAT(text, Not(HasSubstr("intervale_resident_memory_bytes 0\n")));
+  EXPECT_THAT(text, HasSubstr("# TYPE intervale_cpu_seconds_total counter\nintervale_cpu_seconds_total "));
 }
 
 // A client chooses the code it closes with, and may not make the list of series grow.
