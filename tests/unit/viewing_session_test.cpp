@@ -9,6 +9,7 @@
 #include "protocol/codec.h"
 #include "server/build/field_hierarchy.h"
 #include "server/serve/access.h"
+#include "server/serve/replaceable.h"
 #include "server/serve/session_state.h"
 #include "support/analytic_fields.h"
 #include "support/mesh_laws.h"
@@ -30,7 +31,10 @@ Catalogue catalogue_of(Volume volume) {
 // A server at the other end of a line that carries a message at once, or breaks.
 class Line {
  public:
-  Line(const Catalogue& catalogue, ViewingSession& client) : server_(catalogue, Scope::everything()), client_(client) { client_.opened_line(now_); }
+  Line(const Catalogue& catalogue, ViewingSession& client) : client_(client) {
+    catalogue_.set(std::make_shared<const Catalogue>(catalogue));
+    client_.opened_line(now_);
+  }
   // Until neither has anything to say, or so many messages came from the server.
   void run(int messages = 1 << 20) {
     while (messages > 0) {
@@ -52,7 +56,8 @@ class Line {
   SessionState& server() { return server_; }
 
  private:
-  SessionState server_;
+  Replaceable<Catalogue> catalogue_;
+  SessionState server_{catalogue_, Scope::everything()};
   ViewingSession& client_;
   Clock::time_point now_{};
 };
