@@ -74,6 +74,7 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
                                 {"messages", figures.messages},
                                 {"reconnects", figures.reconnects},
                                 {"seconds_first_mesh", figures.seconds_first_mesh},
+                                {"seconds_applying", figures.seconds_applying},
                                 {"seconds", figures.seconds}};
     if (options.digest) json["digest"] = mesh_digest(mesh);
     return print_json(json);

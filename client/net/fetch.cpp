@@ -159,7 +159,9 @@ Result<void> Fetch::apply(const protocol::Batch& batch) {
   if (batch.sequence != sequence_++ || batch.epoch != kEpoch) return nonsense("a batch that is out of order");
   if (!grants_.spend(protocol::cost_of(batch))) return nonsense("more than it was granted");
   const std::uint64_t before = client_->updates();
+  const auto start = Clock::now();
   if (auto applied = client_->apply(batch.payload, batch.epoch); !applied) return nonsense(applied.error().message);
+  figures_.seconds_applying += std::chrono::duration<double>(Clock::now() - start).count();
   if (client_->updates() - before != batch.updates) return nonsense("a batch of another size than it says");
   note_first_mesh();
   figures_.remaining_error = batch.remaining_error;

@@ -30,6 +30,7 @@ struct FetchFigures {
   double remaining_pixels = 0;  // on the camera's screen; 0 without one
   std::uint64_t updates_to_go = 0;
   double seconds_first_mesh = 0;  // until the mesh first had a tetrahedron; 0 if it never had
+  double seconds_applying = 0;    // spent on decoding batches and applying them
   double seconds = 0;             // from the start to the end of the stream
   std::uint64_t reconnects = 0;   // sessions after the first
   bool complete = false;          // all that was asked for came; false: a budget ended it

@@ -108,10 +108,14 @@ export async function open(browser, url, { width = 800, height = 600, expected =
   page.on('console', (message) => {
     if (message.type() === 'error' && !expected.some((text) => message.text().includes(text))) wrong.push(message.text());
   });
+  let downloaded = 0; // of the page, its worker's files among it, as they came
+  context.on('response', (response) => {
+    if (!response.url().includes('/api/')) downloaded += Number(response.headers()['content-length'] ?? 0);
+  });
   page.on('pageerror', (error) => wrong.push(String(error)));
   await page.goto(url);
   await page.waitForFunction(() => window.intervale !== undefined);
-  return { page, wrong, close: () => context.close() };
+  return { page, wrong, downloaded: () => downloaded, close: () => context.close() };
 }
 
 // Until all that the view wants has come and is drawn.

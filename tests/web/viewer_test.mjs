@@ -59,16 +59,11 @@ describe('The page', () => {
     const policy = answer.headers.get('content-security-policy');
     assert.match(policy, /default-src 'none'/);
     assert.doesNotMatch(policy, /'unsafe-eval'|'unsafe-inline'/);
-    const { page, wrong, close } = await open(browser, server.url);
+    const { page, wrong, downloaded, close } = await open(browser, server.url);
     await settled(page);
     assert.equal(await page.textContent('#progress-text'), 'Done for this view');
-    const size = await page.evaluate(() =>
-      performance
-        .getEntries()
-        .filter((entry) => entry instanceof PerformanceNavigationTiming || (entry instanceof PerformanceResourceTiming && !entry.name.includes('/api/')))
-        .reduce((sum, entry) => sum + entry.encodedBodySize, 0),
-    );
-    assert.ok(size > 50_000 && size <= 400_000, `${size} bytes are downloaded before data`);
+    const size = downloaded();
+    assert.ok(size > 200_000 && size <= 400_000, `${size} bytes are downloaded before data`);
     assert.deepEqual(wrong, []);
     await close();
   });

@@ -14,6 +14,7 @@
 #include "client/view/skin.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
+#include "client/web/core/memory_file.h"
 #include "common/mesh_digest.h"
 #include "common/mesh_writer.h"
 
@@ -183,8 +184,12 @@ class Viewer {
     return tets;
   }
 
-  // Writes the mesh to a file in memory.
-  std::string save(const std::string& path) const { return text_of(write_mesh(path, session_.client()->mesh())); }
+  // The mesh as a file of the format that this path ends in: its bytes, or a text that says why there are none.
+  [[nodiscard]] val save(const std::string& path) const {
+    const auto written = write_mesh(path, session_.client()->mesh());
+    if (!written) return val(written.error().message);
+    return buffer_of(take_committed_file());
+  }
   std::string digest() const { return mesh_digest(session_.client()->mesh()); }
 
  private:

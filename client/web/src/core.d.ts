@@ -21,13 +21,12 @@ declare module '@core/core.js' {
     isStale(): boolean; // the mesh may have changed since the last skin: the next two must not be called
     cap(plane: Plane): Pick<Cap, 'vertices' | 'triangles'>;
     tets(box: Box): Omit<Tets, 'box'>;
-    save(path: string): string; // to a file in memory
+    save(path: string): ArrayBuffer | string; // a file of the format that the path ends in; or why there is none
     digest(): string;
     delete(): void;
   }
   export interface Core {
     Viewer: new (dataset: string) => Viewer;
-    FS: { readFile(path: string): Uint8Array; unlink(path: string): void };
     HEAPU8: Uint8Array;
   }
   const createCore: (options: { locateFile: (path: string) => string }) => Promise<Core>;

@@ -90,11 +90,8 @@ class Session {
 
   save(format: 'vtu' | 'stl' | 'glb'): void {
     if (!this.opened) return report({ type: 'error', text: 'there is no mesh to save yet' });
-    const path = `/mesh.${format}`;
-    const wrong = this.viewer.save(path);
-    if (wrong) return report({ type: 'error', text: `the mesh cannot be saved: ${wrong}` });
-    const bytes = this.core.FS.readFile(path).slice().buffer as ArrayBuffer;
-    this.core.FS.unlink(path);
+    const bytes = this.viewer.save(`mesh.${format}`);
+    if (typeof bytes === 'string') return report({ type: 'error', text: `the mesh cannot be saved: ${bytes}` });
     report({ type: 'saved', format, name: `${this.dataset}.${format}`, bytes }, [bytes]);
   }
 

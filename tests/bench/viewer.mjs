@@ -1,0 +1,53 @@
+// What the viewer does in a browser, in figures, as a table: node viewer.mjs FILE.ivm BUCKYBALL.ivm [RUNS]
+// FILE: large, for everything but the first mesh. The environment is that of tests/web/support.mjs. Best on an idle machine.
+import { copyFileSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { basename, join } from 'node:path';
+
+import { killServers, launch, open, program, progressOf, serve, settled } from '../web/support.mjs';
+
+const [file, small, runs = '5'] = process.argv.slice(2);
+const folder = mkdtempSync(join(tmpdir(), 'intervale-bench-'));
+for (const path of [file, small]) copyFileSync(path, join(folder, basename(path)));
+const name = basename(file, '.ivm');
+const smallName = basename(small, '.ivm');
+const server = await serve(folder);
+const median = (values) => values.sort((a, b) => a - b)[Math.floor(values.length / 2)];
+const everything = '-1e6,-1e6,-1e6,1e6,1e6,1e6';
+
+const figures = { speed: [], native: [], block: [], first: [], size: [], memory: [] };
+for (let run = 0; run < Number(runs); ++run) {
+  const browser = await launch();
+  {
+    const { page, downloaded } = await open(browser, `${server.url}#data=${name}&roi=${everything}`, { width: 640, height: 480 });
+    await settled(page);
+    const progress = await progressOf(page);
+    figures.speed.push(progress.busy.updates / progress.busy.seconds);
+    figures.memory.push(progress.memory / (progress.updates / 1e6));
+    figures.block.push(await page.evaluate(() => window.intervale.stats.longestBlock));
+    figures.size.push(downloaded());
+  }
+  {
+    const { page } = await open(browser, `${server.url}#data=${smallName}`, { width: 640, height: 480 });
+    await settled(page);
+    figures.first.push(await page.evaluate(() => window.intervale.stats.firstMeshMs));
+  }
+  await browser.close();
+  const fetched = JSON.parse(program('intervale-client', 'fetch', `ws://${server.address}/${name}`, '--json'));
+  figures.native.push(fetched.updates / fetched.seconds_applying);
+}
+killServers();
+rmSync(folder, { recursive: true });
+
+const rows = [
+  ['updates decoded and applied in the worker, a second', median(figures.speed).toLocaleString('en', { maximumFractionDigits: 0 })],
+  ['the native client, the same stream', median(figures.native).toLocaleString('en', { maximumFractionDigits: 0 })],
+  ['share of the native speed', median(figures.speed.map((speed, i) => speed / figures.native[i])).toFixed(2)],
+  ['longest time that the page was held up by streaming', `${median(figures.block).toFixed(1)} ms`],
+  ['downloaded before data, gzipped', `${(median(figures.size) / 1000).toFixed(0)} kB`],
+  [`from navigation to the first mesh of ${smallName}`, `${median(figures.first).toFixed(0)} ms`],
+  ['memory of the worker\'s core for a million updates', `${(median(figures.memory) / 1e6).toFixed(0)} MB`],
+];
+console.log(`${name}, headless Chromium, software drawing; medians of ${runs} runs\n\n| figure | |\n|---|---|`);
+for (const [figure, value] of rows) console.log(`| ${figure} | ${value} |`);
+process.exit(0);
