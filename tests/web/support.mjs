@@ -61,32 +61,32 @@ export async function serve(folder, port = 0) {
   };
 }
 
-// A line to that port that carries so many bytes a second from the server, and breaks when the server does.
+// A line to that port that carries so many bytes a second of a stream from the server, anything else as it comes, and breaks when the server does.
 export async function slowLine(port, bytesPerSecond) {
   const relay = net.createServer((near) => {
     const far = net.connect(port, '127.0.0.1');
-    const queue = [];
-    const timer = setInterval(() => {
-      for (let left = bytesPerSecond / 20; left > 0 && queue.length > 0; ) {
-        const piece = queue[0].subarray(0, left);
-        near.write(piece);
-        left -= piece.length;
-        queue[0] = queue[0].subarray(piece.length);
-        if (queue[0].length === 0) queue.shift();
-      }
-      if (queue.length < 4) far.resume();
-    }, 50);
-    far.on('data', (data) => {
-      queue.push(data);
-      if (queue.length >= 4) far.pause();
-    });
-    near.pipe(far);
+    let timer = null;
     const end = () => {
       clearInterval(timer);
       near.destroy();
       far.destroy();
     };
     for (const socket of [near, far]) socket.on('close', end).on('error', end);
+    near.once('data', (request) => {
+      far.write(request);
+      near.pipe(far);
+      if (!request.includes('/v1/stream')) return far.pipe(near);
+      let queue = Buffer.alloc(0);
+      far.on('data', (data) => {
+        queue = Buffer.concat([queue, data]);
+        far.pause();
+      });
+      timer = setInterval(() => {
+        near.write(queue.subarray(0, bytesPerSecond / 20));
+        queue = queue.subarray(bytesPerSecond / 20);
+        if (queue.length === 0) far.resume();
+      }, 50);
+    });
   });
   await new Promise((resolve) => relay.listen(0, '127.0.0.1', resolve));
   relay.unref();
