@@ -47,13 +47,14 @@ class Stream {
   // void(Error). Done at once without TLS.
   template <class Token>
   auto async_handshake(Token&& token) {
-    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { tls_or_nothing(std::move(handler), &Tls::handshake); }, token);
+    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { this->tls_or_nothing(std::move(handler), &Tls::handshake); },
+                                                           token);
   }
 
   // Says good-bye within TLS, and waits for the answer. void(Error). Done at once without TLS.
   template <class Token>
   auto async_shutdown(Token&& token) {
-    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { tls_or_nothing(std::move(handler), &Tls::shutdown); }, token);
+    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { this->tls_or_nothing(std::move(handler), &Tls::shutdown); }, token);
   }
 
   template <class Buffers, class Token>

@@ -30,7 +30,7 @@ namespace http = beast::http;
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr std::chrono::seconds kKeepAliveTime{30};  // between requests
 constexpr std::chrono::seconds kAnswerTime{30};
-constexpr std::chrono::seconds kGoodbyeTime{1};
+constexpr std::chrono::milliseconds kGoodbyeTime{1000};
 constexpr std::uint32_t kMaxHeader = 4096;
 
 using Request = http::request<http::empty_body>;
@@ -78,7 +78,6 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   void start() {
     context_.metrics.connections.Increment();
-    late_ = context_.connections.draining();
     membership_ = context_.connections.join(shared_from_this());
     asio::co_spawn(strand_, run(shared_from_this()), [](const std::exception_ptr& failure) { report(failure); });
   }
@@ -90,7 +89,12 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void go_away() override {
     asio::post(strand_, [self = shared_from_this()] {
       self->leaving_ = true;
-      if (self->waiting_ && !self->late_) self->stream_.socket().cancel();  // an answer under way is finished
+      if (!self->waiting_) return;  // an answer under way is finished
+      if (self->answered_) {
+        self->stream_.socket().cancel();
+      } else {
+        self->expire_after(kGoodbyeTime);  // its request may be on its way
+      }
     });
   }
 
@@ -108,10 +112,10 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   asio::awaitable<void> run([[maybe_unused]] std::shared_ptr<HttpSession> self) {
     if (!co_await begin_tls()) co_return;
     std::chrono::milliseconds patience = context_.options.handshake_time;
-    for (bool first = true; !leaving_ || (first && late_); first = false, patience = kKeepAliveTime) {
+    for (; !leaving_ || !answered_; patience = kKeepAliveTime) {
       http::request_parser<http::empty_body> parser;
       parser.header_limit(kMaxHeader);
-      expire_after(patience);
+      expire_after(leaving_ ? kGoodbyeTime : patience);
       waiting_ = true;
       const auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
       waiting_ = false;
@@ -135,6 +139,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
       const bool keep_alive = request.keep_alive() && !has_body && !leaving_;
       const HttpAnswer answer = answer_to(request);
       Response response = response_to(request, answer, keep_alive);
+      answered_ = true;
       if (!co_await send(response) || !keep_alive) break;
     }
     expire_after(kGoodbyeTime);
@@ -251,7 +256,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   beast::flat_buffer buffer_{2 * kMaxHeader};
   bool waiting_ = false;  // for a request
   bool leaving_ = false;
-  bool late_ = false;  // came while the server drains: gets one answer, that it does
+  bool answered_ = false;  // a request; whoever asks while the server drains is told so, once
   Connections::Membership membership_;
 };
 
