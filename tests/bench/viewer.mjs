@@ -19,7 +19,7 @@ const figures = { speed: [], native: [], block: [], first: [], size: [], memory:
 for (let run = 0; run < Number(runs); ++run) {
   const browser = await launch();
   {
-    const { page, downloaded } = await open(browser, `${server.url}#data=${name}&roi=${everything}`, { width: 640, height: 480 });
+    const { page, downloaded } = await open(browser, `${server.url}#data=${name}&roi=${everything}`, { width: 320, height: 240 });
     await settled(page);
     const progress = await progressOf(page);
     figures.speed.push(progress.busy.updates / progress.busy.seconds);
@@ -28,7 +28,7 @@ for (let run = 0; run < Number(runs); ++run) {
     figures.size.push(downloaded());
   }
   {
-    const { page } = await open(browser, `${server.url}#data=${smallName}`, { width: 640, height: 480 });
+    const { page } = await open(browser, `${server.url}#data=${smallName}`, { width: 320, height: 240 });
     await settled(page);
     figures.first.push(await page.evaluate(() => window.intervale.stats.firstMeshMs));
   }
