@@ -57,7 +57,8 @@ class ViewingSession {
   void opened_line(Clock::time_point now);  // after the first look()
   void lost_line();
 
-  // Takes one message. After a failure, whose text says what the server said or sent, this object must not be used again.
+  // Takes one message. After a failure, whose text says what the server said or sent, this object must not be used again, unless fault_code() is that
+  // the server goes away: then lost_line() and another line follow.
   Result<void> receive(std::span<const std::uint8_t> message, Clock::time_point now);
 
   [[nodiscard]] std::vector<std::vector<std::uint8_t>> take_messages() { return std::exchange(messages_, {}); }

@@ -38,8 +38,8 @@ const servers = new Set();
 export const killServers = () => servers.forEach((server) => server.kill('SIGKILL'));
 
 // A running `intervale serve`. port 0: any that is free.
-export async function serve(folder, port = 0) {
-  const server = spawn(join(bin, 'intervale'), ['serve', folder, '--listen', `127.0.0.1:${port}`], { stdio: ['ignore', 'ignore', 'pipe'] });
+export async function serve(folder, port = 0, ...options) {
+  const server = spawn(join(bin, 'intervale'), ['serve', folder, '--listen', `127.0.0.1:${port}`, ...options], { stdio: ['ignore', 'ignore', 'pipe'] });
   process.on('exit', () => server.kill('SIGKILL'));
   servers.add(server);
   server.on('exit', () => servers.delete(server));

@@ -1,6 +1,7 @@
 // The viewer in a real browser, against a real server.
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 
 import {
@@ -302,6 +303,22 @@ describe('A server that is lost', () => {
     await close();
     await second.kill();
   });
+});
+
+test('A server that wants a token is told one, and it never stands in the address', async () => {
+  const file = join(data, 'tokens');
+  writeFileSync(file, 'open-sesame-0123456789abcdef0123456789abcdef buckyball\n', { mode: 0o600 });
+  const guarded = await serve(data, 0, '--tokens', file);
+  const { page, close } = await open(browser, guarded.url);
+  await page.waitForSelector('#token-form');
+  await page.fill('#token', 'open-sesame-0123456789abcdef0123456789abcdef');
+  await page.click('#token-form button[type=submit]');
+  await settled(page);
+  assert.deepEqual(await page.evaluate(() => window.intervale.live.datasets.map(({ name }) => name)), ['buckyball']);
+  assert.doesNotMatch(await page.evaluate(() => location.href), /sesame/);
+  assert.doesNotMatch(guarded.log(), /sesame/);
+  await close();
+  await guarded.kill();
 });
 
 describe('Sizes', () => {

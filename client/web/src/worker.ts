@@ -193,6 +193,7 @@ class Session {
       report({ type: 'opened', dataset: this.viewer.dataset(), resumed: !fresh });
     }
     this.changed = true;
+    if (this.version === 0 && updates > 0) return this.draw(); // the first one at once: messages that are waiting would come before a turn
     this.tellProgress(this.viewer.done());
     this.plan();
   }

@@ -294,12 +294,3 @@ test('a token is asked for, and not put into the address', async () => {
   await page.context().close();
   guarded.close();
 });
-
-test('a large skin never blocks the page for long', async (t) => {
-  const page = await openPage(browser, stand.address + '#data=large');
-  await page.waitForFunction(() => window.intervale?.stats.skinTriangles > 1e6, null, { timeout: 60_000 });
-  const { longestBlock, skinBytes, skinTriangles } = await stats(page);
-  t.diagnostic(`longest stretch ${longestBlock.toFixed(1)} ms for ${skinTriangles} triangles, ${(skinBytes / 1e6).toFixed(1)} MB`);
-  assert.ok(longestBlock <= 16, `${longestBlock} ms`);
-  await page.context().close();
-});

@@ -1,6 +1,5 @@
 // Stands in for the worker where the page is looked at without a server: a thick gyroid, meshed on ever finer grids by clipping tetrahedra. Speaks
-// src/messages.ts. The data set's name chooses what goes wrong: "lost" loses its connection, "broken" fails, "full" has no room,
-// "large" has a million triangles.
+// src/messages.ts. The data set's name chooses what goes wrong: "lost" loses its connection, "broken" fails, "full" has no room.
 
 const kSide = 48; // samples from end to end
 const kRange = [-0.45, 0.75];
@@ -219,32 +218,6 @@ function skin(reset) {
   if (plane) cap();
   if (box) tets();
 }
-// Many triangles at once: 125 pieces with a wavy sheet each.
-function large() {
-  const n = 70;
-  version++;
-  const pieces = [];
-  for (let id = 0; id < 125; ++id) {
-    const low = [id % 5, Math.floor(id / 5) % 5, Math.floor(id / 25)].map((i) => (i * kSide) / 5);
-    const side = kSide / 5;
-    const vertices = new ArrayBuffer(16 * (n + 1) ** 2);
-    const floats = new Float32Array(vertices);
-    const bytes = new Int8Array(vertices);
-    for (let i = 0; i <= n; ++i) for (let j = 0; j <= n; ++j) {
-      const v = i * (n + 1) + j;
-      floats.set([low[0] + (i / n) * side, low[1] + (j / n) * side, low[2] + side * (0.5 + 0.4 * Math.sin(i / 5) * Math.cos(j / 7))], 4 * v);
-      bytes.set([0, 0, 127, 1], 16 * v + 12);
-    }
-    const indices = new Uint32Array(6 * n * n);
-    for (let i = 0, at = 0; i < n; ++i) for (let j = 0; j < n; ++j) {
-      const v = i * (n + 1) + j;
-      indices.set([v, v + n + 1, v + 1, v + 1, v + n + 1, v + n + 2], at);
-      at += 6;
-    }
-    pieces.push({ id, vertices, indices: indices.buffer, edges: null, triangles: [2 * n * n, 0, 0], edgeCounts: [0, 0, 0], min: low, max: low.map((x) => x + side) });
-  }
-  self.postMessage({ type: 'skin', skin: { version, reset: true, pieces, removed: [] } }, pieces.flatMap((piece) => [piece.vertices, piece.indices]));
-}
 function refine() {
   if (step + 1 >= kGrids.length) return progress(true);
   mesh = new Mesh(kGrids[++step]);
@@ -259,7 +232,6 @@ self.onmessage = ({ data }) => {
     if (name === 'broken') return say({ type: 'error', text: 'broken: the server has no such data set; see the list.' });
     say({ type: 'connection', state: { state: 'open' } });
     say({ type: 'opened', dataset: null, resumed: false });
-    if (name === 'large') return large();
     refine();
     if (name === 'lost') say({ type: 'connection', state: { state: 'waiting', seconds: 8, attempt: 2, reason: 'the server went away' } });
     if (name === 'lost') timer = setTimeout(() => {
@@ -269,7 +241,7 @@ self.onmessage = ({ data }) => {
       name = 'gyroid';
       refine();
     }, 3000);
-  } else if (data.type === 'shown' && name !== 'lost' && name !== 'large') {
+  } else if (data.type === 'shown' && name !== 'lost') {
     timer = setTimeout(refine, 30);
   } else if (data.type === 'clip') {
     plane = data.plane;

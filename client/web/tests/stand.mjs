@@ -12,7 +12,7 @@ const kTypes = { '.html': 'text/html; charset=utf-8', '.js': 'text/javascript', 
 const kPolicy =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws: wss:; worker-src 'self'; font-src 'self'";
 // What the stand-in does goes by the name: see fake_worker.js.
-const kDatasets = ['gyroid', 'lost', 'broken', 'full', 'large'].map((name) => ({
+const kDatasets = ['gyroid', 'lost', 'broken', 'full'].map((name) => ({
   name, dims: [49, 49, 49], spacing: [1, 1, 1], origin: [-24, -24, -24], range: [-0.45, 0.75], refine: 'boundary', max_error: 0.61,
   updates: 48000, coefficients: 90000, full: { vertices: 41000, tets: 197000, indexed_bytes: 3.6e6 },
 }));
