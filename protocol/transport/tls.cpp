@@ -22,13 +22,14 @@ struct TlsContext::Parts {
 
 namespace {
 
-constexpr std::size_t kRecord = 16 << 10;  // TLS' largest
+constexpr std::size_t kRecord = 16 << 10;                                                      // TLS' largest
+constexpr std::array<unsigned char, 9> kProtocols{8, 'h', 't', 't', 'p', '/', '1', '.', '1'};  // as ALPN has them
 
-// HTTP/1.1, if the client says what it speaks at all; a client that speaks something else only may try.
+// What is chosen is pointed to, in kProtocols: HTTP/1.1, if the client says what it speaks at all; a client that speaks something else only may try.
 int choose_protocol(SSL*, const unsigned char** chosen, unsigned char* size, const unsigned char* offered, unsigned int offered_size, void*) {
-  constexpr std::array<unsigned char, 9> kOurs{8, 'h', 't', 't', 'p', '/', '1', '.', '1'};
   unsigned char* found = nullptr;
-  if (SSL_select_next_proto(&found, size, kOurs.data(), kOurs.size(), offered, offered_size) != OPENSSL_NPN_NEGOTIATED) return SSL_TLSEXT_ERR_NOACK;
+  if (SSL_select_next_proto(&found, size, kProtocols.data(), kProtocols.size(), offered, offered_size) != OPENSSL_NPN_NEGOTIATED)
+    return SSL_TLSEXT_ERR_NOACK;
   *chosen = found;
   return SSL_TLSEXT_ERR_OK;
 }
@@ -97,6 +98,7 @@ Result<std::shared_ptr<const TlsContext>> TlsContext::client(const std::optional
   std::unique_ptr<Parts> parts(new Parts{ssl::context(ssl::context::tls_client), false});
   SSL_CTX* const handle = parts->context.native_handle();
   set_up(handle);
+  SSL_CTX_set_alpn_protos(handle, kProtocols.data(), kProtocols.size());
   parts->context.set_verify_mode(ssl::verify_peer);
   boost::system::error_code error;
   if (authorities) {
