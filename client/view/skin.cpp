@@ -42,7 +42,6 @@ void Skin::forget_all() {
   members_.clear();
   drawn_.clear();
   triangles_ = 0;
-  groups_ = 0;
   renamed_ = front_->renamed();
 }
 
@@ -81,10 +80,14 @@ void Skin::mark_parents(std::size_t number, std::uint64_t slots, std::vector<std
 std::vector<std::uint8_t> Skin::find_changes() {
   const std::size_t count = patches_.supercubes(), before = parts_.size();
   std::vector<std::uint8_t> dirty(count);
-  position_.resize(patches_.names());
-  surface_.resize(patches_.names());
-  normal_.resize(patches_.names());
-  there_.resize(patches_.names());
+  const auto grow = [names = patches_.names()](auto& items) {  // by less than doubling, for these are most of a viewer's memory
+    if (items.capacity() < names) items.reserve(names + names / 8);
+    items.resize(names);
+  };
+  grow(position_);
+  grow(surface_);
+  grow(normal_);
+  grow(there_);
   parts_.resize(count);
   for (std::size_t i = before; i < count; ++i) {
     parts_[i].piece = piece_of(i);
@@ -204,18 +207,21 @@ void Skin::assemble(std::uint32_t id, bool edges, Change& change) {
   }
   SkinPiece piece;
   piece.id = id;
+  std::vector<std::uint32_t> names;  // of the vertices
   std::vector<std::uint64_t> pairs;
   for (int kind = 0; kind < kKinds; ++kind) {
     if (by_kind[kind].empty()) continue;
     const int group = std::min(kind, 2);
-    const std::uint64_t here = std::uint64_t(++groups_) << 32;
+    const std::size_t first = names.size();  // of this kind's vertices
     pairs.clear();
     for (const Triangle* t : by_kind[kind]) {
       std::array<std::uint32_t, 3> corner;
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t name = t->points[k];
-        if ((there_[name] & ~std::uint64_t(0xffffffff)) != here) {
-          there_[name] = here | piece.vertices.size();
+        // A sparse set (Briggs and Torczon 1993): what is said of a name counts if it is said back.
+        if (there_[name] < first || there_[name] >= names.size() || names[there_[name]] != name) {
+          there_[name] = std::uint32_t(names.size());
+          names.push_back(name);
           const Position& p = position_[name];
           SkinVertex v{float(p[0]) / FrontPatches::kSteps, float(p[1]) / FrontPatches::kSteps, float(p[2]) / FrontPatches::kSteps};
           std::array<std::int8_t, 3> n{};
@@ -232,7 +238,7 @@ void Skin::assemble(std::uint32_t id, bool edges, Change& change) {
           v.level = t->level;
           piece.vertices.push_back(v);
         }
-        corner[k] = std::uint32_t(there_[name]);
+        corner[k] = there_[name];
         auto& level = piece.vertices[corner[k]].level;
         level = std::min(level, t->level);
       }
@@ -314,8 +320,8 @@ double Skin::volume_bound() const {
 }
 
 std::size_t Skin::memory_bytes() const {
-  std::size_t bytes = position_.capacity() * sizeof(Position) + surface_.capacity() + normal_.capacity() * sizeof(Normal) + there_.capacity() * 8 +
-                      parts_.capacity() * sizeof(Part);
+  std::size_t bytes = position_.capacity() * sizeof(Position) + surface_.capacity() + normal_.capacity() * sizeof(Normal) +
+                      there_.capacity() * sizeof(std::uint32_t) + parts_.capacity() * sizeof(Part);
   for (const Part& part : parts_) bytes += part.triangles.capacity() * sizeof(Triangle);
   return bytes;
 }

@@ -93,9 +93,8 @@ class Skin {
   std::uint64_t renamed_ = 0;
   std::vector<FrontPatches::Position> position_;  // by name
   std::vector<Surface> surface_;
-  std::vector<Normal> normal_;        // sums over triangles of the point's own surface: unit normals times angles times kUnit
-  std::vector<std::uint64_t> there_;  // of a point in the group that is being assembled: the group's number, then the vertex's
-  std::uint32_t groups_ = 0;
+  std::vector<Normal> normal_;                       // sums over triangles of the point's own surface: unit normals times angles times kUnit
+  std::vector<std::uint32_t> there_;                 // number of a point's vertex in what is being assembled, if that says so too
   std::vector<Part> parts_;                          // by number of the supercube
   std::vector<std::vector<std::uint32_t>> members_;  // of a piece, by id
   std::vector<std::uint8_t> drawn_;                  // whether a piece had triangles, by id

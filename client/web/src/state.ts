@@ -5,7 +5,7 @@
 import type { Pose } from './camera';
 import { kFov } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
-import { unit } from './vec';
+import { cross, length, sub, unit } from './vec';
 
 export interface Look {
   color: string; // #rrggbb
@@ -81,10 +81,21 @@ export function toHash(state: ViewState): string {
   return parts.length > 0 ? '#' + parts.join('&') : '';
 }
 
-// n finite numbers, or null.
+const kFar = 1e30; // beyond it, what is drawn in 32 bits is nowhere
+
+// n numbers that are not too large, or null.
 function read(text: string | null, n: number): number[] | null {
   const numbers = text === null ? [] : text.split(',').map((word) => (word.trim() === '' ? NaN : Number(word)));
-  return numbers.length === n && numbers.every(Number.isFinite) ? numbers : null;
+  return numbers.length === n && numbers.every((x) => Math.abs(x) <= kFar) ? numbers : null;
+}
+
+// One that is not along the line of sight: as wished, or else what is nearest to it.
+function upFor(eye: Vec3, lookAt: Vec3, wish: Vec3): Vec3 {
+  const ahead = unit(sub(lookAt, eye));
+  for (const up of [wish, [0, 0, 1], [0, 1, 0]] as Vec3[]) {
+    if (length(cross(ahead, unit(up))) > 1e-3) return unit(up);
+  }
+  return [1, 0, 0];
 }
 
 function readOne(text: string | null, least: number, most: number): number | null {
@@ -101,7 +112,7 @@ export function fromHash(hash: string): ViewState {
   const at = read(get('at'), 3);
   const up = read(get('up'), 3);
   if (eye && at && eye.some((x, i) => x !== at[i])) {
-    state.pose = { eye: eye as Vec3, lookAt: at as Vec3, up: unit((up ?? [0, 0, 1]) as Vec3), fov: readOne(get('fov'), 5, 120) ?? kFov };
+    state.pose = { eye: eye as Vec3, lookAt: at as Vec3, up: upFor(eye as Vec3, at as Vec3, (up ?? [0, 0, 1]) as Vec3), fov: readOne(get('fov'), 5, 120) ?? kFov };
   }
   state.pixelError = readOne(get('px'), 0.1, 64) ?? kFirst.pixelError;
   state.maxTets = readOne(get('tets'), 1, 1e9);
