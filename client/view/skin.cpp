@@ -200,7 +200,11 @@ void Skin::remake(std::size_t number) {
   triangles_ += part.triangles.size();
 }
 
-void Skin::assemble(std::uint32_t id, bool edges, Change& change) {
+bool Skin::is_empty(std::uint32_t piece) const {
+  return std::all_of(members_[piece].begin(), members_[piece].end(), [this](std::uint32_t number) { return parts_[number].triangles.empty(); });
+}
+
+SkinPiece Skin::piece(std::uint32_t id, bool edges) {
   std::array<std::vector<const Triangle*>, kKinds> by_kind;
   for (const std::uint32_t number : members_[id]) {
     for (const Triangle& t : parts_[number].triangles) by_kind[t.kind].push_back(&t);
@@ -258,11 +262,7 @@ void Skin::assemble(std::uint32_t id, bool edges, Change& change) {
     }
     piece.edge_counts[group] += std::uint32_t(pairs.size());
   }
-  if (piece.vertices.empty()) {
-    if (std::exchange(drawn_[id], std::uint8_t(0))) change.removed.push_back(id);
-    return;
-  }
-  drawn_[id] = 1;
+  if (piece.vertices.empty()) return piece;
   piece.min = piece.max = {piece.vertices[0].x, piece.vertices[0].y, piece.vertices[0].z};
   for (const SkinVertex& v : piece.vertices) {
     const std::array<float, 3> p{v.x, v.y, v.z};
@@ -271,10 +271,10 @@ void Skin::assemble(std::uint32_t id, bool edges, Change& change) {
       piece.max[i] = std::max(piece.max[i], p[i]);
     }
   }
-  change.pieces.push_back(std::move(piece));
+  return piece;
 }
 
-Skin::Change Skin::update(bool edges) {
+Skin::Change Skin::update() {
   Change change;
   if (front_->renamed() != renamed_ || parts_.empty()) {
     forget_all();
@@ -288,20 +288,24 @@ Skin::Change Skin::update(bool edges) {
     pieces[parts_[i].piece] = 1;
   }
   for (std::uint32_t id = 0; id < pieces.size(); ++id) {
-    if (pieces[id]) assemble(id, edges, change);
+    if (!pieces[id]) continue;
+    const bool was_there = std::exchange(drawn_[id], std::uint8_t(!is_empty(id))) != 0;
+    if (drawn_[id]) {
+      change.pieces.push_back(id);
+    } else if (was_there) {
+      change.removed.push_back(id);
+    }
   }
   return change;
 }
 
-Skin::Change Skin::all(bool edges) {
-  Change change = update(edges);
-  std::vector<std::uint8_t> made(members_.size());
-  for (const SkinPiece& piece : change.pieces) made[piece.id] = 1;
-  for (std::uint32_t id = 0; id < members_.size(); ++id) {
-    if (!made[id]) assemble(id, edges, change);
-  }
+Skin::Change Skin::all() {
+  (void)update();
+  Change change;
   change.reset = true;
-  change.removed.clear();
+  for (std::uint32_t id = 0; id < members_.size(); ++id) {
+    if (drawn_[id]) change.pieces.push_back(id);
+  }
   return change;
 }
 

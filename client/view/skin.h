@@ -41,13 +41,15 @@ class Skin {
 
   struct Change {
     bool reset = false;                  // of what was before nothing stays
-    std::vector<SkinPiece> pieces;       // in place of those with the same ids
-    std::vector<std::uint32_t> removed;  // ids of pieces in which nothing is left
+    std::vector<std::uint32_t> pieces;   // ids of those that are there, and changed
+    std::vector<std::uint32_t> removed;  // ids of those in which nothing is left
   };
-  // What changed since the last time. edges: whether pieces have their edges. O(what changed), and a little for each supercube.
-  [[nodiscard]] Change update(bool edges);
+  // What changed since the last time. O(what changed), and a little for each supercube.
+  [[nodiscard]] Change update();
   // The same, but of everything.
-  [[nodiscard]] Change all(bool edges);
+  [[nodiscard]] Change all();
+  // As of the last update. edges: whether it has its edges. O(its size).
+  [[nodiscard]] SkinPiece piece(std::uint32_t id, bool edges);
 
   // As of the last update.
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
@@ -85,7 +87,7 @@ class Skin {
   void remake(std::size_t number);
   [[nodiscard]] int kind_of(const std::array<std::uint32_t, 3>& points, bool at_border) const;
   void add_normals(const std::vector<Triangle>& triangles, int sign);
-  void assemble(std::uint32_t id, bool edges, Change& change);
+  [[nodiscard]] bool is_empty(std::uint32_t piece) const;
   [[nodiscard]] double volume_of(const FrontPatches::Tet& tet) const;
 
   FrontPatches patches_;

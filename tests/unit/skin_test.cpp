@@ -71,10 +71,12 @@ std::multiset<Triangle> boundary_of(const Mesh& mesh, const Grid& grid) {
 // What a page has that takes up each change.
 class Page {
  public:
-  void take(const Skin::Change& change) {
+  void take(Skin& skin, const Skin::Change& change, bool edges) {
     if (change.reset) pieces_.clear();
     for (const std::uint32_t id : change.removed) EXPECT_EQ(pieces_.erase(id), 1u);
-    for (const SkinPiece& piece : change.pieces) {
+    for (const std::uint32_t id : change.pieces) {
+      const SkinPiece piece = skin.piece(id, edges);
+      EXPECT_EQ(piece.id, id);
       EXPECT_FALSE(piece.vertices.empty());
       EXPECT_EQ(piece.indices.size(), 3 * std::size_t(piece.triangles[0] + piece.triangles[1] + piece.triangles[2]));
       EXPECT_EQ(piece.edges.size(), 2 * std::size_t(piece.edge_counts[0] + piece.edge_counts[1] + piece.edge_counts[2]));
@@ -127,7 +129,7 @@ TEST_P(SkinOf, WhatChangesAddsUpToTheMeshsBoundary) {
       client->look(camera);
       client->set_budget({.max_tets = full * (1 + random() % 4) / 4}, 0);
     }
-    page.take(skin.update(step % 2 == 0));
+    page.take(skin, skin.update(), step % 2 == 0);
     const Mesh mesh = client->mesh();
     ASSERT_EQ(page.triangles(), boundary_of(mesh, grid)) << "step " << step;
     ASSERT_NEAR(skin.volume(), volume_of(mesh), 1e-9 * (1 + volume_of(mesh)));
@@ -142,12 +144,12 @@ TEST_P(SkinOf, PiecesMadeByAndByAreThoseMadeAtOnce) {
   plan.set_lod({});
   while (const auto batch = plan.next(4096)) {
     ASSERT_TRUE(client->apply(batch->payload));
-    (void)skin.update(false);
+    (void)skin.update();
   }
   Page by_and_by, at_once;
-  by_and_by.take(skin.all(true));
+  by_and_by.take(skin, skin.all(), true);
   Skin again(client->front());
-  at_once.take(again.update(true));
+  at_once.take(again, again.update(), true);
   EXPECT_EQ(skin.triangles(), again.triangles());
   EXPECT_EQ(skin.volume_bound(), 0) << "all is split";
   ASSERT_EQ(by_and_by.pieces().size(), at_once.pieces().size());
@@ -173,7 +175,7 @@ TEST_P(SkinOf, AllTetrahedraLieInTheWholeBox) {
     ASSERT_TRUE(client->apply(batch->payload));
   }
   Skin skin(client->front());
-  (void)skin.update(false);
+  (void)skin.update();
   const Box all{{-1000, -1000, -1000}, {1000, 1000, 1000}};
   const TetsInBox tets = tets_in_box(skin, all, UINT64_MAX);
   EXPECT_EQ(tets.count, client->tet_count());
@@ -202,7 +204,7 @@ TEST_P(SkinOf, CutsAddUpToTheVolume) {
   plan.set_lod({});
   while (const auto batch = plan.next(4096)) ASSERT_TRUE(client->apply(batch->payload));
   Skin skin(client->front());
-  (void)skin.update(false);
+  (void)skin.update();
   for (const Point direction : {Point{1, 0, 0}, Point{0.6, 0, 0.8}, Point{-2.0 / 3, 1.0 / 3, 2.0 / 3}}) {
     double low = kInf, high = -kInf;
     for (int corner = 0; corner < 8; ++corner) {
@@ -248,7 +250,7 @@ TEST(Skin, TheFullVolumeIsWithinTheBound) {
   double last = kInf;
   while (const auto batch = plan.next(2048)) {
     ASSERT_TRUE(client->apply(batch->payload));
-    (void)skin.update(false);
+    (void)skin.update();
     EXPECT_LE(std::abs(skin.volume() - full), skin.volume_bound() + 1e-9 * full);
     last = skin.volume_bound();
   }
@@ -264,14 +266,14 @@ TEST(Skin, WhatForgetsIsMadeAfresh) {
   Page page;
   plan.set_lod({});
   ASSERT_TRUE(client->apply(plan.next(1024)->payload));
-  page.take(skin.update(false));
+  page.take(skin, skin.update(), false);
   client->look({.eye = {50, 60, 70}, .look_at = {0, 8, 20}});
   client->set_budget({.max_updates = client->updates() / 2}, 7);
   ASSERT_FALSE(client->give_up(7, 1000).empty());
   client->arrived(7);
-  const auto change = skin.update(false);
+  const auto change = skin.update();
   EXPECT_TRUE(change.reset);
-  page.take(change);
+  page.take(skin, change, false);
   EXPECT_EQ(page.triangles(), boundary_of(client->mesh(), volume->description().grid));
 }
 

@@ -141,10 +141,11 @@ class Viewer {
   // A Skin of messages.ts without its version: what changed since the last one, or all of it.
   val skin(bool edges, bool all) {
     stale_ = false;
-    const Skin::Change change = all ? skin_->all(edges) : skin_->update(edges);
+    const Skin::Change change = all ? skin_->all() : skin_->update();
     val skin = val::object(), pieces = val::array(), removed = val::array();
     std::size_t n = 0;
-    for (const SkinPiece& p : change.pieces) {
+    for (const std::uint32_t id : change.pieces) {
+      const SkinPiece p = skin_->piece(id, edges);
       val piece = val::object();
       piece.set("id", p.id);
       piece.set("vertices", buffer_of(p.vertices));
