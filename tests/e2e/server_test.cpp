@@ -561,10 +561,10 @@ TEST(Metrics, TellWhatASessionGot) {
 TEST(Metrics, HaveADoorOfTheirOwnIfAsked) {
   ServeOptions options;
   options.metrics_listen = "127.0.0.1:0";
+  EXPECT_THAT(get(start(options)->port(), "/metrics"), StartsWith("HTTP/1.1 404"));
   options.max_connections = 1;
   const auto server = start(options);
   EXPECT_NE(server->metrics_port(), server->port());
-  EXPECT_THAT(get(server->port(), "/metrics"), StartsWith("HTTP/1.1 404"));
   const Waiting full(server->port());
   for (const char* target : {"/metrics", "/healthz", "/readyz"})
     EXPECT_THAT(get(server->metrics_port(), target), StartsWith("HTTP/1.1 200")) << target;
