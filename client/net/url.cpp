@@ -16,6 +16,7 @@ struct Scheme {
 constexpr std::array<Scheme, 2> kSchemes{{{"ws://", false}, {"wss://", true}}};
 
 bool is_host(std::string_view host, bool bracketed) {
+  if (bracketed && host.find(':') == std::string_view::npos) return false;  // only an IPv6 address wants brackets
   return !host.empty() && std::all_of(host.begin(), host.end(), [bracketed](unsigned char c) {
     return std::isalnum(c) != 0 || c == '.' || (bracketed ? c == ':' || c == '%' : c == '-' || c == '_');
   });

@@ -35,8 +35,27 @@ TEST(Url, SaysWhetherTheLineIsToBeSecure) {
 }
 
 TEST(Url, OthersAreWrongUsage) {
-  for (const char* text : {"", "ws://", "ws:///x", "http://a:1", "https://a:1", "wss:/a", "a:1", "ws://a:0", "ws://a:65536", "ws://a:x", "ws://a:",
-                           "ws://[::1", "ws://[::1]x", "ws://[]:1", "ws://a b:1", "ws://::1:80", "ws://a:1/x/y", "ws://a:+1", "ws://a\r\nb:1"}) {
+  for (const char* text : {"",
+                           "ws://",
+                           "ws:///x",
+                           "http://a:1",
+                           "https://a:1",
+                           "wss:/a",
+                           "a:1",
+                           "ws://a:0",
+                           "ws://a:65536",
+                           "ws://a:x",
+                           "ws://a:",
+                           "ws://[::1",
+                           "ws://[::1]x",
+                           "ws://[]:1",
+                           "ws://[a]:1",
+                           "ws://[1.2.3.4%eth0]:1",
+                           "ws://a b:1",
+                           "ws://::1:80",
+                           "ws://a:1/x/y",
+                           "ws://a:+1",
+                           "ws://a\r\nb:1"}) {
     const auto url = parse_url(text);
     ASSERT_FALSE(url) << text;
     EXPECT_TRUE(url.error().usage) << text;
