@@ -109,8 +109,8 @@ bool has_weight(std::string_view parameters) {
     const std::string_view parameter = take(parameters, ';');
     if (!equal_but_for_case(parameter.substr(0, 2), "q=")) continue;
     double weight = 0;
-    const auto [stop, failure] = std::from_chars(parameter.data() + 2, parameter.data() + parameter.size(), weight);
-    return failure == std::errc() && stop == parameter.data() + parameter.size() && weight > 0;
+    const auto [stop, failure] = std::from_chars(parameter.data() + 2, parameter.data() + parameter.size(), weight, std::chars_format::fixed);
+    return failure == std::errc() && stop == parameter.data() + parameter.size() && weight > 0 && weight <= 1;
   }
   return true;
 }

@@ -96,8 +96,8 @@ TEST(StaticFiles, ReadAcceptEncoding) {
   for (const char* yes : {"gzip", "GZIP", "br;q=1, gzip;q=0.1", "x-gzip", "*", "deflate,\tgzip ; q=1.000", "identity;q=0, *;q=0.5"}) {
     EXPECT_TRUE(accepts_gzip(yes)) << yes;
   }
-  for (const char* no :
-       {"", "br", "gzip;q=0", "gzip; Q=0.0, br", "*;q=0", "gzip;q=0, *;q=1", "gzip;q=", "gzip;q=nan", "gzip;q=1x", "gzipped", ",,;"}) {
+  for (const char* no : {"", "br", "gzip;q=0", "gzip; Q=0.0, br", "*;q=0", "gzip;q=0, *;q=1", "gzip;q=", "gzip;q=nan", "gzip;q=inf", "gzip;q=2",
+                         "gzip;q=1e-1", "gzip;q=1x", "gzipped", ",,;"}) {
     EXPECT_FALSE(accepts_gzip(no)) << no;
   }
 }
