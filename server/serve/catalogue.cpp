@@ -1,6 +1,7 @@
 #include "server/serve/catalogue.h"
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
 #include "protocol/limits.h"
@@ -8,9 +9,27 @@
 namespace intervale {
 namespace {
 
-// A name stands in URLs, logs and terminals.
+// Well formed as in Unicode's table 3-7: nothing overlong, no surrogates, nothing past U+10FFFF.
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const auto lead = static_cast<unsigned char>(text.front());
+    const std::size_t more = lead < 0x80 ? 0 : lead < 0xe0 ? 1 : lead < 0xf0 ? 2 : 3;
+    if ((lead >= 0x80 && lead < 0xc2) || lead > 0xf4 || text.size() <= more) return false;
+    for (std::size_t i = 1; i <= more; ++i) {
+      const auto c = static_cast<unsigned char>(text[i]);
+      const bool first = i == 1;
+      const unsigned low = first && lead == 0xe0 ? 0xa0 : first && lead == 0xf0 ? 0x90 : 0x80;
+      const unsigned high = first && lead == 0xed ? 0x9f : first && lead == 0xf4 ? 0x8f : 0xbf;
+      if (c < low || c > high) return false;
+    }
+    text.remove_prefix(1 + more);
+  }
+  return true;
+}
+
+// A name stands in URLs, JSON, metrics, logs and terminals.
 bool fit_for_a_url(const std::string& name) {
-  return !name.empty() && name.size() <= protocol::kMaxName &&
+  return !name.empty() && name.size() <= protocol::kMaxName && is_utf8(name) &&
          std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f || c == '/' || c == '?' || c == '#'; });
 }
 
@@ -18,7 +37,7 @@ bool fit_for_a_url(const std::string& name) {
 
 Result<void> Catalogue::add(Volume volume) {
   const std::string name = volume->description().name;
-  if (!fit_for_a_url(name)) return fail("a data set's name must be 1 to 255 bytes without / ? # and control characters: rename the file");
+  if (!fit_for_a_url(name)) return fail("a data set's name must be 1 to 255 bytes of UTF-8 without / ? # and control characters: rename the file");
   if (!volumes_.emplace(name, std::move(volume)).second) return fail("two data sets are named '" + name + "': rename one of the files");
   return {};
 }

@@ -16,7 +16,7 @@ class Catalogue {
  public:
   using Volume = std::shared_ptr<const IntervalVolume>;
 
-  // Under its description's name. Failure: the name is taken, or unfit for a URL's path.
+  // Under its description's name. Failure: the name is taken, unfit for a URL's path, or no UTF-8.
   Result<void> add(Volume volume);
 
   [[nodiscard]] Volume find(std::string_view name) const;  // nullptr if there is none
