@@ -35,6 +35,8 @@ struct ServeOptions {
   double views_per_second = 200;                                        // of those
   std::chrono::milliseconds handshake_time = protocol::kHandshakeTime;  // for a request, and from a WebSocket's start to its Open: each
   std::chrono::milliseconds stall_time = protocol::kStallTime;          // how long updates wait for credit
+  std::chrono::milliseconds write_time = protocol::kWriteTime;          // how long one message may take to leave
+  std::chrono::milliseconds idle_time = protocol::kIdleTime;            // silence, pings unanswered
   std::chrono::milliseconds drain_time{5000};                           // how long stop() waits for clients to take their leave
 };
 

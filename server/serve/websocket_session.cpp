@@ -130,7 +130,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   void prepare() {
     beast::error_code ignored;
     beast::get_lowest_layer(ws_).socket().set_option(asio::ip::tcp::no_delay(true), ignored);
-    ws_.set_option(websocket::stream_base::timeout{protocol::kHandshakeTime, protocol::kIdleTime, true});
+    ws_.set_option(websocket::stream_base::timeout{protocol::kHandshakeTime, context_.options.idle_time, true});
     ws_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
       response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
       response.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
@@ -280,7 +280,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   asio::awaitable<bool> send(const protocol::ServerMessage& message) {
     const auto bytes = protocol::encode(message);
-    write_deadline_.expires_after(protocol::kWriteTime);
+    write_deadline_.expires_after(context_.options.write_time);
     write_deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
       if (const auto self = weak.lock(); self && !error) self->cut_off();
     });
