@@ -15,6 +15,7 @@
 #include "server/serve/catalogue_watch.h"
 #include "tests/e2e/support/programs.h"
 #include "tests/e2e/support/raw_client.h"
+#include "tests/e2e/support/serving.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {
@@ -30,39 +31,6 @@ using protocol::View;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
-
-std::unique_ptr<Server> start(const ServeOptions& wanted = {}) {
-  spdlog::set_level(spdlog::level::off);
-  ServeOptions options = wanted;
-  options.listen = "127.0.0.1:0";
-  options.threads = 2;
-  auto server = Server::start(options, CatalogueWatch({buckyball()}).load().value());
-  if (!server) throw std::runtime_error(server.error().message);
-  return std::move(*server);
-}
-
-std::string get(std::uint16_t port, const std::string& target) {
-  return talk(port, "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
-}
-
-const Open kOpen{"buckyball", "test", protocol::kDefaultWindow};
-const View kEverything{1, {}};
-
-// A client in the middle of its stream: one batch received, no credit for a second.
-struct Waiting {
-  RawClient client;
-  std::uint64_t updates = 0;
-  explicit Waiting(std::uint16_t port) : client(port) {
-    client.send(Open{"buckyball", "waiting", protocol::kMinCredit});
-    client.send(kEverything);
-    (void)client.expect<Opened>();
-    updates = client.expect<Batch>().updates;
-  }
-  std::uint64_t finish() {
-    client.send(Credit{protocol::kDefaultWindow});
-    return updates += client.stream_to_end();
-  }
-};
 
 struct Attack {
   const char* name;
@@ -559,11 +527,8 @@ TEST(Metrics, TellWhatASessionGot) {
 }
 
 TEST(Metrics, HaveADoorOfTheirOwnIfAsked) {
-  ServeOptions options;
-  options.metrics_listen = "127.0.0.1:0";
-  EXPECT_THAT(get(start(options)->port(), "/metrics"), StartsWith("HTTP/1.1 404"));
-  options.max_connections = 1;
-  const auto server = start(options);
+  EXPECT_THAT(get(start({.metrics_listen = "127.0.0.1:0"})->port(), "/metrics"), StartsWith("HTTP/1.1 404"));
+  const auto server = start({.metrics_listen = "127.0.0.1:0", .max_connections = 1});
   EXPECT_NE(server->metrics_port(), server->port());
   const Waiting full(server->port());
   for (const char* target : {"/metrics", "/healthz", "/readyz"})

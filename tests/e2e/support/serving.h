@@ -1,0 +1,32 @@
+// A server in this process, and a client in the middle of its stream.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "server/serve/server.h"
+#include "tests/e2e/support/programs.h"
+#include "tests/e2e/support/raw_client.h"
+
+namespace intervale {
+
+inline const protocol::Open kOpen{"buckyball", "test", protocol::kDefaultWindow};
+inline const protocol::View kEverything{1, {}};
+
+// On a free port, with two threads, whatever the options say of those; silent from then on. Throws if it cannot.
+std::unique_ptr<Server> start(const ServeOptions& wanted = {}, const std::filesystem::path& input = buckyball());
+
+// The whole answer to a GET, its head included, on a connection of its own.
+[[nodiscard]] std::string get(std::uint16_t port, const std::string& target);
+
+// Of the buckyball's: one batch received, no credit for a second.
+struct Waiting {
+  RawClient client;
+  std::uint64_t updates = 0;
+  explicit Waiting(std::uint16_t port);
+  std::uint64_t finish();  // all updates that came
+};
+
+}  // namespace intervale
