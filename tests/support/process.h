@@ -23,6 +23,7 @@ class Process {
   Process& operator=(const Process&) = delete;
   ~Process();
 
+  [[nodiscard]] int id() const { return pid_; }  // while it runs
   void signal(int number) const;
 
   // Reads what the program says on stderr until `text` is among it; what was said so far, or nothing if the program ended or took longer than 60 s.

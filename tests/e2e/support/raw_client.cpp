@@ -36,6 +36,11 @@ struct RawClient::Socket {
 
 RawClient::RawClient(std::uint16_t port, const Hello& hello) : socket_(std::make_unique<Socket>()) {
   auto& ws = socket_->ws;
+  ws.next_layer().open(tcp::v4());
+  if (hello.narrow) {  // by its segments' size the system judges how much the server may have waiting
+    ws.next_layer().set_option(tcp::socket::receive_buffer_size(4096));
+    ws.next_layer().set_option(asio::detail::socket_option::integer<IPPROTO_TCP, TCP_MAXSEG>(536));
+  }
   ws.next_layer().connect({asio::ip::address_v4::loopback(), port});
   set_headers(ws, hello);
   ws.handshake("127.0.0.1", protocol::kPath);
@@ -65,6 +70,12 @@ void RawClient::send_binary(std::span<const std::uint8_t> bytes, bool last) {
 void RawClient::send_text(const std::string& text) {
   socket_->ws.text(true);
   socket_->ws.write(asio::buffer(text));
+}
+
+void RawClient::reset() {
+  auto& socket = socket_->ws.next_layer();
+  socket.set_option(tcp::socket::linger(true, 0));
+  socket.close();
 }
 
 std::optional<protocol::ServerMessage> RawClient::receive() {

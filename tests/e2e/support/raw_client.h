@@ -16,6 +16,7 @@ class RawClient {
   struct Hello {
     std::string subprotocols = protocol::kSubprotocol;
     std::string authorization = {}, origin = {};  // headers; empty: none
+    bool narrow = false;                          // as little as can be is on its way to it
   };
   // With the handshake done. Throws if it is refused.
   explicit RawClient(std::uint16_t port) : RawClient(port, Hello{}) {}
@@ -25,6 +26,8 @@ class RawClient {
   void send(const protocol::ClientMessage& message);
   void send_binary(std::span<const std::uint8_t> bytes, bool last = true);  // one frame
   void send_text(const std::string& text);
+
+  void reset();  // breaks the connection off without a word, TCP's included; the last call
 
   // The next message, or nothing once the server has closed.
   std::optional<protocol::ServerMessage> receive();
