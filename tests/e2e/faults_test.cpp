@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "protocol/codec.h"
+#include "server/serve/catalogue_watch.h"
 #include "tests/e2e/support/programs.h"
 #include "tests/e2e/support/serving.h"
 #include "tests/support/temp_dir.h"
@@ -317,6 +318,25 @@ TEST(Faults, ADiskThatFillsUpWhileBuildingIsOneLineAndKeepsWhatWasThere) {
   EXPECT_THAT(small.err, testing::AllOf(StartsWith("intervale: cannot write '"), HasSubstr("No space left on device")));
   EXPECT_EQ(std::count(small.err.begin(), small.err.end(), '\n'), 1) << small.err;
   EXPECT_EQ(small.out, "x.ivm\nbefore\n");
+}
+
+// As a clock that was set back makes it.
+TEST(Faults, AFileOlderThanTheOneItReplacesIsTakenUp) {
+  const TempDir folder;
+  const std::string volume = folder / "volume.nrrd", path = folder / "served.ivm";
+  const auto build = [&](const char* low) { return run({program("intervale"), "build", volume, "-o", path, "--range", low, "188"}).status; };
+  ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "17", "-o", volume}).status, 0);
+  ASSERT_EQ(build("128"), 0);
+  CatalogueWatch watch({folder.path()});
+  const auto before = watch.load().value().find("served");
+  const auto time = std::filesystem::last_write_time(path);
+  ASSERT_EQ(build("100"), 0);
+  std::filesystem::last_write_time(path, time - std::chrono::hours(24));
+  EXPECT_FALSE(watch.look()) << "it may be under way";
+  const auto changed = watch.look();
+  ASSERT_TRUE(changed);
+  EXPECT_EQ(changed->find("served")->description().range.alpha, 100);
+  EXPECT_EQ(before->description().range.alpha, 128);
 }
 
 }  // namespace
