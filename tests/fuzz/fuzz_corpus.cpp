@@ -91,6 +91,42 @@ void add_messages(const Corpus& corpus) {
   corpus.add("protocol", "fault", {1}, encode(ServerMessage(Fault{CloseCode::too_large, "too large"})));
 }
 
+// Two bytes of flags: see fuzz_http.cpp.
+void add_requests(const Corpus& corpus) {
+  const std::string plain{0, 0}, everything{0, 12}, some{0, 8};
+  corpus.add("http", "front", plain, "/\nlocalhost:8080\n\n\n");
+  corpus.add("http", "packed", plain, "/assets/index-BVx3_a9Z.js?v=1\n[::1]:8080\nbr;q=1, gzip;q=0.8, *;q=0\n\n");
+  corpus.add("http", "tag", plain, "/%69ndex.html\na\nx-gzip\n\"0\", W/\"1\"");
+  corpus.add("http", "any-tag", plain, "/lone.gz\na; script-src *\n*\n*");
+  corpus.add("http", "escapes", {0, 1}, "/assets/50%25%20more%20%26%20less.txt\n\nidentity;q=0, *;q=0.5\n");
+  corpus.add("http", "outside", plain, "/%2e%2e/secret\n");
+  corpus.add("http", "hidden", plain, "/assets/../.hidden/secret\n");
+  corpus.add("http", "unreadable", plain, "/%4\n");
+  corpus.add("http", "datasets", everything, "/api/datasets\n\n\n\nen\"gine <1>");
+  corpus.add("http", "datasets-some", some, "/api/datasets\n\n\n\nscans-\xc3\xa9");
+  corpus.add("http", "datasets-none", {1, 4}, "/\n\n\n\nnothing");
+  corpus.add("http", "page", {1, 12}, "/\n\n\n\na&b");
+  corpus.add("http", "metrics", everything, "/metrics\n\n\n\nengine");
+  corpus.add("http", "metrics-door", {6, 0}, "/metrics\n");
+  corpus.add("http", "ready", {8, 2}, "/readyz\n");
+  corpus.add("http", "healthy", {16, 0}, "/healthz\n");
+}
+
+// A byte of what it is: see fuzz_access.cpp.
+void add_accesses(const Corpus& corpus) {
+  corpus.add("access", "tokens", {0}, "# who may come in\n\nall-0123456789 *\n some.one~/+=\tengine  scans-* h?ad\r\nthird\n");
+  corpus.add("access", "tokens-twice", {0}, "hush\nhush x\n");
+  corpus.add("access", "tokens-wrong", {0}, "hush\nhush!\n");
+  corpus.add("access", "pattern", {1}, "a*b?c**d\naxxbbxcabycd");
+  corpus.add("access", "header", {2}, "Bearer abc.def\nintervale.v1");
+  corpus.add("access", "subprotocol", {2}, "Basic YWJj\nintervale.v1, intervale.token.YWJjLn5-Lw");
+  corpus.add("access", "origin", {3}, "https://Example.org:8080\nexample.ORG:8080\nnull");
+  corpus.add("access", "origin-listed", {3}, "http://b:1\na\nhttp://b:1");
+  corpus.add("access", "url", {4}, "ws://localhost:8080/bucky ball.2/");
+  corpus.add("access", "url-6", {4}, "wss://[fe80::1%eth0]:9/x");
+  corpus.add("access", "url-bare", {4}, "ws://a-b_c.example");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -105,5 +141,7 @@ int main(int argc, char** argv) {
   add_batches(corpus);
   add_nrrds(corpus);
   add_messages(corpus);
+  add_requests(corpus);
+  add_accesses(corpus);
   return 0;
 }
