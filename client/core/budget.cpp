@@ -56,8 +56,22 @@ class Balance {
   }
 
   void run() {
+    fit();
+    show_what_fits();
+    if (front_.tet_count() <= max_tets_) return;
+    // Making room can take some: a coarse patch may have more tetrahedra than what it takes the place of.
+    wanted_.clear();
+    end_ = groups_.size();
+    fit();
+  }
+
+ private:
+  void fit() {
     while (front_.tet_count() > max_tets_ && hide_least(HUGE_VAL)) {
     }
+  }
+
+  void show_what_fits() {
     for (std::size_t g = 0; g < end_ && front_.shown_count() < front_.split_count(); ++g) {
       const std::uint64_t hidden = groups_[g].slots & ~front_.shown_slots(groups_[g].key);
       for (std::uint64_t left = hidden; left != 0; left &= left - 1) {
@@ -67,7 +81,6 @@ class Balance {
     }
   }
 
- private:
   // Shows a split and its ancestors; what matters less than `worth` and is not one of them makes room. False if there is none.
   bool show(Front::Handle handle, double worth) {
     wanted_.push_back(handle);
