@@ -8,6 +8,7 @@ import {
   colours,
   difference,
   digestOf,
+  drawn,
   kBuckyball,
   kGyroid,
   killServers,
@@ -120,13 +121,15 @@ describe('Pictures', () => {
     }));
   test('show the solid inside where a plane cuts it', () =>
     withPage(`${kCamera}&clip=0,-1,0,0`, size, async (page) => {
-      assert.ok((await page.evaluate(() => window.intervale.stats.capTriangles)) > 100);
+      await page.waitForFunction(() => window.intervale.stats.capTriangles > 100);
+      await drawn(page);
       const { sand } = await colours(page, await matches(page, 'clip'));
       assert.ok(sand > 0.01, `${sand}`);
     }));
   test('show shrunken tetrahedra', () =>
     withPage(`${kCamera}&roi=-0.5,-1,-0.5,0.5,0,0.5&show=tets&shrink=0.7&px=4`, size, async (page) => {
-      assert.ok((await page.evaluate(() => window.intervale.stats.tets)) > 100);
+      await page.waitForFunction(() => window.intervale.stats.tets > 100);
+      await drawn(page);
       await matches(page, 'tets');
     }));
   test('show thickness', () => withPage(`${kCamera}&show=thickness`, size, (page) => matches(page, 'thickness')));
