@@ -243,6 +243,21 @@ describe('Controls', () => {
       assert.equal(await page.textContent('#progress-text'), 'Done: no room for more');
     }));
 
+  test('full screen, light or dark, and the link to copy', () =>
+    withPage(kCamera, {}, async (page) => {
+      await page.click('#fullscreen');
+      await page.waitForFunction(() => document.fullscreenElement !== null);
+      await page.click('#fullscreen');
+      await page.waitForFunction(() => document.fullscreenElement === null);
+      const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+      const before = await ground();
+      await page.click('#theme');
+      assert.notEqual(await ground(), before);
+      await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+      await page.click('#copy-link');
+      await page.waitForFunction(async () => (await navigator.clipboard.readText()) === location.href);
+    }));
+
   test('another data set is opened, and its name is in the address', () =>
     withPage('', {}, async (page) => {
       await page.getByText('gyroid').click();
