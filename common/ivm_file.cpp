@@ -229,6 +229,25 @@ Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> s
   return keys;
 }
 
+// That a file of so many bytes may begin like this: with its header and section table, or with all there is of them.
+Result<void> check_start(std::span<const std::byte> start, std::uint64_t bytes) {
+  Header header;
+  if (start.size() < sizeof kMagic || std::memcmp(start.data(), kMagic, sizeof kMagic) != 0) return fail("not an interval volume file (.ivm)");
+  if (start.size() < kTableBytes) return fail("the file ends within its header");
+  std::memcpy(&header, start.data(), sizeof header);
+  if (header.version != kIvmVersion) {
+    return fail("version " + std::to_string(header.version) + " of the format, this program reads version " + std::to_string(kIvmVersion) +
+                "; build the file again");
+  }
+  if (header.checksum != table_checksum(start.first(kTableBytes))) return fail("the header is damaged (checksum)");
+  if (header.sections != kSections)
+    return fail("the header names " + std::to_string(header.sections) + " sections, not " + std::to_string(kSections));
+  if (header.file_bytes != bytes) {
+    return fail("the file has " + std::to_string(bytes) + " bytes, " + std::to_string(header.file_bytes) + " expected: it was cut short or added to");
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel) {
@@ -255,21 +274,7 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
 }
 
 Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string name) {
-  Header header;
-  if (file.size() < sizeof kMagic || std::memcmp(file.data(), kMagic, sizeof kMagic) != 0) return fail("not an interval volume file (.ivm)");
-  if (file.size() < kTableBytes) return fail("the file ends within its header");
-  std::memcpy(&header, file.data(), sizeof header);
-  if (header.version != kIvmVersion) {
-    return fail("version " + std::to_string(header.version) + " of the format, this program reads version " + std::to_string(kIvmVersion) +
-                "; build the file again");
-  }
-  if (header.checksum != table_checksum(file.first(kTableBytes))) return fail("the header is damaged (checksum)");
-  if (header.sections != kSections)
-    return fail("the header names " + std::to_string(header.sections) + " sections, not " + std::to_string(kSections));
-  if (header.file_bytes != file.size()) {
-    return fail("the file has " + std::to_string(file.size()) + " bytes, " + std::to_string(header.file_bytes) +
-                " expected: it was cut short or added to");
-  }
+  if (auto checked = check_start(file.first(std::min(file.size(), kTableBytes)), file.size()); !checked) return tl::unexpected(checked.error());
   Entry entries[kSections];
   std::uint64_t next = kTableBytes;
   for (int s = 0; s < int(kSections); ++s) {
@@ -376,7 +381,7 @@ Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& v
   return file->commit();
 }
 
-Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path) {
+Result<std::vector<std::byte>> read_ivm(const std::filesystem::path& path) {
   const auto because = [&path](const std::string& why) { return fail(path.string() + ": " + why); };
   std::error_code code;
   if (std::filesystem::is_directory(path, code)) return because("is a folder, not an interval volume file (.ivm)");
@@ -384,12 +389,24 @@ Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::pa
   if (!in) return because(std::strerror(errno));
   const std::streamoff size = in.tellg();
   if (size < 0) return because("not a file that can be read at once");
-  std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+  std::vector<std::byte> bytes(std::min(kTableBytes, static_cast<std::size_t>(size)));
   in.seekg(0);
-  in.read(reinterpret_cast<char*>(bytes.data()), size);
+  in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
+  const auto read = bytes.size();
+  if (in) {
+    if (auto checked = check_start(bytes, std::uint64_t(size)); !checked) return because(checked.error().message);
+    bytes.resize(static_cast<std::size_t>(size));
+    in.read(reinterpret_cast<char*>(bytes.data() + read), std::streamsize(bytes.size() - read));
+  }
   if (!in) return because("could not be read to its end");
-  auto volume = decode_ivm(bytes, path.stem().string());
-  if (!volume) return because(volume.error().message);
+  return bytes;
+}
+
+Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path) {
+  const auto bytes = read_ivm(path);
+  if (!bytes) return tl::unexpected(bytes.error());
+  auto volume = decode_ivm(*bytes, path.stem().string());
+  if (!volume) return fail(path.string() + ": " + volume.error().message);
   return std::make_shared<const IntervalVolume>(std::move(*volume));
 }
 

@@ -24,7 +24,11 @@ inline constexpr std::uint32_t kIvmVersion = 4;
 // Writes aside and renames.
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = in_turn);
 
-// Reads a file; the name is the file's, without folders and extension. Errors begin with the path.
+// The bytes of a file that begins as one of these and is as long as it says, for decode_ivm: nothing is allocated for another. Errors begin with the
+// path.
+[[nodiscard]] Result<std::vector<std::byte>> read_ivm(const std::filesystem::path& path);
+
+// Both at once; the name is the file's, without folders and extension. Errors begin with the path.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path);
 
 }  // namespace intervale

@@ -156,6 +156,16 @@ TEST(IvmFile, WhatIsNoIntervalVolumeIsRefusedInOneLineThatBeginsWithThePath) {
   }
 }
 
+TEST(IvmFile, FilesThatAreVastAndNoneOfTheseTakeNoMemory) {
+  const TempDir folder;
+  const auto bytes = encode_ivm(small_volume());
+  for (const std::string& start : {std::string(), std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())}) {
+    const auto path = folder.file("vast.ivm", start);
+    std::filesystem::resize_file(path, std::uintmax_t(1) << 42);  // nothing but holes
+    EXPECT_FALSE(load_ivm(path)) << "and throws nothing";
+  }
+}
+
 TEST(IvmFile, AFileThatCannotBeWrittenIsAnErrorThatNamesIt) {
   const TempDir folder;
   const auto path = folder / "no folder" / "x.ivm";
