@@ -27,10 +27,11 @@ Result<std::vector<fs::path>> files_in(const fs::path& folder) {
   return files;
 }
 
-// A file that promises more than there is memory for is damaged, most likely, and in any case no reason to end.
-Result<Catalogue::Volume> read(const fs::path& path) {
+// For what there is not enough memory for fails, and does not end the server.
+template <class Function>
+auto guarded(const fs::path& path, const Function& function) -> decltype(function()) {
   try {
-    return load_ivm(path);
+    return function();
   } catch (const std::exception& exception) {
     return fail(path.string() + ": could not be read: " + exception.what());
   }
@@ -46,7 +47,7 @@ Result<Catalogue> CatalogueWatch::load(const std::function<bool()>& go_on) {
       if (auto loaded = load_folder(input, go_on); !loaded) return tl::unexpected(loaded.error());
       continue;
     }
-    auto volume = read(input);
+    auto volume = guarded(input, [&] { return load_ivm(input); });
     if (!volume) return tl::unexpected(volume.error());
     named_.emplace_back(input, std::move(*volume));
   }
@@ -89,14 +90,24 @@ bool CatalogueWatch::look_at(const fs::path& path, File& file) {
     return false;
   }
   short_of_memory_ = false;
-  file.stamp = stamp;
-  auto volume = read(path);
-  if (!volume) {
-    spdlog::warn("{}: {}", file.volume ? "what was read before stays" : "left out", volume.error().message);
+  const auto complain = [&](const Error& error) {
+    if (std::exchange(file.complaint, error.message) == error.message) return;
+    spdlog::warn("{}: {}", file.volume ? "what was read before stays" : "left out", error.message);
+  };
+  const auto bytes = guarded(path, [&] { return read_ivm(path); });
+  if (!bytes) {  // no descriptor left, perhaps, or no right to read it: that may change while the file does not
+    complain(bytes.error());
     return false;
   }
-  if (file.volume && file.volume->description() == (*volume)->description()) return false;  // which has a hash of the contents
-  file.volume = std::move(*volume);
+  file.stamp = stamp;
+  file.complaint.clear();
+  auto volume = guarded(path, [&] { return decode_ivm(*bytes, path.stem().string()); });
+  if (!volume) {
+    complain({path.string() + ": " + volume.error().message});
+    return false;
+  }
+  if (file.volume && file.volume->description() == volume->description()) return false;  // which has a hash of the contents
+  file.volume = std::make_shared<const IntervalVolume>(std::move(*volume));
   return true;
 }
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -27,8 +28,9 @@ class CatalogueWatch {
   Result<Catalogue> load(const std::function<bool()>& go_on = [] { return true; });
 
   // Looks into the folders again: what is served from now on, if that is something else than before. A file that is new, or another than it was, is
-  // read once it is the same in two looks, so that one that is being written is left alone. One that cannot be read is logged, once, and what was
-  // read of it before stays. One that has gone, goes. Of two data sets of one name, that of the first file in order stands.
+  // read once it is the same in two looks, so that one that is being written is left alone. Of one that is damaged, or cannot be read (which is
+  // tried again in every look), what was read before stays; it is logged once. One that has gone, goes. Of two data sets of one
+  // name, that of the first file in order stands.
   std::optional<Catalogue> look();
 
  private:
@@ -36,6 +38,7 @@ class CatalogueWatch {
     std::optional<FileStamp> stamp;  // as it was read; nothing if it was not
     Catalogue::Volume volume;        // nullptr if it could not be read
     std::optional<FileStamp> seen;   // in the last look
+    std::string complaint;           // said of it since it was last read
   };
   Result<void> load_folder(const std::filesystem::path& folder, const std::function<bool()>& go_on);
   bool look_at(const std::filesystem::path& path, File& file);

@@ -37,6 +37,8 @@ class FileChanges {
     stamps_ = std::move(stamps);
     return true;
   }
+  // They could not be read: the next look is the first again.
+  void forget() { stamps_.clear(); }
 
  private:
   std::vector<std::optional<FileStamp>> stamps_;

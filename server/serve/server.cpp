@@ -29,15 +29,20 @@ struct Server::Running {
   std::unique_ptr<Listener> listener, metrics_listener;
   std::vector<std::thread> threads;
   FileChanges tokens_changed, certificate_changed;
+  std::string tokens_complaint, certificate_complaint;  // as last said, not to be said again
   bool stopped = false;
 };
 
-// The stamps are taken before reading: what is written meanwhile is then seen as a change.
+// The stamps are taken before reading: what is written meanwhile is then seen as a change. What failed is tried again, for it need not be the files'
+// fault: a token that was taken out must not stay for want of a descriptor.
 Result<bool> Server::Running::load_tokens() {
   const auto& path = context.options.tokens;
   if (!path || !tokens_changed.look({*path})) return false;
   auto tokens = Tokens::load(*path);
-  if (!tokens) return tl::unexpected(tokens.error());
+  if (!tokens) {
+    tokens_changed.forget();
+    return tl::unexpected(tokens.error());
+  }
   context.tokens.set(std::make_shared<const Tokens>(std::move(*tokens)));
   return true;
 }
@@ -46,7 +51,10 @@ Result<bool> Server::Running::load_certificate() {
   const auto& files = context.options.tls;
   if (!files || !certificate_changed.look({files->certificate, files->key})) return false;
   auto tls = TlsContext::server(files->certificate, files->key);
-  if (!tls) return tl::unexpected(tls.error());
+  if (!tls) {
+    certificate_changed.forget();
+    return tl::unexpected(tls.error());
+  }
   context.tls.set(std::move(*tls));
   return true;
 }
@@ -91,12 +99,14 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catal
 void Server::offer(Catalogue catalogue) { running_->context.catalogue.set(std::make_shared<const Catalogue>(std::move(catalogue))); }
 
 void Server::refresh() {
-  const auto tell = [](const Result<bool>& loaded, const char* what) {
-    if (!loaded) spdlog::error("{}; what was read before holds", loaded.error().message);
+  const auto tell = [](const Result<bool>& loaded, const char* what, std::string& complaint) {
+    const std::string now = loaded ? std::string() : loaded.error().message;
+    if (!now.empty() && now != complaint) spdlog::error("{}; what was read before holds", now);
     if (loaded && *loaded) spdlog::info("read the {} again", what);
+    complaint = now;
   };
-  tell(running_->load_tokens(), "tokens");
-  tell(running_->load_certificate(), "certificate");
+  tell(running_->load_tokens(), "tokens", running_->tokens_complaint);
+  tell(running_->load_certificate(), "certificate", running_->certificate_complaint);
 }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
