@@ -13,7 +13,9 @@
 #include <functional>
 #include <iterator>
 #include <memory>
+#include <set>
 #include <span>
+#include <sstream>
 #include <string>
 #include <variant>
 #include <vector>
@@ -99,9 +101,21 @@ class Idle {
   std::size_t descriptors_ = 0;
 };
 
-std::uint64_t everything(std::uint16_t port) {
+// The gyroid, 97 samples a side: more than lies in the buffers on the way to who does not read.
+const std::filesystem::path& large() {
+  static const TempDir folder;
+  static const std::filesystem::path path = [] {
+    const std::string volume = folder / "volume.nrrd", made = folder / "large.ivm";
+    EXPECT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "97", "-o", volume}).status, 0);
+    EXPECT_EQ(run({program("intervale"), "build", volume, "-o", made, "--range", "-0.3", "0.3"}).status, 0);
+    return std::filesystem::path(made);
+  }();
+  return path;
+}
+
+std::uint64_t everything(std::uint16_t port, const Open& open = kOpen) {
   RawClient client(port);
-  client.send(kOpen);
+  client.send(open);
   client.send(kEverything);
   return client.stream_to_end();
 }
@@ -124,19 +138,28 @@ TEST(Faults, ASlowReaderGetsItAllAndHoldsNobodyUp) {
 }
 
 TEST(Faults, AReaderThatStopsIsCutWhateverItHasGranted) {
-  const TempDir folder;
-  const std::string volume = folder / "volume.nrrd", large = folder / "large.ivm";
-  ASSERT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "97", "-o", volume}).status, 0);
-  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", large, "--range", "-0.3", "0.3"}).status, 0);
   ServeOptions options;
   options.write_time = std::chrono::milliseconds(50);
-  const auto server = start(options, large);
+  const auto server = start(options, large());
   RawClient stopped(server->port(), {.narrow = true});
   stopped.send(Open{"large", "stopped", protocol::kMaxWindow});
   stopped.send(kEverything);
   EXPECT_TRUE(
       eventually([&] { return metric(server->port(), "intervale_sessions_total") == 1 && metric(server->port(), "intervale_sessions") == 0; }));
   EXPECT_EQ(metric(server->port(), "intervale_queued_bytes"), 0);
+  EXPECT_EQ(stopped.end().code, 0u) << "it was cut off";
+}
+
+TEST(Faults, PastWhatMayBeQueuedTheSlowestIsCut) {
+  ServeOptions options;
+  options.max_queued_bytes = protocol::kMinCredit;  // what is sent to the quick one is never more
+  const auto server = start(options, large());
+  const Open quick{"large", "quick", protocol::kMinCredit};
+  const std::uint64_t all = everything(server->port(), quick);
+  RawClient stopped(server->port(), {.narrow = true});
+  stopped.send(Open{"large", "stopped", protocol::kMaxWindow});
+  stopped.send(kEverything);
+  EXPECT_TRUE(eventually([&] { return everything(server->port(), quick) == all && metric(server->port(), "intervale_sessions") == 0; }));
   EXPECT_EQ(stopped.end().code, 0u) << "it was cut off";
 }
 
@@ -299,6 +322,33 @@ TEST(Faults, WithoutDescriptorsWhoIsInGoesOnAndOthersComeInLater) {
   EXPECT_EQ(everything(server.port()), all);
 }
 
+// What the server reads while it runs, it reads once it can: a token that was taken out must not stay.
+TEST(Faults, WithoutDescriptorsFilesAreReadLater) {
+  const TempDir folder;
+  const std::filesystem::path data = folder / "data", tokens = folder.file("tokens", "old\n");
+  std::filesystem::create_directory(data);
+  std::filesystem::copy_file(buckyball(), data / "a.ivm");
+  ServerProgram server(data, {"--tokens", tokens});
+  const auto limit_to = [&server](rlim_t most) {
+    rlimit limit{};
+    ASSERT_EQ(::prlimit(server.process().id(), RLIMIT_NOFILE, nullptr, &limit), 0);
+    limit.rlim_cur = std::min(most, limit.rlim_max);
+    ASSERT_EQ(::prlimit(server.process().id(), RLIMIT_NOFILE, &limit, nullptr), 0);
+  };
+  limit_to(0);
+  folder.file("tokens", "replaced\n");
+  std::filesystem::copy_file(buckyball(), data / "b.ivm");
+  const auto all_of = [&server](const std::vector<std::string>& said) {
+    return std::all_of(said.begin(), said.end(), [&server](const std::string& text) { return server.process().wait_for(text).has_value(); });
+  };
+  EXPECT_TRUE(all_of({"data: Too many open files; what was read before stays", "tokens: Too many open files; what was read before holds"}));
+  limit_to(1024);
+  EXPECT_TRUE(all_of({"read the tokens again", "b.ivm was read"}));
+  EXPECT_EQ(run({program("intervale-client"), "list", server.url(), "--token", "old"}).status, 1);
+  const auto listed = run({program("intervale-client"), "list", server.url(), "--token", "replaced"});
+  EXPECT_THAT(listed.out, testing::AllOf(HasSubstr("a"), HasSubstr("b")));
+}
+
 TEST(Faults, ADiskThatFillsUpWhileBuildingIsOneLineAndKeepsWhatWasThere) {
   const TempDir folder;
   const std::string volume = folder / "volume.nrrd";
@@ -318,6 +368,39 @@ TEST(Faults, ADiskThatFillsUpWhileBuildingIsOneLineAndKeepsWhatWasThere) {
   EXPECT_THAT(small.err, testing::AllOf(StartsWith("intervale: cannot write '"), HasSubstr("No space left on device")));
   EXPECT_EQ(std::count(small.err.begin(), small.err.end(), '\n'), 1) << small.err;
   EXPECT_EQ(small.out, "x.ivm\nbefore\n");
+}
+
+// The running server's own clock, that of the wall, by a day; its log tells.
+TEST(Faults, AClockThatIsSetMattersToNobody) {
+  const char* const faketime = "/usr/lib/" INTERVALE_ARCHITECTURE "/faketime/libfaketimeMT.so.1";
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer's runtime would have to come before faketime's";
+#endif
+  if (::access(faketime, R_OK) != 0) GTEST_SKIP() << "no faketime here";
+  const TempDir folder;
+  const std::string clock = folder / "clock";
+  const auto set_clock = [&](const std::string& offset) { std::filesystem::rename(folder.file("clock.new", offset), clock); };
+  set_clock("+0");
+  const auto data = folder / "data";
+  std::filesystem::create_directory(data);
+  std::filesystem::copy_file(buckyball(), data / "buckyball.ivm");
+  ServerProgram server(data, {"--log-level", "debug"},
+                       {std::string("LD_PRELOAD=") + faketime, "FAKETIME_TIMESTAMP_FILE=" + clock, "FAKETIME_NO_CACHE=1",
+                        "FAKETIME_DONT_FAKE_MONOTONIC=1", "NO_FAKE_STAT=1"});
+  const std::uint64_t all = everything(server.port());
+  Waiting inside(server.port());
+  for (const std::string offset : {"-1d", "+1d", "-1d"}) {
+    set_clock(offset);
+    EXPECT_EQ(everything(server.port()), all) << offset;
+  }
+  EXPECT_EQ(inside.finish(), all);
+  std::filesystem::copy_file(buckyball(), data / "later.ivm");
+  const auto said = server.process().wait_for("later.ivm was read");
+  ASSERT_TRUE(said);
+  std::set<std::string> days;
+  std::istringstream lines(*said);
+  for (std::string line; std::getline(lines, line);) days.insert(line.substr(0, 10));
+  EXPECT_GE(days.size(), 2u) << "the clock was not set: " << *said;
 }
 
 // As a clock that was set back makes it.

@@ -18,7 +18,7 @@ bool is_there(const char* file) { return ::access(file, R_OK) == 0; }
 // Runs a peer of tests/e2e/peers with the server's port, the data set's name, and more. What goes wrong it says on stdout, a line each.
 void expect_to_understand(std::vector<std::string> peer, const std::string& more) {
   ServerProgram server;
-  peer.back() = INTERVALE_PEERS "/" + peer.back();
+  peer.back() = INTERVALE_E2E "/peers/" + peer.back();
   peer.insert(peer.end(), {std::to_string(server.port()), "buckyball", more});
   const Finished finished = run(peer);
   EXPECT_EQ(finished.status, 0);

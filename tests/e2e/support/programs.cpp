@@ -12,8 +12,10 @@ void must(const Finished& finished) {
   if (finished.status != 0) throw std::runtime_error("a data set could not be made: " + finished.err);
 }
 
-std::vector<std::string> command(const std::string& input, const std::vector<std::string>& more) {
-  std::vector<std::string> arguments{program("intervale"), "serve", input, "--listen", "127.0.0.1:0"};
+std::vector<std::string> command(const std::string& input, const std::vector<std::string>& more, const std::vector<std::string>& environment) {
+  std::vector<std::string> arguments{"/usr/bin/env"};
+  arguments.insert(arguments.end(), environment.begin(), environment.end());
+  arguments.insert(arguments.end(), {program("intervale"), "serve", input, "--listen", "127.0.0.1:0"});
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
@@ -37,7 +39,8 @@ const std::filesystem::path& buckyball() {
   return path;
 }
 
-ServerProgram::ServerProgram(const std::string& input, const std::vector<std::string>& more) : process_(command(input, more)) {
+ServerProgram::ServerProgram(const std::string& input, const std::vector<std::string>& more, const std::vector<std::string>& environment)
+    : process_(command(input, more, environment)) {
   const std::string before = "://127.0.0.1:";
   const auto said = process_.wait_for("/\n");
   if (!said || said->find(before) == std::string::npos) throw std::runtime_error("the server did not start: " + said.value_or(process_.wait().err));

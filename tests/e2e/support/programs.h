@@ -16,10 +16,11 @@ namespace intervale {
 // The buckyball, 65 samples a side, [128, 188]; made once a run: "…/buckyball.ivm".
 [[nodiscard]] const std::filesystem::path& buckyball();
 
-// `intervale serve` on a free port, ready.
+// `intervale serve` on a free port, ready; more: options. environment: NAME=VALUE.
 class ServerProgram {
  public:
-  explicit ServerProgram(const std::string& input = buckyball().string(), const std::vector<std::string>& more = {});
+  explicit ServerProgram(const std::string& input = buckyball().string(), const std::vector<std::string>& more = {},
+                         const std::vector<std::string>& environment = {});
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] std::string url(const std::string& name = {}) const;
   [[nodiscard]] Process& process() { return process_; }
