@@ -1,0 +1,97 @@
+// Chromium's own WebSocket, without our client: the conversations of tests/e2e/peers, and the close codes that only pages are told.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { kBuckyball, killServers, launch, makeData, serve } from './support.mjs';
+
+const kConversations = fileURLToPath(new URL('../e2e/peers/conversations.mjs', import.meta.url));
+let browser, data;
+before(async () => {
+  data = makeData(kBuckyball);
+  browser = await launch();
+});
+after(async () => {
+  await browser.close();
+  killServers();
+});
+
+// A page of that server's, with the conversations as a module of its own.
+async function visit(server) {
+  const page = await browser.newPage();
+  await page.route('**/conversations.mjs', (route) => route.fulfill({ path: kConversations, contentType: 'text/javascript' }));
+  await page.goto(server.url);
+  return page;
+}
+
+test('Chromium holds every conversation', async () => {
+  const server = await serve(data);
+  const page = await visit(server);
+  const failures = await page.evaluate(async (dataset) => {
+    const { conversations, hold } = await import('/conversations.mjs');
+    return hold(conversations(WebSocket, `ws://${location.host}/v1/stream`, dataset).all);
+  }, kBuckyball.name);
+  assert.deepEqual(failures, []);
+});
+
+test('Chromium is told of tokens by a close code', async () => {
+  const tokens = join(data, 'tokens');
+  writeFileSync(tokens, 'letmein\nelsewhere other*\n');
+  const server = await serve(data, 0, '--tokens', tokens);
+  const page = await visit(server);
+  const ends = await page.evaluate(async (dataset) => {
+    const { conversations } = await import('/conversations.mjs');
+    const { open, connect } = conversations(WebSocket, `ws://${location.host}/v1/stream`, dataset);
+    const told = [];
+    for (const token of ['', 'wrong', 'elsewhere', 'letmein']) {
+      const peer = await connect(token === '' ? ['intervale.v1'] : ['intervale.v1', `intervale.token.${btoa(token).replace(/=+$/, '')}`]);
+      peer.ws.send(open());
+      const { kind, body } = await peer.receive();
+      told.push(kind === 4 ? [body.number(0, 2), await peer.closed] : kind);
+      peer.ws.close();
+    }
+    return told;
+  }, kBuckyball.name);
+  assert.deepEqual(ends, [[4401, 4401], [4401, 4401], [4403, 4403], 1]);
+});
+
+test('Chromium is told that it took too long', async () => {
+  const server = await serve(data, 0, '--handshake-time', '0.5');
+  const page = await visit(server);
+  const code = await page.evaluate(async () => {
+    const { conversations } = await import('/conversations.mjs');
+    const peer = await conversations(WebSocket, `ws://${location.host}/v1/stream`, '').connect();
+    return peer.closed;
+  });
+  assert.equal(code, 4408);
+});
+
+test('Chromium is told when the server leaves, and of other origins nothing', async () => {
+  const server = await serve(data);
+  const other = await serve(data);
+  const page = await visit(server);
+  const code = page.evaluate(async (dataset) => {
+    const { conversations } = await import('/conversations.mjs');
+    const { open, connect } = conversations(WebSocket, `ws://${location.host}/v1/stream`, dataset);
+    const peer = await connect();
+    peer.ws.send(open());
+    await peer.receive();
+    window.opened = true;
+    return peer.closed;
+  }, kBuckyball.name);
+  await page.waitForFunction(() => window.opened);
+  await server.kill('SIGTERM');
+  assert.equal(await code, 1001);
+  await page.goto('about:blank');
+  const elsewhere = await page.evaluate(
+    (url) =>
+      new Promise((resolve) => {
+        const ws = new WebSocket(url, ['intervale.v1']);
+        ws.onopen = () => resolve('open');
+        ws.onclose = ({ code }) => resolve(code);
+      }),
+    `ws://${other.address}/v1/stream`,
+  );
+  assert.equal(elsewhere, 1006);
+});
