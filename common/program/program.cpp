@@ -101,7 +101,9 @@ Result<void> print(const std::string& text) {
   return fail(std::string("cannot write to the standard output: ") + std::strerror(errno));
 }
 
-Result<void> print_json(const nlohmann::ordered_json& object) { return print(object.dump() + "\n"); }
+Result<void> print_json(const nlohmann::ordered_json& object) {
+  return print(object.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
 
 std::string human_bytes(std::uint64_t bytes) {
   if (bytes < 1000) return fmt::format("{} B", bytes);

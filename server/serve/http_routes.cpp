@@ -94,6 +94,20 @@ HttpAnswer file_answer(const HttpRequest& request, const StaticFile& file) {
   return answer;
 }
 
+// Lets pages of allowed origins read an answer.
+HttpAnswer shared(const HttpRequest& request, HttpAnswer answer) {
+  answer.headers.emplace_back("Vary", "Origin");
+  if (!request.allowed_origin.empty()) answer.headers.emplace_back("Access-Control-Allow-Origin", request.allowed_origin);
+  return answer;
+}
+
+// What a browser asks before it sends a token along.
+HttpAnswer preflight() {
+  return {.status = 204,
+          .headers = {
+              {"Access-Control-Allow-Methods", "GET, HEAD"}, {"Access-Control-Allow-Headers", "Authorization"}, {"Access-Control-Max-Age", "600"}}};
+}
+
 bool is_known(std::string_view path, const HttpState& state) {
   if (path == "/healthz" || path == "/readyz") return true;
   if (path == "/metrics") return state.door == Door::metrics || !state.has_metrics_door;
@@ -129,9 +143,10 @@ HttpAnswer answer(const HttpRequest& request, const HttpState& state) {
   if (!path) return short_answer(400, "not a target this server can read");
   const StaticFile* const file = state.door == Door::all ? state.viewer.find(*path) : nullptr;
   if (!is_known(*path, state) && file == nullptr) return short_answer(404, "nothing here");
+  if (*path == "/api/datasets" && request.method == "OPTIONS" && !request.allowed_origin.empty()) return shared(request, preflight());
   if (request.method != "GET" && request.method != "HEAD") return short_answer(405, "only GET and HEAD");
   if (*path == "/api/datasets") {
-    return request.scope != nullptr ? with_body(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized();
+    return shared(request, request.scope != nullptr ? with_body(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized());
   }
   if (*path == "/metrics" && state.door == Door::all) {
     if (request.scope == nullptr) return unauthorized();

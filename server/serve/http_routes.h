@@ -24,7 +24,8 @@ struct HttpRequest {
   std::string_view host;
   std::string_view accept_encoding;
   std::string_view if_none_match;
-  const Scope* scope = nullptr;  // what whoever asks may see; nullptr: only what everybody may
+  std::string_view allowed_origin;  // of a page from elsewhere that may open sessions here; empty: there is none, or it may not
+  const Scope* scope = nullptr;     // what whoever asks may see; nullptr: only what everybody may
 };
 
 struct HttpAnswer {
@@ -60,9 +61,9 @@ struct HttpState {
 };
 
 // GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists
-// the data sets. A query is ignored. With no scope 401 for what tells of data sets; with one
-// that is not everything 403 for /metrics, which tells of all, unless it has a door of its own. 405 for other methods, 404 for other targets, 400 for
-// those that cannot be read. HEAD is answered like GET; whoever sends it leaves the body out.
+// the data sets. A query is ignored. Pages of allowed origins may read /api/datasets, with a token (CORS, Fetch standard, 3.2). With no scope 401 for
+// what tells of data sets; with one that is not everything 403 for /metrics, which tells of all, unless it has a door of its own. 405 for other
+// methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET; whoever sends it leaves the body out.
 [[nodiscard]] HttpAnswer answer(const HttpRequest& request, const HttpState& state);
 
 }  // namespace intervale

@@ -174,11 +174,14 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     const auto catalogue = context_.catalogue.get();
     const auto tls = context_.tls.get();
     static const Catalogue kNothingYet;
+    const auto& allowed = context_.options.allowed_origins;
+    const std::string_view origin = request[http::field::origin], host = request[http::field::host];
     const HttpRequest asked{.method = request.method_string(),
                             .target = request.target(),
-                            .host = request[http::field::host],
+                            .host = host,
                             .accept_encoding = request[http::field::accept_encoding],
                             .if_none_match = request[http::field::if_none_match],
+                            .allowed_origin = !allowed.empty() && is_allowed_origin(origin, host, allowed) ? origin : std::string_view(),
                             .scope = scope.get()};
     return intervale::answer(asked, {.catalogue = catalogue ? *catalogue : kNothingYet,
                                      .metrics = context_.metrics,

@@ -370,5 +370,14 @@ TEST(Programs, SigtermEndsTheServerInOrderWhileAClientStreams) {
   }
 }
 
+TEST(Programs, ANameThatIsNoTextIsNoTrouble) {
+  const TempDir folder;
+  const std::string path = folder / "\xff\xfe.ivm";
+  std::filesystem::copy_file(buckyball(), path);
+  const auto said = run({program("intervale"), "info", path, "--json"});
+  EXPECT_EQ(said.status, 0) << said.err;
+  EXPECT_TRUE(nlohmann::json::accept(said.out)) << said.out;
+}
+
 }  // namespace
 }  // namespace intervale

@@ -21,7 +21,7 @@ using namespace intervale;
 
 namespace {
 
-constexpr std::array<std::string_view, 4> kMethods{"GET", "HEAD", "POST", "get"};
+constexpr std::array<std::string_view, 5> kMethods{"GET", "HEAD", "POST", "get", "OPTIONS"};
 constexpr std::string_view kOpen = "scans-open";  // a data set that every token opens
 
 // What may be sent, by path; in every file its own words.
@@ -102,9 +102,9 @@ bool is_one_line(std::string_view text) {
 
 // What holds for every answer.
 void check(const HttpRequest& request, const HttpState& state, const HttpAnswer& answer) {
-  constexpr std::array<unsigned, 8> kStatuses{200, 304, 400, 401, 403, 404, 405, 503};
+  constexpr std::array<unsigned, 9> kStatuses{200, 204, 304, 400, 401, 403, 404, 405, 503};
   testing::require(std::find(kStatuses.begin(), kStatuses.end(), answer.status) != kStatuses.end(), "the status is a known one");
-  testing::require((answer.body == nullptr) == (answer.status == 304), "only 304 has no body");
+  testing::require((answer.body == nullptr) == (answer.status == 204 || answer.status == 304), "only 204 and 304 have no body");
   for (const std::string* line : {&answer.content_type, &answer.content_security_policy, &answer.cache_control}) {
     testing::require(is_one_line(*line), "a header is one line");
   }
@@ -138,7 +138,10 @@ void check(const HttpRequest& request, const HttpState& state, const HttpAnswer&
       testing::require(packed == takes_gzip(std::string(request.accept_encoding)), "who takes gzip gets it");
     }
   }
-  if (!reads) testing::require(answer.status >= 400, "other methods get nothing");
+  if (!reads) testing::require(answer.status >= 400 || (request.method == "OPTIONS" && answer.status == 204), "other methods get nothing");
+  const bool is_list = path == "/api/datasets" && answer.status != 404 && answer.status != 405;
+  testing::require(header_of(answer, "Access-Control-Allow-Origin") == (is_list ? request.allowed_origin : ""),
+                   "pages from elsewhere read the list only");
 
   if (answer.status != 200 || path == "/metrics") return;
   std::set<std::string> shown;
@@ -184,6 +187,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                       .host = lines[1],
                       .accept_encoding = lines[2],
                       .if_none_match = lines[3],
+                      .allowed_origin = data[0] & 64 ? "https://elsewhere.example" : "",
                       .scope = scopes[data[1] / 4u % scopes.size()]};
   const HttpAnswer first = answer(request, state);
   check(request, state, first);

@@ -67,9 +67,8 @@ test('Chromium is told that it took too long', async () => {
   assert.equal(code, 4408);
 });
 
-test('Chromium is told when the server leaves, and of other origins nothing', async () => {
+test('Chromium is told that the server leaves', async () => {
   const server = await serve(data);
-  const other = await serve(data);
   const page = await visit(server);
   const code = page.evaluate(async (dataset) => {
     const { conversations } = await import('/conversations.mjs');
@@ -83,15 +82,25 @@ test('Chromium is told when the server leaves, and of other origins nothing', as
   await page.waitForFunction(() => window.opened);
   await server.kill('SIGTERM');
   assert.equal(await code, 1001);
-  await page.goto('about:blank');
-  const elsewhere = await page.evaluate(
-    (url) =>
-      new Promise((resolve) => {
-        const ws = new WebSocket(url, ['intervale.v1']);
+});
+
+test('Chromium lets pages from elsewhere open sessions and read the list only where they are allowed to', async () => {
+  const elsewhere = await serve(data);
+  const tokens = join(data, 'tokens');
+  writeFileSync(tokens, 'letmein\n');
+  const page = await browser.newPage({ bypassCSP: true }); // the viewer's own policy would be in the way
+  await page.goto(elsewhere.url);
+  for (const origin of [`http://${elsewhere.address}`, 'https://another.example']) {
+    const server = await serve(data, 0, '--tokens', tokens, '--allow-origin', origin);
+    const reached = await page.evaluate(async (address) => {
+      const list = (headers) => fetch(`http://${address}/api/datasets`, { headers }).then((answer) => answer.status, () => 'nothing');
+      const socket = new Promise((resolve) => {
+        const ws = new WebSocket(`ws://${address}/v1/stream`, ['intervale.v1', `intervale.token.${btoa('letmein').replaceAll('=', '')}`]);
         ws.onopen = () => resolve('open');
-        ws.onclose = ({ code }) => resolve(code);
-      }),
-    `ws://${other.address}/v1/stream`,
-  );
-  assert.equal(elsewhere, 1006);
+        ws.onerror = () => resolve('nothing');
+      });
+      return [await list({ Authorization: 'Bearer letmein' }), await list({ Authorization: 'Bearer wrong' }), await list({}), await socket];
+    }, server.address);
+    assert.deepEqual(reached, origin.endsWith(elsewhere.address) ? [200, 401, 401, 'open'] : ['nothing', 'nothing', 'nothing', 'nothing']);
+  }
 });
