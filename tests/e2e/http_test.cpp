@@ -1,0 +1,90 @@
+// What is asked without a WebSocket.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "tests/e2e/support/serving.h"
+#include "tests/support/temp_dir.h"
+
+namespace intervale {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+TEST(Http, AnswersByMethodAndTarget) {
+  const auto server = start();
+  const auto ask = [&](const std::string& line) { return talk(server->port(), line + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"); };
+  EXPECT_THAT(ask("GET /"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("text/html"), HasSubstr("buckyball")));
+  EXPECT_THAT(ask("GET /api/datasets?x=1"),
+              testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("application/json"), HasSubstr("\"dims\":[65,65,65]")));
+  EXPECT_THAT(ask("GET /healthz"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(ask("GET /readyz"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(ask("GET /metrics"), testing::AllOf(HasSubstr("version=0.0.4"), HasSubstr("\nintervale_sessions 0\n")));
+  EXPECT_THAT(ask("HEAD /"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("Content-Length"), Not(HasSubstr("<html"))));
+  EXPECT_THAT(ask("POST /"), testing::AllOf(StartsWith("HTTP/1.1 405"), HasSubstr("Allow: GET, HEAD")));
+  EXPECT_THAT(ask("GET /../etc/passwd"), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(ask("GET /v1/stream"), StartsWith("HTTP/1.1 426"));
+}
+
+TEST(Http, ServesTheViewerFromMemory) {
+  std::unique_ptr<Server> server;
+  const auto ask = [&](const std::string& lines) { return talk(server->port(), lines + "\r\nHost: a:1\r\nConnection: close\r\n\r\n"); };
+  {
+    const TempDir folder;
+    folder.file("index.html", "<html>viewer");
+    folder.file("app.js", "let a;");
+    folder.file("app.js.gz", "packed");
+    ServeOptions options;
+    options.viewer = folder.path();
+    server = start(options);
+  }
+  const std::string page = ask("GET / HTTP/1.1");
+  EXPECT_THAT(page, testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("<html>viewer"),
+                                   HasSubstr("Content-Security-Policy: default-src 'none'; script-src"), HasSubstr("ws://a:1 wss://a:1"),
+                                   HasSubstr("Cross-Origin-Opener-Policy: same-origin"), HasSubstr("Referrer-Policy: no-referrer"),
+                                   HasSubstr("X-Content-Type-Options: nosniff")));
+  const std::string packed = ask("GET /app.js HTTP/1.1\r\nAccept-Encoding: gzip");
+  EXPECT_THAT(packed, testing::AllOf(HasSubstr("Content-Encoding: gzip"), HasSubstr("Content-Length: 6"), HasSubstr("\r\n\r\npacked")));
+  EXPECT_THAT(ask("HEAD /app.js HTTP/1.1"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("Content-Length: 6"), Not(HasSubstr("let"))));
+  const std::size_t etag = packed.find("ETag: ");
+  ASSERT_NE(etag, std::string::npos);
+  const std::string tag = packed.substr(etag + 6, packed.find('\r', etag) - etag - 6);
+  EXPECT_THAT(ask("GET /app.js HTTP/1.1\r\nAccept-Encoding: gzip\r\nIf-None-Match: " + tag),
+              testing::AllOf(StartsWith("HTTP/1.1 304"), HasSubstr(tag), Not(HasSubstr("Content-Length")), testing::EndsWith("\r\n\r\n")));
+  EXPECT_THAT(ask("GET /%2e%2e/app.js HTTP/1.1"), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(ask("GET /%00 HTTP/1.1"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(ask("GET /api/datasets HTTP/1.1"), HasSubstr("Content-Security-Policy: default-src 'none'\r\n"));
+}
+
+TEST(Http, AViewerThatIsNotThereIsAnError) {
+  ServeOptions options;
+  options.listen = "127.0.0.1:0";
+  options.viewer = "/nonexistent";
+  const auto server = Server::start(options, {});
+  ASSERT_FALSE(server);
+  EXPECT_THAT(server.error().message, HasSubstr("/nonexistent"));
+}
+
+TEST(Http, KeepsTheConnectionForTheNextRequest) {
+  const auto server = start();
+  const std::string answers =
+      talk(server->port(), "GET /healthz HTTP/1.1\r\nHost: x\r\n\r\nGET /readyz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  EXPECT_NE(answers.find("HTTP/1.1 200"), answers.rfind("HTTP/1.1 200"));
+}
+
+TEST(Http, WhatIsNoRequestIsToldSo) {
+  const auto server = start();
+  EXPECT_THAT(talk(server->port(), std::string(100, '\x01') + "\r\n\r\n"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(talk(server->port(), "GET / HTTP/1.1\r\nX: " + std::string(5000, 'x') + "\r\n\r\n"), StartsWith("HTTP/1.1 431"));
+  const std::string upgrade =
+      "GET /v1/stream HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+  EXPECT_THAT(talk(server->port(), upgrade), StartsWith("HTTP/1.1 400"));  // our subprotocol is not offered
+}
+
+}  // namespace
+}  // namespace intervale

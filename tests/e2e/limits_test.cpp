@@ -1,0 +1,98 @@
+// How much a server takes on, and how long it waits.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdint>
+#include <variant>
+
+#include "tests/e2e/support/raw_client.h"
+#include "tests/e2e/support/serving.h"
+
+namespace intervale {
+namespace {
+
+using protocol::Batch;
+using protocol::CloseCode;
+using protocol::Credit;
+using protocol::Done;
+using protocol::Open;
+using protocol::Opened;
+using protocol::View;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+TEST(Server, ASessionThatDoesNotOpenIsClosed) {
+  ServeOptions options;
+  options.handshake_time = std::chrono::milliseconds(50);
+  const auto server = start(options);
+  RawClient client(server->port());
+  EXPECT_EQ(client.end().code, static_cast<unsigned>(CloseCode::timed_out));
+}
+
+TEST(Server, ASessionThatGrantsNothingIsClosed) {
+  ServeOptions options;
+  options.stall_time = std::chrono::milliseconds(50);
+  const auto server = start(options);
+  RawClient client(server->port());
+  client.send(Open{"buckyball", "", 0});
+  client.send(kEverything);
+  EXPECT_EQ(client.end().code, static_cast<unsigned>(CloseCode::timed_out));
+}
+
+TEST(Server, TurnsConnectionsAwayAtItsLimit) {
+  ServeOptions options;
+  options.max_connections = 2;
+  const auto server = start(options);
+  Waiting first(server->port());
+  Waiting second(server->port());
+  EXPECT_EQ(talk(server->port(), ""), "");
+  EXPECT_GT(first.finish(), 0u);
+  EXPECT_GT(second.finish(), 0u);
+}
+
+TEST(Server, TurnsSessionsAwayAtItsLimits) {
+  ServeOptions options;
+  options.max_sessions = 1;
+  {
+    const auto server = start(options);
+    const Waiting only(server->port());
+    EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
+    EXPECT_THAT(get(server->port(), "/metrics"), HasSubstr("intervale_refused_total{reason=\"sessions\"} 1\n"));
+  }
+  options = {};
+  options.max_memory = 1;
+  {
+    const auto server = start(options);
+    EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
+    EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
+  }
+  options = {};
+  options.max_connections_per_address = 2;
+  const auto server = start(options);
+  Waiting first(server->port());
+  Waiting second(server->port());
+  EXPECT_EQ(talk(server->port(), ""), "");
+  EXPECT_GT(first.finish(), 0u);
+}
+
+TEST(Server, ReadsASessionThatSaysTooMuchMoreSlowly) {
+  ServeOptions options;
+  options.messages_per_second = 50;
+  options.views_per_second = 20;
+  const auto server = start(options);
+  RawClient client(server->port());
+  client.send(kOpen);
+  const auto begun = std::chrono::steady_clock::now();
+  for (std::uint64_t epoch = 1; epoch <= 30; ++epoch) client.send(View{epoch, {}});
+  (void)client.expect<Opened>();
+  for (std::uint64_t epoch = 0; epoch < 30;) {  // 20 at once, and 10 more within half a second
+    const auto message = client.receive().value();
+    if (const auto* batch = std::get_if<Batch>(&message)) epoch = batch->epoch, client.send(Credit{protocol::cost_of(*batch)});
+    if (const auto* done = std::get_if<Done>(&message)) epoch = done->epoch;
+  }
+  EXPECT_GE(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(450));
+}
+
+}  // namespace
+}  // namespace intervale
