@@ -3,8 +3,8 @@
 import { type Camera, FloatType, HalfFloatType, NearestFilter, RedFormat, Vector2, type WebGLRenderer, WebGLRenderTarget } from 'three';
 import { roundAbove } from './format';
 import { overMaterial, thicknessMaterial } from './materials';
+import { canvasTarget, fullScreen } from './passes';
 import { kMostFragment, kThicknessOverFragment } from './shaders';
-import { fullScreen } from './veil';
 
 const kBlocks = 32; // a side, as the shader has it
 
@@ -16,7 +16,6 @@ export class Thickness {
   onMost: () => void = () => {}; // it has changed: to be drawn again
   private precise: boolean;
   private target: WebGLRenderTarget | null = null;
-  private size = new Vector2();
   private overMaterial = overMaterial(kThicknessOverFragment, { sums: { value: null }, most: { value: 1 } });
   private over = fullScreen(this.overMaterial);
   private mostMaterial = overMaterial(kMostFragment, { sums: { value: null }, size: { value: new Vector2() } });
@@ -69,19 +68,15 @@ export class Thickness {
   }
 
   private obtained(renderer: WebGLRenderer): WebGLRenderTarget {
-    renderer.getDrawingBufferSize(this.size);
-    const { x: width, y: height } = this.size;
-    if (this.target && this.target.width === width && this.target.height === height) return this.target;
-    this.target?.dispose();
-    this.target = new WebGLRenderTarget(width, height, {
+    this.target = canvasTarget(renderer, this.target, () => ({
       format: RedFormat,
       type: this.precise ? FloatType : HalfFloatType,
       minFilter: NearestFilter,
       magFilter: NearestFilter,
       depthBuffer: false,
-    });
+    }));
     this.overMaterial.uniforms['sums']!.value = this.mostMaterial.uniforms['sums']!.value = this.target.texture;
-    this.mostMaterial.uniforms['size']!.value.set(width, height);
+    this.mostMaterial.uniforms['size']!.value.set(this.target.width, this.target.height);
     return this.target;
   }
 }

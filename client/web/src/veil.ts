@@ -1,24 +1,14 @@
 // Surfaces that one sees through, in any order: weighted blended transparency (see shaders.ts). Their colours are gathered in targets of their own,
 // with the depth of what is solid, and then laid over the picture.
-import { BufferGeometry, type Camera, HalfFloatType, Mesh, NearestFilter, type RawShaderMaterial, Scene, Vector2, type WebGLRenderer, WebGLRenderTarget } from 'three';
+import { type Camera, HalfFloatType, NearestFilter, type WebGLRenderer, type WebGLRenderTarget } from 'three';
 import { overMaterial } from './materials';
+import { canvasTarget, fullScreen } from './passes';
 import { kVeilOverFragment } from './shaders';
-
-export function fullScreen(material: RawShaderMaterial): Scene {
-  const geometry = new BufferGeometry();
-  geometry.setDrawRange(0, 3);
-  const mesh = new Mesh(geometry, material);
-  mesh.frustumCulled = false;
-  const scene = new Scene();
-  scene.add(mesh);
-  return scene;
-}
 
 const kMostSmoothed = 3e6; // pixels: with more of them, edges are fine as they are, and four samples of each take too much memory
 
 export class Veil {
   private target: WebGLRenderTarget | null = null;
-  private size = new Vector2();
   private material = overMaterial(kVeilOverFragment, { sums: { value: null }, weights: { value: null } });
   private over = fullScreen(this.material);
 
@@ -35,17 +25,13 @@ export class Veil {
   }
 
   private obtained(renderer: WebGLRenderer): WebGLRenderTarget {
-    renderer.getDrawingBufferSize(this.size);
-    const { x: width, y: height } = this.size;
-    if (this.target && this.target.width === width && this.target.height === height) return this.target;
-    this.target?.dispose();
-    this.target = new WebGLRenderTarget(width, height, {
+    this.target = canvasTarget(renderer, this.target, (pixels) => ({
       count: 2,
       type: HalfFloatType,
       minFilter: NearestFilter,
       magFilter: NearestFilter,
-      samples: width * height > kMostSmoothed ? 0 : 4,
-    });
+      samples: pixels > kMostSmoothed ? 0 : 4,
+    }));
     this.material.uniforms['sums']!.value = this.target.textures[0];
     this.material.uniforms['weights']!.value = this.target.textures[1];
     return this.target;
