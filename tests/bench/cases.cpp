@@ -11,6 +11,7 @@
 
 #include "server/volume/read_volume.h"
 #include "server/volume/samples.h"
+#include "support/split.h"
 
 namespace intervale::bench {
 namespace {
@@ -18,18 +19,6 @@ namespace {
 // The paper's range for the buckyball; for the others one that meets a good part of the volume.
 const std::map<std::string_view, Range> kSampleRanges{
     {"buckyball", {128, 188}}, {"gyroid", {-0.5, 0.5}}, {"marschner-lobb", {100, 140}}, {"hydrogen", {20, 120}}};
-
-std::vector<std::string> parts_of(std::string_view text, char separator) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == separator) {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
 
 std::optional<double> number(const std::string& text) {
   try {
@@ -44,7 +33,7 @@ std::optional<double> number(const std::string& text) {
 
 template <class T>
 bool read_three(const std::string& text, std::array<T, 3>& out) {
-  const auto parts = parts_of(text, 'x');
+  const auto parts = testing::split(text, 'x');
   for (std::size_t i = 0; i < 3; ++i) {
     const auto value = parts.size() == 3 ? number(parts[i]) : std::nullopt;
     if (!value) return false;
@@ -57,7 +46,7 @@ bool read_three(const std::string& text, std::array<T, 3>& out) {
 
 Result<Case> read_case(std::string_view text) {
   const auto wrong = [&](const std::string& what) { return misuse("'" + std::string(text) + "': " + what + "; give " + kCaseSyntax); };
-  const auto parts = parts_of(text, ',');
+  const auto parts = testing::split(text, ',');
   const auto low = parts.size() < 3 ? std::nullopt : number(parts[1]), high = parts.size() < 3 ? std::nullopt : number(parts[2]);
   if (!low || !high || *low > *high) return wrong("no range");
   Case c;

@@ -46,7 +46,7 @@ void check_tokens(const std::string& text) {
   for (std::string line; std::getline(in, line);) {
     std::replace_if(
         line.begin(), line.end(), [](char c) { return c == '\t' || c == '\r'; }, ' ');
-    std::vector<std::string> words = testing::split(line, ' ');
+    std::vector<std::string> words = testing::split_trimmed(line, ' ');
     std::erase(words, "");
     if (words.empty() || words.front().front() == '#') continue;
     const std::string token = words.front();

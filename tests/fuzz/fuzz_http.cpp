@@ -74,8 +74,8 @@ std::string escaped_path(std::string_view path) {
 bool takes_gzip(std::string header) {
   std::transform(header.begin(), header.end(), header.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   std::optional<bool> gzip, any;
-  for (const std::string& item : testing::split(header, ',')) {
-    const auto parts = testing::split(item, ';');
+  for (const std::string& item : testing::split_trimmed(header, ',')) {
+    const auto parts = testing::split_trimmed(item, ';');
     const auto q = std::find_if(parts.begin() + 1, parts.end(), [](const std::string& part) { return part.starts_with("q="); });
     bool taken = true;
     if (q != parts.end()) {

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "support/split.h"
+
 namespace intervale::testing {
 
 // Ends the program, as a finding, where a law does not hold.
@@ -31,15 +33,8 @@ inline std::vector<std::string> lines_of(const std::uint8_t* data, std::size_t s
 }
 
 // What stands between separators, without blanks around; at least one.
-inline std::vector<std::string> split(const std::string& text, char separator) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == separator) {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
-    }
-  }
+inline std::vector<std::string> split_trimmed(std::string_view text, char separator) {
+  std::vector<std::string> parts = split(text, separator);
   for (std::string& part : parts) {
     while (!part.empty() && (part.back() == ' ' || part.back() == '\t')) part.pop_back();
     part.erase(0, part.find_first_not_of(" \t"));
