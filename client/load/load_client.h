@@ -1,66 +1,86 @@
-// The clients of a load: each a WebSocket that asks for views by its own timetable and measures what it gets.
-//
-// Latencies are free of coordinated omission. A client connects at a time fixed before the run; its view k is due k periods after its WebSocket was
-// opened, however slow the server is, and its latency counts from that time, not from when it could be sent. A view that is replaced before it was
-// served counts until the first message for a view as new or newer. What is unanswered when the duration is over is waited for kGrace more, and then
-// counts with the time it has waited.
-//
-// A client that has lost its server, if the plan says so, looks for one again and resumes with what it has; its views go on being due meanwhile.
+// One client of a load: a WebSocket that asks for views by its own timetable and measures what it gets. Internal to client/load: brings in Asio.
 #pragma once
 
-#include <atomic>
-#include <chrono>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
-#include <span>
+#include <string>
 
-#include "client/core/stream_client.h"
-#include "client/load/camera_paths.h"
 #include "client/load/figures.h"
-#include "client/net/url.h"
-#include "common/description.h"
+#include "client/load/load_connection.h"
+#include "client/load/load_plan.h"
+#include "client/load/load_stream.h"
+#include "client/load/load_views.h"
+#include "protocol/messages.h"
 
 namespace intervale {
 
-class TlsContext;
+// On one thread. It has one session after the other, as long as its server is lost and found again. Two coroutines a session: the reader takes
+// messages and measures, the writer sends credit and views as they are due, and alone closes.
+class LoadClient {
+ public:
+  // number: among the plan's clients. All that is referred to outlives this; figures and progress are added to.
+  LoadClient(boost::asio::io_context& io, const LoadConnection::Endpoints& endpoints, const LoadPlan& plan, unsigned number, LoadFigures& figures,
+             LoadProgress& progress);
+  LoadClient(const LoadClient&) = delete;
+  LoadClient& operator=(const LoadClient&) = delete;
 
-using LoadClock = std::chrono::steady_clock;
+  // From the wait for its start to the end of its last session. What goes wrong is in the figures.
+  boost::asio::awaitable<void> run();
+  void end_views();  // the duration is over: no new views; closes once all are answered
+  void leave();      // closes
 
-inline constexpr std::chrono::milliseconds kLate{5};  // a view sent later than this is a late one
-inline constexpr std::chrono::seconds kGrace{2};      // after the duration, for answers on their way
+  // After run().
+  std::optional<StreamClient> take_mesh() { return stream_.take_mesh(); }
 
-struct LoadPlan {
-  ServerUrl url;
-  std::shared_ptr<const TlsContext> tls;  // if the URL says so
-  Description description;                // of the data set: every client is to be told the same
-  CameraPath path;                        // with the run's seed, from which the clients' are made
-  unsigned clients = 1;
-  LoadClock::time_point start;  // of the first client
-  LoadClock::duration duration{};
-  LoadClock::duration ramp{};           // the clients' starts are spread over it evenly
-  std::optional<std::uint64_t> rate;    // bytes a second that a client reads, at least 1024; off: as fast as they come
-  std::optional<std::uint64_t> window;  // most credit that a client has outstanding; see Grants
-  LoadClock::duration patience{};       // to be connected, for the WebSocket's handshake and for closing: each
-  bool verify = false;                  // apply what comes
-  Budget budget;                        // each client's, if it applies
-  // How long a client looks for a server again that it has lost; off: it has failed. Wants verify: one that applies nothing has nothing to resume
-  // with.
-  std::optional<LoadClock::duration> reconnect;
-  [[nodiscard]] LoadClock::time_point end() const { return start + duration; }
+ private:
+  using Time = LoadClock::time_point;
+  LoadClient(boost::asio::io_context& io, const LoadConnection::Endpoints& endpoints, const LoadPlan& plan, const CameraPath& path, Time start,
+             LoadFigures& figures, LoadProgress& progress);
+
+  boost::asio::awaitable<void> converse();
+  boost::asio::awaitable<void> write_messages();
+  boost::asio::awaitable<bool> greet();
+  boost::asio::awaitable<bool> send(const protocol::ClientMessage& message);
+  boost::asio::awaitable<void> read_messages();
+  boost::asio::awaitable<void> pass_line(std::size_t bytes);
+  [[nodiscard]] bool advance();
+  [[nodiscard]] protocol::View view() { return stream_.ask(views_.epoch(), views_.lod()); }  // the last one that was due
+  void receive(std::size_t size);
+  void take(protocol::Opened opened);
+  void take(const protocol::Batch& batch);
+  void take(const protocol::Done& done);
+  void take(const protocol::Fault& fault);
+  void close_if_answered();
+  void lost(boost::beast::error_code error);
+  void lose(const std::string& what);
+  void fail(const std::string& what);
+  void cut_off();
+
+  const LoadPlan& plan_;
+  LoadFigures& figures_;
+  LoadProgress& progress_;
+  Time start_;  // when it is to connect
+  LoadConnection connection_;
+  LoadViews views_;
+  LoadStream stream_;
+  boost::beast::flat_buffer buffer_;
+  boost::asio::steady_timer wake_;  // the writer sleeps on it
+  boost::asio::steady_timer line_;  // the reader does, where the rate is limited
+  Time line_free_{};
+  Time asked_;                    // when Open was sent
+  Time now_;                      // when the message that is looked at had come
+  std::uint64_t credit_due_ = 0;  // granted, and still to be sent
+  std::uint64_t bytes_ = 0;       // of messages
+  bool connected_ = false;
+  bool closing_ = false;  // what comes counts no more
+  bool gone_ = false;     // the connection is over
+  bool lost_ = false;     // ... and another is looked for
+  bool failed_ = false;   // ... and none is
 };
-
-// How far a run has come, for who watches it from another thread.
-struct LoadProgress {
-  std::atomic<std::uint64_t> connected = 0;  // now
-  std::atomic<std::uint64_t> updates = 0;
-  std::atomic<std::uint64_t> bytes = 0;
-};
-
-// Runs clients number `first`, `first + step`, … of the plan on this thread, until the last has closed: at most kGrace and the plan's patience after
-// its end. meshes: a place for each of the plan's clients, filled if the plan says verify, left empty where a batch did not apply; other threads may
-// fill other places meanwhile. Throws where the machine fails, the host cannot be found for one.
-[[nodiscard]] LoadFigures run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<StreamClient>> meshes,
-                                      LoadProgress& progress);
 
 }  // namespace intervale

@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-#include "client/load/load_client.h"
+#include "client/load/run_clients.h"
 #include "client/load/verify_meshes.h"
 #include "client/net/connection.h"
 #include "client/net/fetch.h"

@@ -1,0 +1,52 @@
+// How a client of a load comes to its server: connecting, and connecting again. Internal to client/load: brings in Asio.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "client/load/load_plan.h"
+#include "protocol/transport/stream.h"
+
+namespace intervale {
+
+// One WebSocket after the other. On one thread.
+class LoadConnection {
+ public:
+  using Endpoints = boost::asio::ip::tcp::resolver::results_type;
+  using WebSocket = boost::beast::websocket::stream<Stream>;
+
+  // All of them outlive this. seed: of the pauses between attempts.
+  LoadConnection(boost::asio::io_context& io, const Endpoints& endpoints, const LoadPlan& plan, std::uint64_t seed);
+
+  // Opens the first WebSocket, within the plan's patience each for connecting and for the handshake. False: complaint() says why not.
+  boost::asio::awaitable<bool> open();
+  // Another one in its place, once lose() was called: tries until the plan's time for it is over, then false, and complaint() is again what lose()
+  // was told. Wants a plan with such a time.
+  boost::asio::awaitable<bool> open_again();
+
+  void lose(const std::string& why);  // and cut()
+  void cut();                         // what is under way on the WebSocket fails
+  void give_up();                     // cut(), and open_again() ends, if it is under way, with false
+
+  [[nodiscard]] WebSocket& websocket() { return *websocket_; }               // another one after open_again()
+  [[nodiscard]] const std::string& complaint() const { return complaint_; }  // why there is no connection; one line
+
+ private:
+  boost::asio::io_context& io_;
+  const Endpoints& endpoints_;
+  const LoadPlan& plan_;
+  std::uint64_t seed_;
+  std::optional<WebSocket> websocket_;  // never empty
+  boost::asio::steady_timer pause_;     // between attempts
+  std::string complaint_;
+  bool given_up_ = false;
+};
+
+}  // namespace intervale
