@@ -14,115 +14,13 @@
 #include "server/build/error_levels.h"
 #include "server/build/interpolation_error.h"
 #include "server/build/relevance.h"
+#include "server/build/supercube_family.h"
 #include "server/build/surface_moves.h"
 
 namespace intervale {
 namespace {
 
 constexpr int kShared = 5;  // diamonds of this scale and up are few and large: threads share their tetrahedra out
-
-// Where a child is, from the supercube of its parent.
-struct ChildPlace {
-  std::uint8_t supercube = 0;  // class 0 and 1: 0 the same, 1 + axis the next one along that axis. Class 2, a scale finer: see Family
-  std::uint8_t slot = 0;
-};
-
-const std::array<std::array<ChildPlace, kMaxChildren>, 64>& child_places() {
-  static const auto places = [] {
-    std::array<std::array<ChildPlace, kMaxChildren>, 64> all{};
-    for (unsigned type = 0; type < 64; ++type) {
-      const DiamondType& row = diamond_type(type);
-      const std::array<int, 3> at{int(type & 3), int(type >> 2 & 3), int(type >> 4)};
-      for (int k = 0; k < row.children; ++k) {
-        const std::array<int, 3> step{row.child[k].child.x, row.child[k].child.y, row.child[k].child.z};
-        ChildPlace& child = all[type][k];
-        unsigned child_type = 0;
-        for (int axis = 0, power = 1; axis < 3; ++axis, power *= 3) {
-          const int c = row.cls == 2 ? 2 * at[axis] + step[axis] : at[axis] + step[axis];  // in [-1, 7] or [0, 4]
-          child_type |= unsigned(c & 3) << (2 * axis);
-          if (row.cls == 2) child.supercube = std::uint8_t(child.supercube + power * ((c + 4) / 4));
-          if (row.cls != 2 && c == 4) child.supercube = std::uint8_t(1 + axis);
-        }
-        child.slot = kSlotOfType[child_type];
-      }
-    }
-    return all;
-  }();
-  return places;
-}
-
-// The diamonds of one supercube.
-class Block {
- public:
-  Block(const std::vector<Outlines>& outlines, SupercubeKey key) : scale_(scale_of_key(key)), outlines_(outlines[std::size_t(scale_)]) {
-    const Vertex p = position_of_key(key);
-    corner_ = {4 * p.x, 4 * p.y, 4 * p.z};
-    for (int i = 0; i < 4; ++i) place_[i] = {outlines_.place(0, corner_.x + i), outlines_.place(1, corner_.y + i), outlines_.place(2, corner_.z + i)};
-  }
-
-  [[nodiscard]] Diamond diamond(int slot) const {
-    const unsigned type = kTypeOfSlot[slot];
-    return Diamond({(corner_.x + std::int32_t(type & 3)) << scale_, (corner_.y + std::int32_t(type >> 2 & 3)) << scale_,
-                    (corner_.z + std::int32_t(type >> 4)) << scale_});
-  }
-  [[nodiscard]] const Outline& outline(int slot) const {
-    const unsigned type = kTypeOfSlot[slot];
-    return outlines_.of(place_[type & 3][0], place_[type >> 2 & 3][1], place_[type >> 4][2]);
-  }
-
- private:
-  int scale_;
-  const Outlines& outlines_;
-  Vertex corner_;                            // in units of h
-  std::array<std::array<int, 3>, 4> place_;  // of its coordinates: [i][axis]
-};
-
-// The children of one supercube's diamonds, as far as they are in a set.
-class Family {
- public:
-  Family(const SupercubeSet& set, SupercubeKey key) {
-    const int scale = scale_of_key(key);
-    const Vertex p = position_of_key(key);
-    const auto members = [&set](int of_scale, Vertex position) {
-      const auto found = set.find_supercube(of_scale, position);
-      return found ? Members{set.occupancy()[found->supercube], set.first(found->brick, found->supercube)} : Members{};
-    };
-    near_ = {members(scale, p), members(scale, {p.x + 1, p.y, p.z}), members(scale, {p.x, p.y + 1, p.z}), members(scale, {p.x, p.y, p.z + 1})};
-    if (scale == 0 || (near_[0].occupancy & kSlotsOfClass[2]) == 0) return;
-    for (int i = 0; i < 27; ++i) {
-      const Vertex q{2 * p.x + i % 3 - 1, 2 * p.y + i / 3 % 3 - 1, 2 * p.z + i / 9 - 1};
-      if (q.x >= 0 && q.y >= 0 && q.z >= 0) finer_[i] = members(scale - 1, q);
-    }
-  }
-
-  // A bit for each child that is in the set.
-  [[nodiscard]] unsigned children(int slot) const {
-    const unsigned type = kTypeOfSlot[slot];
-    unsigned some = 0;
-    for (int k = 0; k < diamond_type(type).children; ++k) {
-      const ChildPlace c = child_places_[type][k];
-      some |= unsigned(of(slot, c).occupancy >> c.slot & 1) << k;
-    }
-    return some;
-  }
-  // The number of such a one.
-  [[nodiscard]] UpdateIndex child(int slot, int k) const {
-    const ChildPlace c = child_places_[kTypeOfSlot[slot]][k];
-    const Members& m = of(slot, c);
-    return m.first + UpdateIndex(std::popcount(m.occupancy & ((std::uint64_t(1) << c.slot) - 1)));
-  }
-
- private:
-  // The diamonds of one supercube: slots, and the number of the first.
-  struct Members {
-    std::uint64_t occupancy = 0;
-    UpdateIndex first = 0;
-  };
-  [[nodiscard]] const Members& of(int slot, ChildPlace c) const { return kSlotsOfClass[2] >> slot & 1 ? finer_[c.supercube] : near_[c.supercube]; }
-  const std::array<std::array<ChildPlace, kMaxChildren>, 64>& child_places_ = child_places();
-  std::array<Members, 4> near_;      // itself, and the next ones along the axes
-  std::array<Members, 27> finer_{};  // of the next finer scale: from one before its first octant on each axis, x fastest
-};
 
 // The samples around a diamond, by local vertex.
 using Around = std::array<double, kMaxVertices + 1>;
@@ -262,12 +160,12 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
       tbb::parallel_for(tbb::blocked_range<std::uint32_t>(begin, end, 1), [&](const auto& some) {
         for (std::uint32_t brick = some.begin(); brick != some.end(); ++brick) {
           set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
-            const Block block(outlines_, key);
+            const SupercubeDiamonds diamonds(outlines_, key);
             UpdateIndex next = set_.first(brick, s);
             for (std::uint64_t left = set_.occupancy()[s]; left != 0; left &= left - 1) {
               const int slot = std::countr_zero(left);
-              const Diamond d = block.diamond(slot);
-              const Outline& outline = block.outline(slot);
+              const Diamond d = diamonds.diamond(slot);
+              const Outline& outline = diamonds.outline(slot);
               double error = 0;
               if (scale < kShared) {
                 error = error_of(d, outline);
@@ -300,13 +198,13 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
         set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
           const std::uint64_t slots = set_.occupancy()[s] & kSlotsOfClass[cls];
           if (slots == 0) return;
-          const Family family(set_, key);
+          const SupercubeChildren children(set_, key);
           UpdateIndex next = set_.first(brick, s) + UpdateIndex(std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots));
           for (std::uint64_t left = slots; left != 0; left &= left - 1) {
             const int slot = std::countr_zero(left);
             float& error = errors[next++];
-            for (unsigned some = family.children(slot); some != 0; some &= some - 1)
-              error = std::max(error, errors[family.child(slot, std::countr_zero(some))]);
+            for (unsigned some = children.of(slot); some != 0; some &= some - 1)
+              error = std::max(error, errors[children.number_of(slot, std::countr_zero(some))]);
           }
         });
       });
@@ -400,13 +298,13 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()), [&](std::uint32_t b) {
       Part& part = by_brick[b];
       set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
-        const Block block(outlines_, key);
-        const Family family(set_, key);
+        const SupercubeDiamonds diamonds(outlines_, key);
+        const SupercubeChildren children(set_, key);
         UpdateIndex next = set_.first(b, s);
         for (std::uint64_t left = set_.occupancy()[s]; left != 0; left &= left - 1, ++next) {
           const int slot = std::countr_zero(left);
-          const Diamond diamond = block.diamond(slot);
-          const Outline& outline = block.outline(slot);
+          const Diamond diamond = diamonds.diamond(slot);
+          const Outline& outline = diamonds.outline(slot);
           const Around f = around(field, domain_, diamond, outline);
           const Side centre = side_of(f[kCentre], range_);
           const DiamondContext c = context_of(f, outline, range_);
@@ -417,7 +315,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
           part.differences.insert(part.differences.end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
           parts.codes[next] = UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first),
                                          unsigned(level_of(errors_[next])));
-          part.full.tets += leaves(cases, domain_, diamond, outline, c.sides | std::uint32_t(centre) << (2 * kCentre), family.children(slot));
+          part.full.tets += leaves(cases, domain_, diamond, outline, c.sides | std::uint32_t(centre) << (2 * kCentre), children.of(slot));
           if (centre != Side::inside) continue;
           if (domain_.contains(diamond.centre))
             ++part.full.vertices;
