@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -20,6 +21,18 @@ std::unique_ptr<Server> start(const ServeOptions& wanted = {}, const std::filesy
 
 // The whole answer to a GET, its head included, on a connection of its own.
 [[nodiscard]] std::string get(std::uint16_t port, const std::string& target);
+
+// What the server that listens there says of itself; -1: nothing under that name.
+[[nodiscard]] double metric(std::uint16_t port, const std::string& name);
+
+// What comes true once somebody has noticed; they have a minute.
+[[nodiscard]] bool eventually(const std::function<bool()>& holds);
+
+// How many a process has open.
+[[nodiscard]] std::size_t descriptors_of(int process);
+
+// The updates of a session that takes the whole stream.
+std::uint64_t everything(std::uint16_t port, const protocol::Open& open = kOpen);
 
 // Of the buckyball's: one batch received, no credit for a second.
 struct Waiting {
