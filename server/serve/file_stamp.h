@@ -13,7 +13,8 @@
 namespace intervale {
 
 struct FileStamp {
-  std::int64_t seconds = 0, nanoseconds = 0;  // when it was last written
+  std::int64_t seconds = 0, nanoseconds = 0;                  // when it was last written
+  std::int64_t changed_seconds = 0, changed_nanoseconds = 0;  // when anything about it was last changed, who may read it too; cannot be set
   std::uint64_t bytes = 0, device = 0, inode = 0;
   friend bool operator==(const FileStamp&, const FileStamp&) = default;
 };
@@ -22,8 +23,8 @@ struct FileStamp {
 [[nodiscard]] inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) return {};
-  return FileStamp{status.st_mtim.tv_sec, status.st_mtim.tv_nsec, std::uint64_t(status.st_size), std::uint64_t(status.st_dev),
-                   std::uint64_t(status.st_ino)};
+  return FileStamp{status.st_mtim.tv_sec,         status.st_mtim.tv_nsec,       status.st_ctim.tv_sec,       status.st_ctim.tv_nsec,
+                   std::uint64_t(status.st_size), std::uint64_t(status.st_dev), std::uint64_t(status.st_ino)};
 }
 
 // Files that are read together.

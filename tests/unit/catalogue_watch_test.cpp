@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -116,6 +117,27 @@ TEST_F(CatalogueWatchTest, DamageTouchesNoOneWhoIsServed) {
   ASSERT_TRUE(mended);
   EXPECT_THAT(names(*mended), ElementsAre("a", "b"));
   EXPECT_EQ(mended->find("a"), volume);
+}
+
+// As one is that may be read only later, or that a copy puts in its place which keeps its time.
+TEST_F(CatalogueWatchTest, AFileThatHasChangedIsReadWhateverItsTimeOfWriting) {
+  save(folder / "a.ivm", -0.3);
+  const std::string good = contents_of(folder / "a.ivm");
+  const auto time = std::filesystem::last_write_time(folder / "a.ivm");
+  const auto write_in_place = [&](const std::string& bytes) {
+    const auto before = stamp_of(folder / "a.ivm");
+    do {  // until the clock of the file system has gone on
+      std::ofstream(folder / "a.ivm", std::ios::binary | std::ios::in) << bytes;
+      std::filesystem::last_write_time(folder / "a.ivm", time);
+    } while (stamp_of(folder / "a.ivm") == before);
+  };
+  write_in_place(std::string(good.size(), 'x'));
+  EXPECT_THAT(names(watch.load().value()), IsEmpty());
+  write_in_place(good);
+  EXPECT_FALSE(watch.look());
+  const auto mended = watch.look();
+  ASSERT_TRUE(mended);
+  EXPECT_THAT(names(*mended), ElementsAre("a"));
 }
 
 TEST_F(CatalogueWatchTest, AFolderThatIsAwayKeepsWhatItHad) {
