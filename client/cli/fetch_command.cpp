@@ -14,6 +14,7 @@
 #include "common/mesh_writer.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
+#include "common/printable.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
 
@@ -79,7 +80,7 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
     if (options.digest) json["digest"] = mesh_digest(mesh);
     return print_json(json);
   }
-  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}\n", fetched.client.description().name,
+  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}\n", printable(fetched.client.description().name),
                                  fetched.client.updates_in_mesh(), mesh.points.size(), mesh.tets.size(), volume);
   text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(figures.bytes_received),
                       figures.messages, 1000 * figures.seconds_first_mesh, figures.complete ? "all" : "budget reached", 1000 * figures.seconds);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/net/line.h"
+#include "common/printable.h"
 #include "protocol/codec.h"
 
 namespace intervale {
@@ -70,10 +71,7 @@ tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) {
 }
 
 tl::unexpected<Error> StreamConnection::Socket::faulted(const protocol::Fault& fault) const {
-  std::string text = fault.text;
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';  // it goes to a terminal
-  }
+  const std::string text = printable(fault.text);
   if (fault.code == CloseCode::no_such_dataset) {
     return fail("no data set '" + url.name + "' at " + url.server() + "; see intervale-client list " + url.server());
   }

@@ -14,6 +14,8 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "common/printable.h"
+
 namespace intervale {
 namespace {
 
@@ -86,7 +88,7 @@ int Program::run(int argc, const char* const* argv) {
 }
 
 int Program::complain(const std::string& message, ExitStatus status) const {
-  const std::string line = name_ + ": " + one_line(message) + "\n";
+  const std::string line = name_ + ": " + printable(one_line(message)) + "\n";
   std::fwrite(line.data(), 1, line.size(), stderr);
   return status;
 }

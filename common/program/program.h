@@ -54,7 +54,8 @@ CLI::Option* add_json_flag(CLI::App& app, bool& json);
 // --digest: what mesh_digest says of the mesh is among the figures.
 CLI::Option* add_digest_flag(CLI::App& app, bool& digest);
 
-// Prints to stdout and sees that it arrived (a full disk or a closed pipe is a failure): text as it stands; an object on one line.
+// Prints to stdout and sees that it arrived (a full disk or a closed pipe is a failure): text as it stands; an object on one line, and what is no
+// UTF-8 in it as U+FFFD.
 Result<void> print(const std::string& text);
 Result<void> print_json(const nlohmann::ordered_json& object);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include "common/printable.h"
 #include "common/program/describe.h"
 #include "common/program/program.h"
 
@@ -18,8 +19,9 @@ nlohmann::ordered_json figures_of(const IntervalVolume& volume, std::uint64_t fi
 std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
   const Description& d = volume.description();
   const auto times = [&d](std::uint64_t bytes) { return bytes == 0 ? 0.0 : double(d.full.indexed_bytes()) / double(bytes); };
-  std::string text = fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined at its {}\n", d.name, d.grid.dims[0], d.grid.dims[1],
-                                 d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
+  std::string text =
+      fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined at its {}\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
+                  d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
   text += fmt::format("{} updates, {} coefficients, {} supercubes, largest error {:g}\n", d.updates, d.coefficients, volume.set().supercubes(),
                       d.max_error);
   text += fmt::format("full mesh: {} vertices, {} tetrahedra, {} as an indexed mesh\n", d.full.vertices, d.full.tets,

@@ -13,6 +13,7 @@
 #include "common/mesh_writer.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
+#include "common/printable.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
 #include "server/build/all_cores.h"
@@ -32,7 +33,7 @@ struct ExtractCommand {
 };
 
 Result<Extraction> extract_with_progress(const IntervalVolume& volume, const Lod& lod) {
-  Progress progress("extracting " + volume.description().name);
+  Progress progress("extracting " + printable(volume.description().name));
   return extract(
       volume, lod, [&progress](double done) { progress.fraction(done); }, on_all_cores);
 }
@@ -67,8 +68,9 @@ Result<void> run(const ExtractCommand& options) {
     if (options.digest) json["digest"] = mesh_digest(mesh);
     return print_json(json);
   }
-  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", (*volume)->description().name,
-                                 extracted->updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
+  std::string text =
+      fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", printable((*volume)->description().name),
+                  extracted->updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
   if (options.digest) text += "digest " + mesh_digest(mesh) + "\n";
   if (options.output) text += "wrote " + options.output->string() + "\n";
   if (options.picture) text += "drew " + options.picture->file.string() + "\n";

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "common/ivm_file.h"
+#include "common/printable.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 
@@ -31,7 +32,7 @@ Result<void> verify(const InfoCommand& options) {
   if (!volume) return tl::unexpected(volume.error());
   if (auto valid = (*volume)->validate(); !valid) return fail(options.file + ": " + valid.error().message);
   if (options.json) return print_json({{"file", options.file}, {"valid", true}, {"updates", (*volume)->size()}});
-  return print(options.file + ": all checksums and invariants hold (" + std::to_string((*volume)->size()) + " updates)\n");
+  return print(printable(options.file) + ": all checksums and invariants hold (" + std::to_string((*volume)->size()) + " updates)\n");
 }
 
 }  // namespace

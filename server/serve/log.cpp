@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "common/printable.h"
+
 namespace intervale {
 namespace {
 
@@ -22,7 +24,7 @@ class TextMessage : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm& /*time*/, spdlog::memory_buf_t& line) override {
     if (log_detail::session) append(line, "session " + std::to_string(*log_detail::session) + " ");
-    for (const char c : said_by(message)) line.push_back(static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c);
+    append(line, printable(said_by(message)));
   }
   [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<TextMessage>(); }
 };

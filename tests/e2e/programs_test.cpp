@@ -223,6 +223,21 @@ TEST(Programs, APortInUseIsOneLine) {
   expect_complaint(second, 1, "in use", "intervale: ");
 }
 
+TEST(Programs, NamesDoNotReachTheTerminalAsTheyAre) {
+  const TempDir folder;
+  const std::string path = folder / "red \x1b[31m\xff.ivm";
+  std::filesystem::copy_file(buckyball(), path);
+  for (const char* command : {"info", "verify"}) {
+    const auto told = run({program("intervale"), command, path});
+    EXPECT_EQ(told.status, 0);
+    EXPECT_THAT(told.out, testing::AllOf(HasSubstr("red ?[31m"), Not(HasSubstr("\x1b")))) << command;
+    EXPECT_EQ(run({program("intervale"), command, path, "--json"}).status, 0);
+  }
+  const auto missing = run({program("intervale"), "info", folder / "\x1b[31m.ivm"});
+  EXPECT_EQ(missing.status, 1);
+  EXPECT_THAT(missing.err, Not(HasSubstr("\x1b")));
+}
+
 TEST(Programs, ADamagedFileIsAnErrorIfNamedAndLeftOutInAFolder) {
   const TempDir folder;
   const auto damaged = folder.file("damaged.ivm", "not an interval volume");
