@@ -7,6 +7,7 @@
 #include "client/cli/commands.h"
 #include "client/net/http_get.h"
 #include "client/program/access_options.h"
+#include "common/printable.h"
 
 namespace intervale {
 namespace {
@@ -17,14 +18,13 @@ struct ListOptions {
   bool json = false;
 };
 
+constexpr int kMaxDepth = 16;
+
+// What is nested deeper than any answer of ours is left out: to print it takes a call for each level.
+bool is_shallow(int depth, nlohmann::ordered_json::parse_event_t /*event*/, const nlohmann::ordered_json& /*value*/) { return depth < kMaxDepth; }
+
 // What a server says goes to a terminal: no control characters.
-std::string shown(const nlohmann::ordered_json& value) {
-  std::string text = value.is_string() ? value.get<std::string>() : value.dump();
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  }
-  return text;
-}
+std::string shown(const nlohmann::ordered_json& value) { return printable(value.is_string() ? value.get<std::string>() : value.dump()); }
 
 std::string line_of(const nlohmann::ordered_json& dataset) {
   const auto& dims = dataset.at("dims");
@@ -44,7 +44,7 @@ Result<void> list(const ListOptions& options) {
   if (!body) return tl::unexpected(body.error());
   // The parser throws on what is no JSON, at() on JSON of another shape: both come from outside, so both end here.
   try {
-    const auto answer = nlohmann::ordered_json::parse(*body);
+    const auto answer = nlohmann::ordered_json::parse(*body, &is_shallow);
     if (options.json) return print_json(answer);
     std::string text;
     for (const auto& dataset : answer.at("datasets")) text += line_of(dataset);

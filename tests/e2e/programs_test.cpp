@@ -238,6 +238,14 @@ TEST(Programs, NamesDoNotReachTheTerminalAsTheyAre) {
   EXPECT_THAT(missing.err, Not(HasSubstr("\x1b")));
 }
 
+TEST(Programs, AListThatIsNestedWithoutEndIsOneLine) {
+  const std::string deep = std::string(1 << 20, '[') + std::string(1 << 20, ']');
+  for (const std::string& body : {deep, "{\"datasets\":[{\"name\":" + deep + "}]}"}) {
+    const Stranger stranger("HTTP/1.1 200 OK\r\nServer: intervale\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+    expect_complaint(run({client(), "list", stranger.url("")}), 1, "makes no sense");
+  }
+}
+
 TEST(Programs, ADamagedFileIsAnErrorIfNamedAndLeftOutInAFolder) {
   const TempDir folder;
   const auto damaged = folder.file("damaged.ivm", "not an interval volume");
