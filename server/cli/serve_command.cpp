@@ -1,8 +1,10 @@
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/cli/commands.h"
@@ -18,7 +20,18 @@ struct ServeCommand {
   std::vector<std::string> inputs;
 };
 
+// The parser takes a variable that is empty for none. One that was meant to guard the server is not to leave it open.
+bool is_empty_in_environment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value != nullptr && *value == '\0';
+}
+
 Result<void> run(const ServeCommand& options) {
+  for (const auto& [name, given] :
+       {std::pair("INTERVALE_TOKENS", options.serve.tokens.has_value()), std::pair("INTERVALE_TLS_CERT", options.serve.tls.has_value()),
+        std::pair("INTERVALE_TLS_KEY", options.serve.tls.has_value())}) {
+    if (!given && is_empty_in_environment(name)) return misuse(std::string(name) + " is empty: name a file in it, or leave it out");
+  }
   return serve(options.serve, options.log, std::vector<std::filesystem::path>(options.inputs.begin(), options.inputs.end()));
 }
 
@@ -66,7 +79,12 @@ CLI::Validator at_least_one() {
 void add_milliseconds(CLI::App& command, const std::string& name, std::chrono::milliseconds& time, double least, const std::string& description) {
   command
       .add_option_function<double>(
-          name, [&time](double seconds) { time = std::chrono::milliseconds(std::llround(1000 * seconds)); }, description)
+          name,
+          [&time, name](double seconds) {
+            if (std::isnan(seconds)) throw CLI::ValidationError(name, "a number is wanted");  // which is in every range
+            time = std::chrono::milliseconds(std::llround(1000 * seconds));
+          },
+          description)
       ->check(CLI::Range(least, 86400.0))
       ->type_name("SECONDS")
       ->group("Limits");
@@ -97,6 +115,7 @@ void add_limits(CLI::App& command, ServeOptions& serve) {
   add_optional(command, "--max-memory", serve.max_memory,
                "While the process has more resident, new sessions are answered 503; 2GiB, 500MB. Default: none")
       ->transform(bytes)
+      ->check(at_least_one())
       ->type_name("BYTES")
       ->group(group);
   command
@@ -105,6 +124,7 @@ void add_limits(CLI::App& command, ServeOptions& serve) {
           "Of messages that are leaving, in all; past it, those that have been leaving the longest are cut off with their connections, if that is "
           "more than a second. Default: 512MiB")
       ->transform(bytes)
+      ->check(at_least_one())
       ->type_name("BYTES")
       ->group(group);
   command.add_option("--max-messages-per-second", serve.messages_per_second, "Of each session; one that sends more is read more slowly")
@@ -164,7 +184,7 @@ void add_serve_command(Program& program) {
           "--viewer", [options](const std::string& folder) { options->serve.viewer = folder; },
           "Where the browser's viewer is; by default ../share/intervale/viewer from this program's folder, if that is there")
       ->type_name("FOLDER");
-  command.add_option("--threads", options->serve.threads, "0: one for each core")->capture_default_str();
+  command.add_option("--threads", options->serve.threads, "0: one for each core")->check(CLI::Range(0, 1024))->capture_default_str();
   command
       .add_option_function<std::string>(
           "--metrics-listen", [options](const std::string& address) { options->serve.metrics_listen = address; },

@@ -223,6 +223,22 @@ TEST(Programs, APortInUseIsOneLine) {
   expect_complaint(second, 1, "in use", "intervale: ");
 }
 
+TEST(Programs, AGuardThatIsEmptyInTheEnvironmentIsAnError) {
+  for (const char* name : {"INTERVALE_TOKENS", "INTERVALE_TLS_CERT", "INTERVALE_TLS_KEY"}) {
+    ::setenv(name, "", 1);
+    const auto open = run({program("intervale"), "serve", buckyball(), "--listen", "127.0.0.1:0"});
+    ::unsetenv(name);
+    expect_complaint(open, 2, std::string(name) + " is empty", "intervale: ");
+  }
+}
+
+TEST(Programs, ServeTakesNoLimitThatIsNone) {
+  for (const auto& [option, value] : std::vector<std::pair<std::string, std::string>>{
+           {"--handshake-time", "nan"}, {"--drain-time", "nan"}, {"--max-memory", "-5"}, {"--max-queued-bytes", "-1"}, {"--threads", "100000"}}) {
+    expect_complaint(run({program("intervale"), "serve", buckyball(), "--listen", "127.0.0.1:0", option, value}), 2, option, "intervale: ");
+  }
+}
+
 TEST(Programs, NamesDoNotReachTheTerminalAsTheyAre) {
   const TempDir folder;
   const std::string path = folder / "red \x1b[31m\xff.ivm";
