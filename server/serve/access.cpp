@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <unordered_set>
 #include <utility>
 
 #include "protocol/messages.h"
@@ -99,6 +100,7 @@ bool Scope::allows(std::string_view dataset) const {
 
 Result<Tokens> Tokens::parse(std::string_view text) {
   Tokens tokens;
+  std::unordered_set<std::string> seen;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const auto end = std::min(text.find('\n'), text.size());
     std::vector<std::string> words = words_of(text.substr(0, end));
@@ -107,7 +109,7 @@ Result<Tokens> Tokens::parse(std::string_view text) {
     const auto wrong = [number](const char* what) { return fail("line " + std::to_string(number) + ": " + what); };
     std::string token = std::move(words.front());
     if (!is_token(token)) return wrong("not a token: 1 to 512 of A-Z a-z 0-9 - . _ ~ + / = are wanted");
-    if (tokens.find(token)) return wrong("a token that is there already");
+    if (!seen.insert(token).second) return wrong("a token that is there already");
     words.erase(words.begin());
     tokens.entries_.push_back({std::move(token), words.empty() ? Scope::everything() : std::make_shared<const Scope>(std::move(words))});
   }

@@ -63,6 +63,16 @@ TEST(Tokens, ThatCannotBeReadAreAnErrorThatKeepsThem) {
   EXPECT_TRUE(Tokens::load(folder.file("good", "token\n")));
 }
 
+TEST(Tokens, OfAsManyAsAFileHoldsEachOpensItsOwn) {
+  std::string text;
+  for (int i = 0; text.size() < (1 << 20) - 20; ++i) text += std::to_string(i) + " data-" + std::to_string(i) + "\n";
+  const auto tokens = Tokens::parse(text);  // in a moment: not each against each
+  ASSERT_TRUE(tokens);
+  EXPECT_TRUE(tokens->find("40000")->allows("data-40000"));
+  EXPECT_FALSE(tokens->find("40000")->allows("data-40001"));
+  EXPECT_FALSE(Tokens::parse(text + "40000\n"));
+}
+
 TEST(Tokens, ComeInAHeaderOrAsASubprotocol) {
   EXPECT_EQ(token_of("Bearer abc.def", ""), "abc.def");
   EXPECT_EQ(token_of("bearer  abc ", "intervale.v1"), "abc");
