@@ -4,6 +4,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/printable.h"
 #include "protocol/limits.h"
 
 namespace intervale {
@@ -29,15 +30,20 @@ bool is_utf8(std::string_view text) {
 
 // A name stands in URLs, JSON, metrics, logs and terminals.
 bool fit_for_a_url(const std::string& name) {
-  return !name.empty() && name.size() <= protocol::kMaxName && is_utf8(name) &&
-         std::none_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f || c == '/' || c == '?' || c == '#'; });
+  return !name.empty() && name.size() <= protocol::kMaxName && is_utf8(name) && printable(name) == name &&
+         std::none_of(name.begin(), name.end(), [](char c) { return c == '/' || c == '?' || c == '#'; });
 }
 
 }  // namespace
 
+Result<void> Catalogue::check_name(const std::string& name) {
+  if (fit_for_a_url(name)) return {};
+  return fail("a data set's name must be 1 to 255 bytes of UTF-8 without / ? # and control characters: rename the file");
+}
+
 Result<void> Catalogue::add(Volume volume) {
   const std::string name = volume->description().name;
-  if (!fit_for_a_url(name)) return fail("a data set's name must be 1 to 255 bytes of UTF-8 without / ? # and control characters: rename the file");
+  if (auto fit = check_name(name); !fit) return fit;
   if (!volumes_.emplace(name, std::move(volume)).second) return fail("two data sets are named '" + name + "': rename one of the files");
   return {};
 }

@@ -16,7 +16,10 @@ class Catalogue {
  public:
   using Volume = std::shared_ptr<const IntervalVolume>;
 
-  // Under its description's name. Failure: the name is taken, unfit for a URL's path, or no UTF-8.
+  // Failure: unfit for a URL's path, or no UTF-8.
+  static Result<void> check_name(const std::string& name);
+
+  // Under its description's name. Failure: the name is taken, or unfit.
   Result<void> add(Volume volume);
 
   [[nodiscard]] Volume find(std::string_view name) const;  // nullptr if there is none

@@ -94,6 +94,11 @@ bool CatalogueWatch::look_at(const fs::path& path, File& file) {
     if (std::exchange(file.complaint, error.message) == error.message) return;
     spdlog::warn("{}: {}", file.volume ? "what was read before stays" : "left out", error.message);
   };
+  const std::string name = path.stem().string();
+  if (auto fit = Catalogue::check_name(name); !fit) {
+    complain({path.string() + ": " + fit.error().message});
+    return false;
+  }
   const auto bytes = guarded(path, [&] { return read_ivm(path); });
   if (!bytes) {  // no descriptor left, perhaps, or no right to read it: that may change while the file does not
     complain(bytes.error());
@@ -101,7 +106,7 @@ bool CatalogueWatch::look_at(const fs::path& path, File& file) {
   }
   file.stamp = stamp;
   file.complaint.clear();
-  auto volume = guarded(path, [&] { return decode_ivm(*bytes, path.stem().string()); });
+  auto volume = guarded(path, [&] { return decode_ivm(*bytes, name); });
   if (!volume) {
     complain({path.string() + ": " + volume.error().message});
     return false;
@@ -121,8 +126,9 @@ std::optional<Catalogue> CatalogueWatch::look() {
     if (!paths) {
       // Gone for a while, perhaps: what came from there stays.
       if (!std::exchange(unreadable_[input], true)) spdlog::warn("{}; what was read before stays", paths.error().message);
+      const fs::path folder = (input / "file").parent_path();  // as those in it name it: x/ is x
       for (const auto& [path, file] : found_) {
-        if (path.parent_path() == input) found[path] = file;
+        if (path.parent_path() == folder) found[path] = file;
       }
       continue;
     }

@@ -23,8 +23,9 @@ class CatalogueWatch {
   explicit CatalogueWatch(std::vector<std::filesystem::path> inputs, std::optional<std::uint64_t> max_memory = {})
       : inputs_(std::move(inputs)), max_memory_(max_memory) {}
 
-  // What there is at the start. A damaged file in a folder is logged and left out; one that is named is an error, like two data sets of one name and
-  // a folder that cannot be read. go_on is asked before each file; where it says no, what was read so far is the catalogue.
+  // What there is at the start. A file in a folder that is damaged, or has a name unfit for a data set, is logged and left out; one that is named is
+  // an error, like two data sets of one name and a folder that cannot be read. go_on is asked before each file; where it says no, what was read so
+  // far is the catalogue.
   Result<Catalogue> load(const std::function<bool()>& go_on = [] { return true; });
 
   // Looks into the folders again: what is served from now on, if that is something else than before. A file that is new, or another than it was, is

@@ -25,7 +25,7 @@ Result<void> add(Catalogue& catalogue, std::string name) {
 TEST(Catalogue, NamesAreUtf8) {
   Catalogue catalogue;
   for (const char* name :
-       {"engine", "\xc3\xa9", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xef\xbf\xbf", "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf", "a\xc2\x80z"}) {
+       {"engine", "\xc3\xa9", "\xe0\xa0\x80", "\xed\x9f\xbf", "\xef\xbf\xbf", "\xf0\x90\x80\x80", "\xf4\x8f\xbf\xbf", "a\xc2\xa0z"}) {
     EXPECT_TRUE(add(catalogue, name)) << name;
   }
   for (const char* name : {"\x80", "a\xc3", "\xc3(", "\xc0\xaf", "\xc1\xbf", "\xe0\x9f\xbf", "\xe2\x82", "\xed\xa0\x80", "\xf0\x8f\xbf\xbf",
@@ -44,8 +44,8 @@ TEST(Catalogue, NamesAreUtf8) {
 TEST(Catalogue, NamesFitIntoAUrlOnce) {
   Catalogue catalogue;
   for (const std::string& name : {std::string("a b"), std::string(255, 'x')}) EXPECT_TRUE(add(catalogue, name)) << name;
-  for (const std::string& name :
-       {std::string(), std::string(256, 'x'), std::string("a/b"), std::string("a?b"), std::string("a#b"), std::string("a\nb"), std::string("a b")}) {
+  for (const std::string& name : {std::string(), std::string(256, 'x'), std::string("a/b"), std::string("a?b"), std::string("a#b"),
+                                  std::string("a\nb"), std::string("a\xc2\x9bz"), std::string("a b")}) {
     EXPECT_FALSE(add(catalogue, name)) << name;
   }
 }

@@ -143,14 +143,25 @@ TEST_F(CatalogueWatchTest, AFileThatHasChangedIsReadWhateverItsTimeOfWriting) {
 TEST_F(CatalogueWatchTest, AFolderThatIsAwayKeepsWhatItHad) {
   std::filesystem::create_directory(folder / "in");
   save(folder / "in/a.ivm", -0.3);
-  CatalogueWatch watch_in({folder / "in"});
-  ASSERT_TRUE(watch_in.load());
-  std::filesystem::rename(folder / "in", folder / "out");
-  EXPECT_FALSE(watch_in.look());
-  std::filesystem::rename(folder / "out", folder / "in");
-  EXPECT_FALSE(watch_in.look());
-  std::filesystem::remove(folder / "in/a.ivm");
-  EXPECT_TRUE(watch_in.look());
+  for (const char* name : {"in", "in/", "./in//"}) {
+    CatalogueWatch watch_in({folder / name});
+    ASSERT_TRUE(watch_in.load());
+    std::filesystem::rename(folder / "in", folder / "out");
+    EXPECT_FALSE(watch_in.look()) << name;
+    std::filesystem::rename(folder / "out", folder / "in");
+    EXPECT_FALSE(watch_in.look()) << name;
+    std::filesystem::rename(folder / "in/a.ivm", folder / "a.ivm");
+    EXPECT_TRUE(watch_in.look()) << name;
+    std::filesystem::rename(folder / "a.ivm", folder / "in/a.ivm");
+  }
+}
+
+TEST_F(CatalogueWatchTest, AFileWhoseNameDoesNotDoIsLeftOut) {
+  save(folder / "a.ivm", -0.3);
+  for (const char* name : {"a?.ivm", "b\n.ivm", "c\xff.ivm", "d\xc2\x9b.ivm"}) std::filesystem::copy_file(folder / "a.ivm", folder / name);
+  EXPECT_THAT(names(watch.load().value()), ElementsAre("a"));
+  EXPECT_FALSE(watch.look());
+  EXPECT_FALSE(CatalogueWatch({folder / "a?.ivm"}).load()) << "one that is named is an error";
 }
 
 TEST_F(CatalogueWatchTest, OfTwoOfOneNameTheFirstStands) {
