@@ -135,7 +135,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
         co_return;
       }
       // A body is not read, so what follows it cannot be told from it: the connection ends with this answer.
-      const bool has_body = parser.chunked() || parser.content_length().value_or(0) > 0;
+      const bool has_body = parser.content_length().value_or(0) > 0 || request.count(http::field::transfer_encoding) > 0;
       const bool keep_alive = request.keep_alive() && !has_body && !leaving_;
       const HttpAnswer answer = answer_to(request);
       Response response = response_to(request, answer, keep_alive);

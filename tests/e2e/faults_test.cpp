@@ -270,5 +270,18 @@ TEST(Faults, TenThousandConnectionsLeaveNothingBehind) {
   EXPECT_EQ(everything(server->port()), all);
 }
 
+TEST(Faults, WhatFollowsABodyIsNoRequest) {
+  const auto server = start();
+  const std::string hidden = "GET /readyz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n";
+  for (const std::string& length : {std::string("Transfer-Encoding: chunked"), std::string("Transfer-Encoding: gzip"),
+                                    std::string("Transfer-Encoding: xchunked"), "Content-Length: " + std::to_string(hidden.size())}) {
+    for (const char* method : {"GET", "POST"}) {
+      const std::string answers = talk(server->port(), method + (" /healthz HTTP/1.1\r\nHost: x\r\n" + length + "\r\n\r\n") + hidden);
+      EXPECT_THAT(answers, StartsWith("HTTP/1.1 "));
+      EXPECT_EQ(answers.find("HTTP/1.1 ", 1), std::string::npos) << method << ' ' << length;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace intervale
