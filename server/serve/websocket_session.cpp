@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "protocol/codec.h"
+#include "server/serve/guard.h"
 #include "server/serve/log.h"
 #include "server/serve/session_state.h"
 
@@ -51,7 +52,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   WebSocketSession& operator=(const WebSocketSession&) = delete;
 
   ~WebSocketSession() override {
-    context_.metrics.sessions.Decrement();
+    if (guest_.scope) context_.metrics.sessions.Decrement();
     context_.metrics.connections.Decrement();
     context_.metrics.closed(close_code_);
     log_session(id_, spdlog::level::info, "closed: dataset '{}', {} updates, {} bytes, code {}{}", state_.dataset(), state_.updates_sent(),
@@ -60,7 +61,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   void start(const Request& request) {
     context_.metrics.connections.Increment();
-    context_.metrics.sessions.Increment();
+    if (guest_.scope) context_.metrics.sessions.Increment();  // who is only to be told takes no one's place
     context_.metrics.sessions_total.Increment();
     beast::error_code ignored;
     const auto peer = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
@@ -192,10 +193,20 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (why_ || gone_) return;
     if (!state_.starved()) stalled_since_ = Clock::now();  // in case this message makes it so
     tell(message);
+    if (std::holds_alternative<protocol::Open>(message) && lacks_memory()) {
+      context_.metrics.refused(Refusal::memory);
+      return end({CloseCode::going_away, "no room for another session now"});
+    }
     if (auto fault = state_.receive(message)) return end(std::move(*fault));
     if (const auto* view = std::get_if<protocol::View>(&message)) viewed(view->epoch);
     if (state_.fresh()) context_.turnstile.hurry(id_);
     wake_.cancel();
+  }
+
+  // A data set takes memory once it is opened: many upgrades may have passed when there still was some.
+  [[nodiscard]] bool lacks_memory() const {
+    const auto& most = context_.options.max_memory;
+    return most && resident_bytes() > *most;
   }
 
   void tell(const protocol::ClientMessage& message) const {

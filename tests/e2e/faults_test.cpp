@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "protocol/codec.h"
+#include "server/serve/guard.h"
 #include "tests/e2e/support/programs.h"
 #include "tests/e2e/support/serving.h"
 #include "tests/support/temp_dir.h"
@@ -34,6 +35,7 @@ using protocol::Open;
 using protocol::Opened;
 using protocol::View;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 const std::string kHalfARequest = "GET /v1/stream HTTP/1.1\r\nHost: x\r\nUpgr";
 
@@ -281,6 +283,29 @@ TEST(Faults, WhatFollowsABodyIsNoRequest) {
       EXPECT_EQ(answers.find("HTTP/1.1 ", 1), std::string::npos) << method << ' ' << length;
     }
   }
+}
+
+TEST(Faults, WhoHasNoTokenTakesNoOnesPlace) {
+  const TempDir folder;
+  ServeOptions options;
+  options.tokens = folder.file("tokens", "good\n");
+  options.max_sessions = 1;
+  options.allowed_origins = {"*"};
+  const auto server = start(options);
+  RawClient page(server->port(), {.authorization = "Bearer bad", .origin = "https://viewer.example"});
+  EXPECT_EQ(upgrade_status(server->port(), {.authorization = "Bearer good"}), 101u);
+  EXPECT_EQ(page.end().code, 4401u);
+}
+
+TEST(Faults, ManyWhoComeAtOnceDoNotTakeTheMemoryThatIsLeft) {
+  ServeOptions options;
+  options.max_memory = resident_bytes() + (32 << 20);
+  const auto server = start(options);
+  RawClient client(server->port());
+  const std::vector<char> taken(64 << 20, 'x');
+  ASSERT_GT(resident_bytes(), *options.max_memory) << taken.size();
+  client.send(kOpen);
+  EXPECT_EQ(client.end().code, 1001u) << "come back later, or to another replica";
 }
 
 }  // namespace
