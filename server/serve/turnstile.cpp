@@ -4,43 +4,53 @@
 
 namespace intervale {
 
-void Turnstile::queue(Id session, Turn turn, LetIn let_in) {
+void Turnstile::queue(Account& account, Turn turn, LetIn let_in) {
   {
     const std::lock_guard lock(mutex_);
+    const Time stands = std::max(clock_, account.until_);
     if (free_ == 0) {
-      Line& line = turn == Turn::answer ? answers_ : more_;
-      line.push_back({session, std::move(let_in)});
-      if (turn == Turn::more) in_more_[session] = std::prev(line.end());
+      if (turn == Turn::answer) {
+        answers_.emplace(stands, std::move(let_in));
+      } else {
+        account.in_more_ = more_.insert(more_.end(), {&account, std::move(let_in)});
+      }
       return;
     }
     --free_;
+    if (turn == Turn::answer) clock_ = stands;
   }
   let_in();
 }
 
-void Turnstile::leave(Turn turn, Time time) {
-  Line next;
+void Turnstile::leave(Account& account, Turn turn, Time time) {
+  LetIn next;
   {
     const std::lock_guard lock(mutex_);
+    if (turn == Turn::answer) account.until_ = std::max(clock_, account.until_) + time;
     ahead_ = std::clamp(ahead_ + (turn == Turn::answer ? time : -kAnswersShare * time), -kMemory, kMemory);
-    const bool answer = !answers_.empty() && (more_.empty() || ahead_ <= Time(0));
-    Line& line = answer ? answers_ : more_;
-    if (line.empty()) {
+    if (!answers_.empty() && (more_.empty() || ahead_ <= Time(0))) {
+      const auto first = answers_.begin();
+      clock_ = std::max(clock_, first->first);
+      next = std::move(first->second);
+      answers_.erase(first);
+    } else if (!more_.empty()) {
+      more_.front().account->in_more_.reset();
+      next = std::move(more_.front().let_in);
+      more_.pop_front();
+    } else {
       ++free_;
       return;
     }
-    if (!answer) in_more_.erase(line.front().session);
-    next.splice(next.end(), line, line.begin());
   }
-  next.front().let_in();
+  next();
 }
 
-void Turnstile::hurry(Id session) {
+void Turnstile::hurry(Account& account) {
   const std::lock_guard lock(mutex_);
-  const auto found = in_more_.find(session);
-  if (found == in_more_.end()) return;
-  answers_.splice(answers_.end(), more_, found->second);
-  in_more_.erase(found);
+  if (!account.in_more_) return;
+  const Line::iterator waiting = *std::exchange(account.in_more_, std::nullopt);
+  answers_.emplace(std::max(clock_, account.until_), std::move(waiting->let_in));
+  more_.erase(waiting);
 }
 
 bool Turnstile::crowded() const {
@@ -49,11 +59,12 @@ bool Turnstile::crowded() const {
 }
 
 void Turnstile::clear() {
-  Line answers, more;  // destroyed outside the lock: with a handler may go its session
+  std::multimap<Time, LetIn> answers;  // destroyed outside the lock: with a handler may go its session
+  Line more;
   const std::lock_guard lock(mutex_);
+  for (const Waiter& waiter : more_) waiter.account->in_more_.reset();
   answers.swap(answers_);
   more.swap(more_);
-  in_more_.clear();
 }
 
 }  // namespace intervale

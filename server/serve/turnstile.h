@@ -6,44 +6,61 @@
 #include <boost/asio/async_result.hpp>
 #include <boost/asio/post.hpp>
 #include <chrono>
-#include <cstdint>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <mutex>
-#include <unordered_map>
+#include <optional>
 #include <utility>
 
 namespace intervale {
 
 // Lets in so many sessions at a time. Any thread.
 class Turnstile {
+  using LetIn = std::function<void()>;
+  struct Waiter;
+  using Line = std::list<Waiter>;
+
  public:
-  using Id = std::uint64_t;  // of a session
   using Time = std::chrono::steady_clock::duration;
   // Whose view is not answered yet goes before whose stream goes on. But those have an eighth of the time, so that no one waits for ever.
   enum class Turn { answer, more };
+
+  // What a session has had, and where it waits. The session's own; it stays where it is until the session has left.
+  class Account {
+   public:
+    Account() = default;
+    Account(const Account&) = delete;
+    Account& operator=(const Account&) = delete;
+
+   private:
+    friend class Turnstile;
+    Time until_{0};  // of the answers' clock: when what it has had is its fair part
+    std::optional<Line::iterator> in_more_;
+  };
 
   explicit Turnstile(unsigned seats) : free_(seats) {}
   Turnstile(const Turnstile&) = delete;
   Turnstile& operator=(const Turnstile&) = delete;
 
   // Completes with void() once it is the session's turn, by way of the handler's executor. The session computes and calls leave(), without waiting
-  // for anything in between. A session waits for more once at a time.
+  // for anything in between. A session waits for more once at a time. Answers go by the time that their sessions have had: who asks for what takes
+  // long waits for those who do not (start-time fair queueing: P. Goyal, H. M. Vin and H. Cheng, 1996).
   template <class Token>
-  auto enter(Id session, Turn turn, Token&& token) {
+  auto enter(Account& account, Turn turn, Token&& token) {
     return boost::asio::async_initiate<Token, void()>(
-        [this, session, turn](auto handler) {
+        [this, &account, turn](auto handler) {
           const auto shared = std::make_shared<decltype(handler)>(std::move(handler));
-          queue(session, turn, [shared] { boost::asio::post(boost::asio::get_associated_executor(*shared), std::move(*shared)); });
+          queue(account, turn, [shared] { boost::asio::post(boost::asio::get_associated_executor(*shared), std::move(*shared)); });
         },
         token);
   }
   // turn: what the time was spent for.
-  void leave(Turn turn, Time time);
+  void leave(Account& account, Turn turn, Time time);
 
   // A session that waits to send more now waits to answer. Nothing if it does not wait.
-  void hurry(Id session);
+  void hurry(Account& account);
 
   // Somebody waits.
   [[nodiscard]] bool crowded() const;
@@ -52,21 +69,20 @@ class Turnstile {
   void clear();
 
  private:
-  using LetIn = std::function<void()>;
   struct Waiter {
-    Id session = 0;
+    Account* account = nullptr;
     LetIn let_in;
   };
-  using Line = std::list<Waiter>;
   static constexpr int kAnswersShare = 7;  // of eight parts
   static constexpr Time kMemory{std::chrono::milliseconds(20)};
-  void queue(Id session, Turn turn, LetIn let_in);
+  void queue(Account& account, Turn turn, LetIn let_in);
 
   mutable std::mutex mutex_;
   unsigned free_;
-  Time ahead_{0};  // what answers took beyond their share, as far as it is remembered
-  Line answers_, more_;
-  std::unordered_map<Id, Line::iterator> in_more_;
+  Time ahead_{0};                       // what answers took beyond their share, as far as it is remembered
+  Time clock_{0};                       // of answers: where the one stood that was let in last, or any before it
+  std::multimap<Time, LetIn> answers_;  // by where their sessions stand; of those that stand alike, who came first
+  Line more_;
 };
 
 }  // namespace intervale

@@ -31,6 +31,7 @@ using protocol::Fault;
 using Clock = std::chrono::steady_clock;
 using Request = http::request<http::empty_body>;
 
+constexpr std::chrono::seconds kMostPings{1};  // ahead of the pace that messages may have
 constexpr std::size_t kCrowdedAnswer = 4 << 10, kCrowdedPayload = 16 << 10;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
@@ -136,6 +137,12 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
       response.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
     }));
+    // Pings are answered beneath async_read_some, where no one can be kept waiting. The socket goes with its session, and this with the socket.
+    ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
+      if (kind == websocket::frame_type::ping && messages_.take(Clock::now()) > kMostPings) {
+        end({CloseCode::too_large, "more pings than messages may come"});
+      }
+    });
     ws_.read_message_max(0);  // read_messages counts, so that it can close with a code of ours
     ws_.auto_fragment(false);
     ws_.binary(true);
@@ -164,8 +171,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       if (view != nullptr) co_await keep_pace(views_);
       if (view != nullptr && !view->forget.empty()) {
         // That takes time, like a batch.
-        co_await context_.turnstile.enter(id_, Turnstile::Turn::answer, asio::use_awaitable);
-        const Inside inside{context_.turnstile, Turnstile::Turn::answer};
+        co_await context_.turnstile.enter(turns_, Turnstile::Turn::answer, asio::use_awaitable);
+        const Inside inside{context_.turnstile, turns_, Turnstile::Turn::answer};
         receive(*message);
       } else {
         receive(*message);
@@ -184,9 +191,10 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   // Between enter() and leave().
   struct Inside {
     Turnstile& turnstile;
+    Turnstile::Account& account;
     Turnstile::Turn turn;
     Clock::time_point since = Clock::now();
-    ~Inside() { turnstile.leave(turn, Clock::now() - since); }
+    ~Inside() { turnstile.leave(account, turn, Clock::now() - since); }
   };
 
   void receive(const protocol::ClientMessage& message) {
@@ -199,7 +207,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }
     if (auto fault = state_.receive(message)) return end(std::move(*fault));
     if (const auto* view = std::get_if<protocol::View>(&message)) viewed(view->epoch);
-    if (state_.fresh()) context_.turnstile.hurry(id_);
+    if (state_.fresh()) context_.turnstile.hurry(turns_);
     wake_.cancel();
   }
 
@@ -247,7 +255,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       if (why_) co_return co_await take_leave();
       std::optional<protocol::ServerMessage> message;
       if (state_.working()) {
-        co_await context_.turnstile.enter(id_, turn(), asio::use_awaitable);
+        co_await context_.turnstile.enter(turns_, turn(), asio::use_awaitable);
         message = compute();
       } else {
         message = state_.next();
@@ -271,7 +279,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   // What the session has next. Leaves the turnstile.
   std::optional<protocol::ServerMessage> compute() {
-    const Inside inside{context_.turnstile, turn()};
+    const Inside inside{context_.turnstile, turns_, turn()};
     if (gone_ || why_) return {};
     const bool crowded = context_.turnstile.crowded();
     auto message = state_.next(!crowded ? protocol::kMaxBatchPayload : state_.fresh() ? kCrowdedAnswer : kCrowdedPayload);
@@ -326,6 +334,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   ServerContext& context_;
   Guest guest_;
   SessionState state_;
+  Turnstile::Account turns_;
   RateLimit messages_, views_;
   std::uint64_t id_;
   std::optional<Fault> why_;  // set once the session is to end

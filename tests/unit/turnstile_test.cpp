@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <boost/asio/bind_executor.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -20,9 +22,10 @@ using Turn = Turnstile::Turn;
 
 class TurnstileLaws : public ::testing::Test {
  protected:
-  void enter(Turnstile::Id session, Turn turn) {
-    turnstile_.enter(session, turn, asio::bind_executor(io_, [this, session] { inside_ += char('a' + session); }));
+  void enter(int session, Turn turn) {
+    turnstile_.enter(sessions_[session], turn, asio::bind_executor(io_, [this, session] { inside_ += char('a' + session); }));
   }
+  void leave(int session, Turn turn, int ms) { turnstile_.leave(sessions_[session], turn, milliseconds(ms)); }
   // Lets everybody in who may, and tells who is new.
   std::string inside() {
     io_.restart();
@@ -30,103 +33,140 @@ class TurnstileLaws : public ::testing::Test {
     return std::exchange(inside_, "");
   }
 
+  std::array<Turnstile::Account, 10> sessions_;
   asio::io_context io_;
   Turnstile turnstile_{2};
   std::string inside_;
 };
 
 TEST_F(TurnstileLaws, AsManyAsThereAreSeats) {
-  for (const Turnstile::Id session : {0, 1}) enter(session, Turn::more);
+  for (const int session : {0, 1}) enter(session, Turn::more);
   EXPECT_FALSE(turnstile_.crowded());
-  for (const Turnstile::Id session : {2, 3}) enter(session, Turn::more);
+  for (const int session : {2, 3}) enter(session, Turn::more);
   EXPECT_TRUE(turnstile_.crowded());
   EXPECT_EQ(inside(), "ab");
   EXPECT_EQ(inside(), "");
-  turnstile_.leave(Turn::more, milliseconds(1));
+  leave(0, Turn::more, 1);
   EXPECT_EQ(inside(), "c");
-  turnstile_.leave(Turn::more, milliseconds(1));
+  leave(1, Turn::more, 1);
   EXPECT_EQ(inside(), "d");
   EXPECT_FALSE(turnstile_.crowded());
-  for (int i = 0; i < 2; ++i) turnstile_.leave(Turn::more, milliseconds(1));
+  for (const int session : {2, 3}) leave(session, Turn::more, 1);
   enter(4, Turn::more);
   EXPECT_EQ(inside(), "e") << "a seat was left free";
 }
 
 TEST_F(TurnstileLaws, NobodyIsLetInBeforeEnterReturns) {
   bool entered = false;
-  turnstile_.enter(0, Turn::answer, asio::bind_executor(io_, [&] { entered = true; }));
+  turnstile_.enter(sessions_[0], Turn::answer, asio::bind_executor(io_, [&] { entered = true; }));
   EXPECT_FALSE(entered);
   io_.poll();
   EXPECT_TRUE(entered);
 }
 
 TEST_F(TurnstileLaws, AnswersGoFirst) {
-  for (const Turnstile::Id session : {0, 1, 2, 3}) enter(session, Turn::more);
-  for (const Turnstile::Id session : {4, 5}) enter(session, Turn::answer);
+  for (const int session : {0, 1, 2, 3}) enter(session, Turn::more);
+  for (const int session : {4, 5}) enter(session, Turn::answer);
   EXPECT_EQ(inside(), "ab");
   std::string order;
   for (int i = 0; i < 4; ++i) {
-    turnstile_.leave(Turn::more, milliseconds(0));
+    leave(i, Turn::more, 0);
     order += inside();
   }
   EXPECT_EQ(order, "efcd");
 }
 
 TEST_F(TurnstileLaws, WhoHurriesGoesBehindTheLastAnswer) {
-  for (const Turnstile::Id session : {0, 1, 2, 3}) enter(session, Turn::more);
+  for (const int session : {0, 1, 2, 3}) enter(session, Turn::more);
   enter(4, Turn::answer);
-  turnstile_.hurry(3);
-  turnstile_.hurry(3);
-  turnstile_.hurry(0);  // inside
-  turnstile_.hurry(9);  // nowhere
+  turnstile_.hurry(sessions_[3]);
+  turnstile_.hurry(sessions_[3]);
+  turnstile_.hurry(sessions_[0]);  // inside
+  turnstile_.hurry(sessions_[9]);  // nowhere
   EXPECT_EQ(inside(), "ab");
   std::string order;
   for (int i = 0; i < 3; ++i) {
-    turnstile_.leave(Turn::more, milliseconds(0));
+    leave(i, Turn::more, 0);
     order += inside();
   }
   EXPECT_EQ(order, "edc");
 }
 
-// However many answers there are, an eighth of the time is for the others; and the other way round answers have what they want.
-TEST_F(TurnstileLaws, NobodyWaitsForEver) {
-  for (const double wanted : {0.5, 3.0}) {  // milliseconds that one of the others takes, answers take 1
-    Turnstile turnstile(1);
-    std::string order;
-    const auto enter = [&](Turn turn) {
-      turnstile.enter(turn == Turn::answer ? 0 : 1, turn, asio::bind_executor(io_, [&order, turn] { order += turn == Turn::answer ? 'a' : 'm'; }));
-    };
-    for (int i = 0; i < 2; ++i) {
-      enter(Turn::more);
-      enter(Turn::answer);
-    }
-    double answers = 0, others = 0;
-    for (int i = 0; i < 20000; ++i) {
-      io_.restart();
-      io_.poll();
-      ASSERT_EQ(order.size(), 1u);
-      const Turn turn = order[0] == 'a' ? Turn::answer : Turn::more;
-      order.clear();
-      const double time = turn == Turn::answer ? 1 : wanted;
-      (turn == Turn::answer ? answers : others) += time;
-      enter(turn);  // and again, at once
-      turnstile.leave(turn, std::chrono::duration_cast<Turnstile::Time>(std::chrono::duration<double, std::milli>(time)));
-    }
-    io_.restart();
-    io_.poll();  // the last one
-    EXPECT_NEAR(others / (answers + others), 0.125, 0.02) << wanted;
+// Sessions that want their next turn as soon as they have had one, at one seat. Turns and the milliseconds that each takes; the time that each
+// session has had after many of them.
+struct Wanting {
+  Turn turn;
+  double ms;
+};
+std::vector<double> shares(const std::vector<Wanting>& wanting) {
+  constexpr int kTurns = 20000;
+  asio::io_context io;
+  std::vector<Turnstile::Account> sessions(wanting.size());
+  Turnstile turnstile(1);
+  std::vector<std::size_t> inside;
+  const auto enter = [&](std::size_t session) {
+    turnstile.enter(sessions[session], wanting[session].turn, asio::bind_executor(io, [&inside, session] { inside.push_back(session); }));
+  };
+  for (std::size_t session = 0; session < wanting.size(); ++session) enter(session);
+  std::vector<double> times(wanting.size());
+  double all = 0;
+  for (int i = 0; i < kTurns; ++i) {
+    io.restart();
+    io.poll();
+    EXPECT_EQ(inside.size(), 1u);
+    const std::size_t session = inside.back();
+    inside.clear();
+    const auto& [turn, ms] = wanting[session];
+    times[session] += ms;
+    all += ms;
+    enter(session);
+    turnstile.leave(sessions[session], turn, std::chrono::duration_cast<Turnstile::Time>(std::chrono::duration<double, std::milli>(ms)));
   }
+  io.restart();
+  io.poll();  // the last one
+  for (double& time : times) time /= all;
+  return times;
+}
+
+// However many answers there are, an eighth of the time is for the others; and the other way round answers have what they want.
+TEST(Turnstile, NobodyWaitsForEver) {
+  for (const double wanted : {0.5, 3.0}) {
+    const auto times = shares({{Turn::more, wanted}, {Turn::more, wanted}, {Turn::answer, 1}, {Turn::answer, 1}});
+    EXPECT_NEAR(times[0] + times[1], 0.125, 0.02) << wanted;
+  }
+}
+
+TEST(Turnstile, WhoAsksForWhatTakesLongHasNoMoreTimeThanOthers) {
+  const auto times = shares({{Turn::answer, 200}, {Turn::answer, 1}, {Turn::answer, 5}, {Turn::answer, 50}});
+  for (const double time : times) EXPECT_NEAR(time, 0.25, 0.02);
+}
+
+TEST_F(TurnstileLaws, WhoComesNewGoesBeforeWhoHasHadMuch) {
+  for (const int session : {0, 1}) enter(session, Turn::answer);
+  EXPECT_EQ(inside(), "ab");
+  enter(0, Turn::answer);  // with a view it wants while its last one is computed
+  leave(0, Turn::answer, 200);
+  EXPECT_EQ(inside(), "a") << "nobody else wanted to";
+  for (const int session : {0, 2, 3}) enter(session, Turn::answer);
+  std::string order;
+  leave(1, Turn::answer, 1);
+  order += inside();
+  leave(2, Turn::answer, 1);
+  order += inside();
+  leave(3, Turn::answer, 1);
+  order += inside();
+  EXPECT_EQ(order, "cda");
 }
 
 TEST_F(TurnstileLaws, ClearForgetsAllWhoWait) {
   const auto token = std::make_shared<int>(1);
-  for (const Turnstile::Id session : {0, 1}) enter(session, Turn::more);
-  for (const Turn turn : {Turn::more, Turn::answer}) turnstile_.enter(7, turn, asio::bind_executor(io_, [token] {}));
+  for (const int session : {0, 1}) enter(session, Turn::more);
+  for (const Turn turn : {Turn::more, Turn::answer}) turnstile_.enter(sessions_[7], turn, asio::bind_executor(io_, [token] {}));
   EXPECT_EQ(token.use_count(), 3);
   turnstile_.clear();
   EXPECT_EQ(token.use_count(), 1);
   EXPECT_FALSE(turnstile_.crowded());
-  turnstile_.hurry(7);
+  turnstile_.hurry(sessions_[7]);
 }
 
 TEST(Turnstile, NeverMoreInsideThanSeatsWhateverTheThreads) {
@@ -134,21 +174,22 @@ TEST(Turnstile, NeverMoreInsideThanSeatsWhateverTheThreads) {
   Turnstile turnstile(2);
   std::atomic<int> inside{0}, most{0}, done{0};
   constexpr int kSessions = 50, kTurns = 100;
-  std::function<void(Turnstile::Id, int)> go = [&](Turnstile::Id session, int turns) {
+  std::array<Turnstile::Account, kSessions> sessions;
+  std::function<void(int, int)> go = [&](int session, int turns) {
     if (turns == kTurns) return;
-    const Turn turn = (session + unsigned(turns)) % 3 == 0 ? Turn::answer : Turn::more;
-    turnstile.enter(session, turn, asio::bind_executor(io, [&, session, turns, turn] {
+    const Turn turn = (session + turns) % 3 == 0 ? Turn::answer : Turn::more;
+    turnstile.enter(sessions[std::size_t(session)], turn, asio::bind_executor(io, [&, session, turns, turn] {
                       const int now = ++inside;
                       for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
                       }
-                      turnstile.hurry((session + 1) % kSessions);
+                      turnstile.hurry(sessions[std::size_t((session + 1) % kSessions)]);
                       --inside;
                       ++done;
-                      turnstile.leave(turn, milliseconds(0));
+                      turnstile.leave(sessions[std::size_t(session)], turn, milliseconds(0));
                       go(session, turns + 1);
                     }));
   };
-  for (Turnstile::Id session = 0; session < kSessions; ++session) asio::post(io, [&go, session] { go(session, 0); });
+  for (int session = 0; session < kSessions; ++session) asio::post(io, [&go, session] { go(session, 0); });
   std::vector<std::thread> threads;
   for (int i = 0; i < 4; ++i) threads.emplace_back([&io] { io.run(); });
   for (std::thread& thread : threads) thread.join();

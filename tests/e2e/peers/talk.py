@@ -183,6 +183,21 @@ async def ends_what_is_too_large_with_4413(peer):
         await peer.expect_end(ws, 4413)
 
 
+async def ends_a_flood_of_pings_with_4413(peer):
+    async with peer.connect() as ws:
+        await ws.send(peer.open())
+        await peer.expect(ws, "Opened")
+        pongs = []
+        try:
+            for _ in range(100000):
+                pongs.append(await ws.ping())
+                await asyncio.sleep(0)
+        except websockets.ConnectionClosed:
+            pass
+        await peer.expect_end(ws, 4413)
+        await asyncio.gather(*pongs, return_exceptions=True)
+
+
 async def closes_in_every_state(peer):
     async def connecting(_):
         pass
@@ -217,7 +232,7 @@ async def closes_in_every_state(peer):
 CONVERSATIONS = (confirms_the_subprotocol, refuses_an_upgrade_without_the_subprotocol, sends_the_whole_stream,
                  takes_fragments_and_answers_pings_in_the_middle, ends_a_text_frame_with_1003, ends_garbage_with_4400,
                  ends_an_unknown_data_set_with_4404, ends_what_is_out_of_order_with_4409, ends_what_is_too_large_with_4413,
-                 closes_in_every_state)
+                 ends_a_flood_of_pings_with_4413, closes_in_every_state)
 
 
 async def talk(peer):
