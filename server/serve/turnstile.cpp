@@ -4,20 +4,27 @@
 
 namespace intervale {
 
+void Turnstile::begin_answer(Account& account, Time stands) {
+  clock_ = std::max(clock_, stands);
+  if (!account.long_) return;
+  ++account.long_inside_;
+  ++long_inside_;
+}
+
 void Turnstile::queue(Account& account, Turn turn, LetIn let_in) {
   {
     const std::lock_guard lock(mutex_);
     const Time stands = std::max(clock_, account.until_);
+    if (turn == Turn::answer && (free_ == 0 || !fits(account))) {
+      answers_.emplace(stands, Waiter{&account, std::move(let_in)});
+      return;
+    }
     if (free_ == 0) {
-      if (turn == Turn::answer) {
-        answers_.emplace(stands, std::move(let_in));
-      } else {
-        account.in_more_ = more_.insert(more_.end(), {&account, std::move(let_in)});
-      }
+      account.in_more_ = more_.insert(more_.end(), {&account, std::move(let_in)});
       return;
     }
     --free_;
-    if (turn == Turn::answer) clock_ = stands;
+    if (turn == Turn::answer) begin_answer(account, stands);
   }
   let_in();
 }
@@ -26,13 +33,20 @@ void Turnstile::leave(Account& account, Turn turn, Time time) {
   LetIn next;
   {
     const std::lock_guard lock(mutex_);
-    if (turn == Turn::answer) account.until_ = std::max(clock_, account.until_) + time;
+    if (turn == Turn::answer) {
+      account.until_ = std::max(clock_, account.until_) + time;
+      account.long_ = time >= kLong;
+      if (account.long_inside_ > 0) {
+        --account.long_inside_;
+        --long_inside_;
+      }
+    }
     ahead_ = std::clamp(ahead_ + (turn == Turn::answer ? time : -kAnswersShare * time), -kMemory, kMemory);
-    if (!answers_.empty() && (more_.empty() || ahead_ <= Time(0))) {
-      const auto first = answers_.begin();
-      clock_ = std::max(clock_, first->first);
-      next = std::move(first->second);
-      answers_.erase(first);
+    const auto answer = std::find_if(answers_.begin(), answers_.end(), [this](const auto& waiting) { return fits(*waiting.second.account); });
+    if (answer != answers_.end() && (more_.empty() || ahead_ <= Time(0))) {
+      begin_answer(*answer->second.account, answer->first);
+      next = std::move(answer->second.let_in);
+      answers_.erase(answer);
     } else if (!more_.empty()) {
       more_.front().account->in_more_.reset();
       next = std::move(more_.front().let_in);
@@ -49,7 +63,7 @@ void Turnstile::hurry(Account& account) {
   const std::lock_guard lock(mutex_);
   if (!account.in_more_) return;
   const Line::iterator waiting = *std::exchange(account.in_more_, std::nullopt);
-  answers_.emplace(std::max(clock_, account.until_), std::move(waiting->let_in));
+  answers_.emplace(std::max(clock_, account.until_), std::move(*waiting));
   more_.erase(waiting);
 }
 
@@ -59,7 +73,7 @@ bool Turnstile::crowded() const {
 }
 
 void Turnstile::clear() {
-  std::multimap<Time, LetIn> answers;  // destroyed outside the lock: with a handler may go its session
+  Answers answers;  // destroyed outside the lock: with a handler may go its session
   Line more;
   const std::lock_guard lock(mutex_);
   for (const Waiter& waiter : more_) waiter.account->in_more_.reset();

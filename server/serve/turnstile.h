@@ -36,17 +36,19 @@ class Turnstile {
 
    private:
     friend class Turnstile;
-    Time until_{0};  // of the answers' clock: when what it has had is its fair part
+    Time until_{0};        // of the answers' clock: when what it has had is its fair part
+    bool long_ = false;    // its last answer took kLong
+    int long_inside_ = 0;  // it is inside with such answers
     std::optional<Line::iterator> in_more_;
   };
 
-  explicit Turnstile(unsigned seats) : free_(seats) {}
+  explicit Turnstile(unsigned seats) : free_(seats), for_long_(seats > 1 ? seats - 1 : 1) {}
   Turnstile(const Turnstile&) = delete;
   Turnstile& operator=(const Turnstile&) = delete;
 
   // Completes with void() once it is the session's turn, by way of the handler's executor. The session computes and calls leave(), without waiting
   // for anything in between. A session waits for more once at a time. Answers go by the time that their sessions have had: who asks for what takes
-  // long waits for those who do not (start-time fair queueing: P. Goyal, H. M. Vin and H. Cheng, 1996).
+  // long waits for those who do not (start-time fair queueing: P. Goyal, H. M. Vin and H. Cheng, 1996), and leaves them a seat if there are two.
   template <class Token>
   auto enter(Account& account, Turn turn, Token&& token) {
     return boost::asio::async_initiate<Token, void()>(
@@ -73,15 +75,21 @@ class Turnstile {
     Account* account = nullptr;
     LetIn let_in;
   };
+  using Answers = std::multimap<Time, Waiter>;
   static constexpr int kAnswersShare = 7;  // of eight parts
   static constexpr Time kMemory{std::chrono::milliseconds(20)};
+  static constexpr Time kLong{std::chrono::milliseconds(50)};
+  [[nodiscard]] bool fits(const Account& account) const { return !account.long_ || long_inside_ < for_long_; }
+  void begin_answer(Account& account, Time stands);
   void queue(Account& account, Turn turn, LetIn let_in);
 
   mutable std::mutex mutex_;
-  unsigned free_;
-  Time ahead_{0};                       // what answers took beyond their share, as far as it is remembered
-  Time clock_{0};                       // of answers: where the one stood that was let in last, or any before it
-  std::multimap<Time, LetIn> answers_;  // by where their sessions stand; of those that stand alike, who came first
+  unsigned free_;      // while any is, nobody waits but with answers that do not fit
+  unsigned for_long_;  // seats, at most
+  unsigned long_inside_ = 0;
+  Time ahead_{0};    // what answers took beyond their share, as far as it is remembered
+  Time clock_{0};    // of answers: where the one stood that was let in last, or any before it
+  Answers answers_;  // by where their sessions stand; of those that stand alike, who came first
   Line more_;
 };
 

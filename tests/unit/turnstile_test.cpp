@@ -145,7 +145,7 @@ TEST_F(TurnstileLaws, WhoComesNewGoesBeforeWhoHasHadMuch) {
   for (const int session : {0, 1}) enter(session, Turn::answer);
   EXPECT_EQ(inside(), "ab");
   enter(0, Turn::answer);  // with a view it wants while its last one is computed
-  leave(0, Turn::answer, 200);
+  leave(0, Turn::answer, 20);
   EXPECT_EQ(inside(), "a") << "nobody else wanted to";
   for (const int session : {0, 2, 3}) enter(session, Turn::answer);
   std::string order;
@@ -156,6 +156,30 @@ TEST_F(TurnstileLaws, WhoComesNewGoesBeforeWhoHasHadMuch) {
   leave(3, Turn::answer, 1);
   order += inside();
   EXPECT_EQ(order, "cda");
+}
+
+// Two seats: one is for those whose answers are short, as soon as it is known whose are not.
+TEST_F(TurnstileLaws, LongAnswersLeaveASeatToOthers) {
+  for (const int session : {0, 1}) enter(session, Turn::answer);
+  for (const int session : {0, 1}) leave(session, Turn::answer, 200);
+  EXPECT_EQ(inside(), "ab");
+  for (const int session : {0, 1}) enter(session, Turn::answer);
+  EXPECT_EQ(inside(), "a");
+  EXPECT_TRUE(turnstile_.crowded());
+  enter(2, Turn::answer);
+  EXPECT_EQ(inside(), "c") << "the seat was kept";
+  leave(2, Turn::answer, 1);
+  EXPECT_EQ(inside(), "");
+  enter(3, Turn::more);
+  EXPECT_EQ(inside(), "d");
+  leave(3, Turn::more, 1);
+  EXPECT_EQ(inside(), "");
+  leave(0, Turn::answer, 200);
+  EXPECT_EQ(inside(), "b") << "and nobody waits for ever";
+  leave(1, Turn::answer, 1);
+  enter(1, Turn::answer);
+  enter(0, Turn::answer);
+  EXPECT_EQ(inside(), "ba") << "what is short now is not long any more";
 }
 
 TEST_F(TurnstileLaws, ClearForgetsAllWhoWait) {
