@@ -21,17 +21,18 @@ const { chromium } = createRequire(join(need('INTERVALE_VIEWER_PAGE'), 'package.
 
 export const program = (name, ...args) => execFileSync(join(bin, name), args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] });
 
-// A folder with interval volumes, which goes when the tests end.
+// A folder with interval volumes, which goes when the tests end. sample: where it is named otherwise.
 export function makeData(...wanted) {
   const folder = mkdtempSync(join(tmpdir(), 'intervale-web-'));
   process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
-  for (const { name, size, range } of wanted) {
-    program('intervale', 'sample', name, '--size', String(size), '-o', join(folder, `${name}.nrrd`));
+  for (const { name, sample = name, size, range } of wanted) {
+    program('intervale', 'sample', sample, '--size', String(size), '-o', join(folder, `${name}.nrrd`));
     program('intervale', 'build', join(folder, `${name}.nrrd`), '-o', join(folder, `${name}.ivm`), '--range', ...range.map(String));
   }
   return folder;
 }
 export const kBuckyball = { name: 'buckyball', size: 65, range: [128, 188] };
+export const kBlock = { name: 'block', sample: 'gyroid', size: 9, range: ['-inf', 'inf'] }; // the whole box is inside
 export const kGyroid = { name: 'gyroid', size: 33, range: [-0.4, 0.4] };
 
 const servers = new Set();

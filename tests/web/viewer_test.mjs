@@ -9,6 +9,7 @@ import {
   difference,
   digestOf,
   drawn,
+  kBlock,
   kBuckyball,
   kGyroid,
   killServers,
@@ -34,7 +35,7 @@ let data;
 let server;
 let browser;
 before(async () => {
-  data = makeData(kBuckyball, kGyroid);
+  data = makeData(kBuckyball, kGyroid, kBlock);
   server = await serve(data);
   browser = await launch();
 });
@@ -42,6 +43,50 @@ after(async () => {
   await browser.close();
   killServers(); // those of tests that failed, too
 });
+
+// The thickness that the picture shows, read off by the legend, at points all over it; x and y from -1 to 1, y up, in heights of the picture's half.
+async function thicknessSeen(page) {
+  return page.evaluate(async () => {
+    const legend = document.getElementById('legend-ramp');
+    const ramp = legend.getContext('2d').getImageData(0, 0, legend.width, 1).data;
+    const most = parseFloat(document.getElementById('legend-high').textContent);
+    const bitmap = await createImageBitmap(await window.intervale.photograph());
+    const { width, height } = bitmap;
+    const context = new OffscreenCanvas(width, height).getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    const picture = context.getImageData(0, 0, width, height).data;
+    const background = [...picture.slice(0, 3)];
+    const apart = (a, i, b, j) => Math.hypot(a[i] - b[j], a[i + 1] - b[j + 1], a[i + 2] - b[j + 2]);
+    const seen = [];
+    for (let v = 4; v < height; v += 13) {
+      for (let u = 4; u < width; u += 13) {
+        const at = 4 * (v * width + u);
+        let best = 0;
+        for (let k = 4; k < ramp.length; k += 4) if (apart(picture, at, ramp, k) < apart(picture, at, ramp, best)) best = k;
+        const empty = apart(picture, at, background, 0) < 2;
+        seen.push({ x: (2 * u + 1 - width) / height, y: (height - 2 * v - 1) / height, thickness: empty ? 0 : (best / 4 / (ramp.length / 4 - 1)) * most });
+      }
+    }
+    const { dims, spacing, origin } = window.intervale.live.dataset;
+    return { seen, most, box: { min: origin, max: origin.map((o, k) => o + (dims[k] - 1) * spacing[k]) } };
+  });
+}
+
+// How far the ray through that point of the picture goes in the box.
+function wayThrough(box, { eye, lookAt, up, fov }, x, y) {
+  const sub = (a, b) => a.map((v, k) => v - b[k]);
+  const unit = (a) => a.map((v) => v / Math.hypot(...a));
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const ahead = unit(sub(lookAt, eye)), right = unit(cross(ahead, up)), above = cross(right, ahead), scale = Math.tan((fov * Math.PI) / 360);
+  const ray = unit(ahead.map((v, k) => v + scale * (x * right[k] + y * above[k])));
+  let [near, far] = [0, Infinity];
+  for (let k = 0; k < 3; ++k) {
+    const [a, b] = [(box.min[k] - eye[k]) / ray[k], (box.max[k] - eye[k]) / ray[k]];
+    near = Math.max(near, Math.min(a, b));
+    far = Math.min(far, Math.max(a, b));
+  }
+  return Math.max(0, far - near);
+}
 
 // A page on the buckyball that fails its test if anything went wrong in it.
 async function withPage(hash, options, body) {
@@ -133,6 +178,24 @@ describe('Pictures', () => {
       await matches(page, 'tets');
     }));
   test('show thickness', () => withPage(`${kCamera}&show=thickness`, size, (page) => matches(page, 'thickness')));
+  test('show the thickness that a block has along each ray', async () => {
+    const { page, wrong, close } = await open(browser, `${server.url}#data=block&eye=5,-7,4&at=0.1,0,0&up=0,0,1&fov=40&show=thickness`, size);
+    await settled(page);
+    await page.waitForFunction(() => !document.getElementById('legend').hidden && parseFloat(document.getElementById('legend-high').textContent) > 1);
+    await drawn(page);
+    const { seen, most, box } = await thicknessSeen(page);
+    const { pose } = await page.evaluate(() => window.intervale.state);
+    let hit = 0;
+    for (const { x, y, thickness } of seen) {
+      const expected = wayThrough(box, pose, x, y);
+      if (expected > 0 && expected < 0.02 * most) continue; // so little is let shine through
+      if (expected > 0) ++hit;
+      assert.ok(Math.abs(thickness - expected) < 0.02 * most, `${thickness} instead of ${expected} at ${x}, ${y}, of ${most}`);
+    }
+    assert.ok(hit > 20 && hit < seen.length - 20, `${hit} of ${seen.length} rays`);
+    assert.deepEqual(wrong, []);
+    await close();
+  });
   test('show a region refined while the rest is coarse', () =>
     withPage(`${kCamera}&roi=0,-1,-1,1,1,1&show=wireframe`, size, async (page) => {
       await matches(page, 'region');

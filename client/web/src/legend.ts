@@ -1,23 +1,8 @@
 // What colours stand for, where they stand for something: thickness, or levels of detail.
 import { element } from './dom';
 import { short } from './format';
-import { kRamp } from './shaders';
+import { kLevelRamp, kThicknessRamp, type Ramp } from './shaders';
 import type { ViewState } from './state';
-
-type Rgb = readonly [number, number, number];
-
-// The same stops as the picture's shader has.
-const kInferno: Rgb[] = [
-  [0.02, 0.02, 0.1],
-  [0.13, 0.05, 0.3],
-  [0.34, 0.06, 0.43],
-  [0.54, 0.13, 0.42],
-  [0.74, 0.21, 0.33],
-  [0.9, 0.36, 0.2],
-  [0.98, 0.55, 0.04],
-  [0.98, 0.78, 0.17],
-  [0.97, 0.98, 0.62],
-];
 
 export function showLegend(view: Readonly<ViewState>, thicknessMost: number): void {
   const shown = view.thickness ? 'thickness' : view.levels ? 'levels' : null;
@@ -28,10 +13,10 @@ export function showLegend(view: Readonly<ViewState>, thicknessMost: number): vo
   say('legend-low', shown === 'thickness' ? '0' : 'finest');
   say('legend-middle', shown === 'thickness' ? short(thicknessMost / 2) : '');
   say('legend-high', shown === 'thickness' ? `${short(thicknessMost)} or more` : 'coarsest');
-  paint(shown === 'thickness' ? kInferno : kRamp);
+  paint(shown === 'thickness' ? kThicknessRamp : kLevelRamp);
 }
 
-function paint(stops: readonly Rgb[]): void {
+function paint(stops: Ramp): void {
   const canvas = element<HTMLCanvasElement>('legend-ramp');
   const context = canvas.getContext('2d');
   if (!context) return;

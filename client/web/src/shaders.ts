@@ -51,22 +51,41 @@ vec3 lit(vec3 color, vec3 n, vec3 p) {
 }
 `;
 
+// Colours along a scale, evenly apart.
+export type Ramp = readonly (readonly [number, number, number])[];
+
 // Levels of detail: from fine and light to coarse and dark, even in lightness, told apart without red and green (after viridis).
-export const kRamp: readonly [number, number, number][] = [
+export const kLevelRamp: Ramp = [
   [0.98, 0.88, 0.2],
   [0.45, 0.78, 0.36],
   [0.14, 0.58, 0.56],
   [0.23, 0.36, 0.6],
   [0.32, 0.17, 0.5],
 ];
-const kLevels = `
-uniform float byLevel, levels; // 1 where colours are the levels'; the coarsest level
+// Thickness: from nothing and dark to much and light (after inferno).
+export const kThicknessRamp: Ramp = [
+  [0.02, 0.02, 0.1],
+  [0.13, 0.05, 0.3],
+  [0.34, 0.06, 0.43],
+  [0.54, 0.13, 0.42],
+  [0.74, 0.21, 0.33],
+  [0.9, 0.36, 0.2],
+  [0.98, 0.55, 0.04],
+  [0.98, 0.78, 0.17],
+  [0.97, 0.98, 0.62],
+];
+// vec3 ramp(float t): a ramp's colour, t from 0 to 1.
+const rampOf = (stops: Ramp) => `
 vec3 ramp(float t) {
-  vec3 c[5] = vec3[5](${kRamp.map((c) => `vec3(${c.map((x) => x.toFixed(3)).join(',')})`).join(',')});
-  float x = clamp(t, 0.0, 1.0) * 4.0;
-  int i = min(int(x), 3);
+  vec3 c[${stops.length}] = vec3[${stops.length}](${stops.map((c) => `vec3(${c.map((x) => x.toFixed(3)).join(',')})`).join(',')});
+  float x = clamp(t, 0.0, 1.0) * ${stops.length - 1}.0;
+  int i = min(int(x), ${stops.length - 2});
   return mix(c[i], c[i + 1], x - float(i));
 }
+`;
+const kLevels = `
+uniform float byLevel, levels; // 1 where colours are the levels'; the coarsest level
+${rampOf(kLevelRamp)}
 vec3 colored(vec3 color, float level) { return mix(color, ramp(level / max(levels, 1.0)), byLevel); }
 `;
 
@@ -239,20 +258,11 @@ in vec2 at;
 uniform sampler2D sums;
 uniform float most; // what the end of the ramp stands for
 out vec4 picture;
-vec3 inferno(float t) {
-  const vec3 c0 = vec3(0.0002189403691192265, 0.001651004631001012, -0.01948089843709184);
-  const vec3 c1 = vec3(0.1065134194856116, 0.5639564367884091, 3.932712388889277);
-  const vec3 c2 = vec3(11.60249308247187, -3.972853965665698, -15.9423941062914);
-  const vec3 c3 = vec3(-41.70399613139459, 17.43639888205313, 44.35414519872813);
-  const vec3 c4 = vec3(77.162935699427, -33.40235894210092, -81.80730925738993);
-  const vec3 c5 = vec3(-71.31942824499214, 32.62606426397723, 73.20951985803202);
-  const vec3 c6 = vec3(25.13112622477341, -12.24266895238567, -23.07032500287172);
-  return clamp(c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6))))), 0.0, 1.0);
-}
+${rampOf(kThicknessRamp)}
 void main() {
   float way = texture(sums, at).r;
   float t = clamp(way / most, 0.0, 1.0);
-  picture = vec4(inferno(0.12 + 0.86 * t), smoothstep(0.0, 0.004, t));
+  picture = vec4(ramp(t), smoothstep(0.0, 0.004, t));
 }`;
 
 export const kLineVertex = `${kPrecision}
