@@ -68,6 +68,13 @@ void add_log_options(CLI::App& command, LogOptions& log) {
   };
 }
 
+// One with a path would never be met.
+bool may_be_origin(const std::string& text) {
+  const std::size_t scheme = text.find("://");
+  return text == "*" ||
+         (scheme != 0 && scheme != std::string::npos && scheme + 3 < text.size() && text.find_first_of("/ \t?#@", scheme + 3) == std::string::npos);
+}
+
 CLI::Validator at_least_one() {
   return {[](const std::string& text) {
             double value = 0;
@@ -166,8 +173,12 @@ void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
       ->group(group);
   command
       .add_option("--allow-origin", serve.allowed_origins,
-                  "Pages that may open sessions: https://example.org, * for any. Default: those of the host that the request names")
-      ->type_name("ORIGIN ...")
+                  "Pages that may open sessions: https://example.org, * for any; in the environment, with commas between. Default: those of the host "
+                  "that the request names")
+      ->check([](const std::string& origin) {
+        return std::string(may_be_origin(origin) ? "" : "must be like https://example.org:8443, without a path, or *");
+      })
+      ->type_name("ORIGIN")
       ->group(group);
 }
 

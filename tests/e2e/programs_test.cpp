@@ -233,8 +233,12 @@ TEST(Programs, AGuardThatIsEmptyInTheEnvironmentIsAnError) {
 }
 
 TEST(Programs, ServeTakesNoLimitThatIsNone) {
-  for (const auto& [option, value] : std::vector<std::pair<std::string, std::string>>{
-           {"--handshake-time", "nan"}, {"--drain-time", "nan"}, {"--max-memory", "-5"}, {"--max-queued-bytes", "-1"}, {"--threads", "100000"}}) {
+  for (const auto& [option, value] : std::vector<std::pair<std::string, std::string>>{{"--allow-origin", "https://example.org/"},
+                                                                                      {"--handshake-time", "nan"},
+                                                                                      {"--drain-time", "nan"},
+                                                                                      {"--max-memory", "-5"},
+                                                                                      {"--max-queued-bytes", "-1"},
+                                                                                      {"--threads", "100000"}}) {
     expect_complaint(run({program("intervale"), "serve", buckyball(), "--listen", "127.0.0.1:0", option, value}), 2, option, "intervale: ");
   }
 }
