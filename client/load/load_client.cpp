@@ -8,6 +8,7 @@
 #include <utility>
 #include <variant>
 
+#include "common/printable.h"
 #include "protocol/codec.h"
 
 namespace intervale {
@@ -196,12 +197,8 @@ void LoadClient::take(const protocol::Done& done) {
 }
 
 void LoadClient::take(const protocol::Fault& fault) {
-  std::string text = fault.text;
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';  // it goes to a terminal
-  }
   ++figures_.protocol_closes;
-  const std::string what = "the server ended the session: " + text + " (code " + std::to_string(static_cast<unsigned>(fault.code)) + ")";
+  const std::string what = "the server ended the session: " + printable(fault.text) + " (code " + std::to_string(static_cast<unsigned>(fault.code)) + ")";
   if (is_to_be_found_again(static_cast<unsigned>(fault.code))) return lose(what);
   fail(what);
 }
