@@ -4,19 +4,13 @@
 #include <utility>
 #include <variant>
 
+#include "common/printable.h"
 #include "protocol/codec.h"
 
 namespace intervale {
 namespace {
 
 tl::unexpected<Error> nonsense(const std::string& what) { return fail("the server sent nonsense: " + what); }
-
-// What a server says goes to people's screens.
-std::string printable(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
-  return text;
-}
 
 }  // namespace
 
