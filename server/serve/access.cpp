@@ -60,6 +60,7 @@ std::vector<std::string> words_of(std::string_view line) {
     const auto first = line.find_first_not_of(kBlanks);
     if (first == std::string_view::npos) return words;
     line.remove_prefix(first);
+    if (line.front() == '#') return words;  // a comment
     const auto end = std::min(line.find_first_of(kBlanks), line.size());
     words.emplace_back(line.substr(0, end));
     line.remove_prefix(end);
@@ -105,7 +106,7 @@ Result<Tokens> Tokens::parse(std::string_view text) {
     const auto end = std::min(text.find('\n'), text.size());
     std::vector<std::string> words = words_of(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
-    if (words.empty() || words.front().starts_with('#')) continue;
+    if (words.empty()) continue;
     const auto wrong = [number](const char* what) { return fail("line " + std::to_string(number) + ": " + what); };
     std::string token = std::move(words.front());
     if (!is_token(token)) return wrong("not a token: 1 to 512 of A-Z a-z 0-9 - . _ ~ + / = are wanted");

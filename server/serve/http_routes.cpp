@@ -101,6 +101,13 @@ HttpAnswer shared(const HttpRequest& request, HttpAnswer answer) {
   return answer;
 }
 
+// Not an empty list: whoever asks is to ask again.
+HttpAnswer loading() {
+  HttpAnswer answer = short_answer(503, "loading: the data sets are still being read");
+  answer.headers.emplace_back("Retry-After", "1");
+  return answer;
+}
+
 // What a browser asks before it sends a token along.
 HttpAnswer preflight() {
   return {.status = 204,
@@ -146,6 +153,7 @@ HttpAnswer answer(const HttpRequest& request, const HttpState& state) {
   if (*path == "/api/datasets" && request.method == "OPTIONS" && !request.allowed_origin.empty()) return shared(request, preflight());
   if (request.method != "GET" && request.method != "HEAD") return short_answer(405, "only GET and HEAD");
   if (*path == "/api/datasets") {
+    if (request.scope != nullptr && state.readiness == Readiness::loading) return shared(request, loading());
     return shared(request, request.scope != nullptr ? with_body(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized());
   }
   if (*path == "/metrics" && state.door == Door::all) {

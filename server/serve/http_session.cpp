@@ -140,6 +140,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
       const HttpAnswer answer = answer_to(request);
       Response response = response_to(request, answer, keep_alive);
       answered_ = true;
+      if (answer.status == 401) context_.metrics.refused(Refusal::token);
       if (!co_await send(response) || !keep_alive) break;
     }
     expire_after(kGoodbyeTime);

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 TEST(Tokens, OpenWhatTheirLineSays) {
-  const auto tokens = Tokens::parse("# who may come in\n\nall-0123456789\n some.one~/+=\tengine  scans-* h?ad\r\n").value();
+  const auto tokens = Tokens::parse("# who may come in\n\nall-0123456789\n some.one~/+=\tengine  scans-* h?ad # mine\r\n").value();
   const auto everything = tokens.find("all-0123456789");
   ASSERT_NE(everything, nullptr);
   EXPECT_TRUE(everything->is_everything());

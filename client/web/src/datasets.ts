@@ -9,6 +9,7 @@ export async function listDatasets(token: string | null): Promise<Listing> {
   try {
     const answer = await fetch(url, token === null ? {} : { headers: { Authorization: `Bearer ${token}` } });
     if (answer.status === 401) return { needsToken: true };
+    if (answer.status === 503) return { trouble: 'The server is still reading what it has.' };
     if (!answer.ok) return { trouble: `The server answers ${answer.status} when asked what it has.` };
     const body: unknown = await answer.json();
     const list = (body as { datasets?: unknown }).datasets;
