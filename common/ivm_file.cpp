@@ -237,7 +237,7 @@ Result<void> check_start(std::span<const std::byte> start, std::uint64_t bytes) 
   std::memcpy(&header, start.data(), sizeof header);
   if (header.version != kIvmVersion) {
     return fail("version " + std::to_string(header.version) + " of the format, this program reads version " + std::to_string(kIvmVersion) +
-                "; build the file again");
+                (header.version > kIvmVersion ? "; a newer program is wanted" : "; build the file again"));
   }
   if (header.checksum != table_checksum(start.first(kTableBytes))) return fail("the header is damaged (checksum)");
   if (header.sections != kSections)

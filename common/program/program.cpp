@@ -72,7 +72,11 @@ int Program::run(int argc, const char* const* argv) {
   } catch (const CLI::Success& asked) {  // --help, --version: not errors
     return app_.exit(asked);
   } catch (const CLI::Error& error) {
-    return complain(one_line(error.what()) + " (see " + name_ + " --help)", kExitUsage);
+    const auto begun = app_.get_subcommands();
+    const std::string of = begun.empty() ? "" : begun.front()->get_name() + " ";
+    const bool is_none = begun.empty() && argc > 1 && argv[1][0] != '-' && !app_.get_subcommands([](const CLI::App*) { return true; }).empty();
+    const std::string what = is_none ? "there is no command '" + std::string(argv[1]) + "'" : one_line(error.what());
+    return complain(what + " (see " + name_ + " " + of + "--help)", kExitUsage);
   }
   try {
     for (auto& [command, body] : commands_) {

@@ -69,6 +69,24 @@ Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
   return std::optional(layout);
 }
 
+// Neither the volume itself nor a file of another kind is to be written over by mistake.
+Result<void> check_output(const std::filesystem::path& input, const std::filesystem::path& output) {
+  std::error_code none;
+  if (std::filesystem::equivalent(input, output, none)) return misuse("the output '" + output.string() + "' is the input: give it a name of its own");
+  for (const char* ending : {".nrrd", ".nhdr", ".raw", ".gz", ".vtu", ".vtp", ".ply", ".stl", ".obj", ".glb", ".png"}) {
+    if (output.extension() == ending)
+      return misuse("the output '" + output.string() + "' is an interval volume, and named like something else: .ivm is wanted");
+  }
+  return {};
+}
+
+std::string text_of_values(const Volume& volume) {
+  return visit_samples(volume, [](auto samples) {
+    const auto [least, greatest] = std::minmax_element(samples.begin(), samples.end());
+    return fmt::format("{:g} to {:g}", double(*least), double(*greatest));
+  });
+}
+
 Result<void> run(const BuildCommand& options) {
   const auto start = std::chrono::steady_clock::now();
   const auto range = parse_range(options.range);
@@ -79,10 +97,13 @@ Result<void> run(const BuildCommand& options) {
   const std::filesystem::path folder = std::filesystem::absolute(options.output).parent_path();
   if (!std::filesystem::is_directory(folder)) return fail("'" + options.output + "' cannot be written: there is no folder '" + folder.string() + "'");
 
+  if (auto output = check_output(options.input, options.output); !output) return output;
+
   auto volume = read_volume(options.input, *layout);
   if (!volume) return tl::unexpected(volume.error());
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
   volume->name = std::filesystem::path(options.output).stem().string();
+  const std::string values = text_of_values(*volume);
 
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -100,12 +121,15 @@ Result<void> run(const BuildCommand& options) {
   const auto size = std::filesystem::file_size(options.output, code);
   const std::uint64_t file_bytes = code ? 0 : size;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
+    fmt::print(stderr, "intervale: nothing lies in the range: the values are {}\n", values);
+  }
   if (options.json) {
     auto figures = figures_of(*made, file_bytes);
     figures["seconds"] = seconds;
     return print_json(figures);
   }
-  return print(text_of(*made, file_bytes) + fmt::format("wrote {} in {:.2f} s\n", options.output, seconds));
+  return print(text_of(*made, file_bytes) + fmt::format("the volume's values are {}\nwrote {} in {:.2f} s\n", values, options.output, seconds));
 }
 
 }  // namespace

@@ -1,6 +1,9 @@
 #include "server/cli/describe_volume.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <array>
 
 #include "common/printable.h"
 #include "common/program/describe.h"
@@ -22,6 +25,9 @@ std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
   std::string text =
       fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined at its {}\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
                   d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
+  std::array<double, 3> last{};
+  for (std::size_t k = 0; k < 3; ++k) last[k] = d.grid.origin[k] + d.grid.spacing[k] * (d.grid.dims[k] - 1);
+  text += fmt::format("world box ({:g}) to ({:g})\n", fmt::join(d.grid.origin, ", "), fmt::join(last, ", "));
   text += fmt::format("{} updates, {} coefficients, {} supercubes, largest error {:g}\n", d.updates, d.coefficients, volume.set().supercubes(),
                       d.max_error);
   text += fmt::format("full mesh: {} vertices, {} tetrahedra, {} as an indexed mesh\n", d.full.vertices, d.full.tets,

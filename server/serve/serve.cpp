@@ -1,7 +1,9 @@
 #include "server/serve/serve.h"
 
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -30,6 +32,18 @@ std::optional<std::filesystem::path> viewer_beside_the_program() {
   auto folder = (program.parent_path() / ".." / "share" / "intervale" / "viewer").lexically_normal();
   if (!std::filesystem::exists(folder / "index.html", error)) return {};
   return folder;
+}
+
+// Descriptors: as many as connections may take, if that is allowed.
+void make_room_for(std::size_t connections) {
+  constexpr rlim_t kOthers = 64;  // files, listeners, threads
+  rlimit limit{};
+  const rlim_t wanted = connections + kOthers;
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted) return;
+  limit.rlim_cur = std::min(wanted, limit.rlim_max);
+  const bool raised = ::setrlimit(RLIMIT_NOFILE, &limit) == 0;
+  if (raised && limit.rlim_cur >= wanted) return;
+  spdlog::warn("the process may open {} files, and --max-connections is {}: see ulimit -n", limit.rlim_cur, connections);
 }
 
 class LevelSwitch {
@@ -92,6 +106,7 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
     timer.cancel();  // and looks at once
   });
 
+  make_room_for(wanted.max_connections);
   ServeOptions options = wanted;
   if (!options.viewer) options.viewer = viewer_beside_the_program();
   auto server = Server::start(options);

@@ -422,5 +422,31 @@ TEST(Programs, ANameThatIsNoTextIsNoTrouble) {
   EXPECT_TRUE(nlohmann::json::accept(said.out)) << said.out;
 }
 
+TEST(Programs, BuildDoesNotWriteOverWhatItReads) {
+  const TempDir folder;
+  const std::string volume = folder / "volume.nrrd", link = folder / "link.ivm";
+  ASSERT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "9", "-o", volume}).status, 0);
+  std::filesystem::create_symlink(volume, link);
+  const std::string before = contents_of(volume);
+  for (const std::string& output : {volume, link, (folder / "mesh.vtu").string()}) {
+    expect_complaint(run({program("intervale"), "build", volume, "-o", output, "--range", "0", "1"}), 2, output, "intervale: ");
+  }
+  EXPECT_EQ(contents_of(volume), before);
+}
+
+TEST(Programs, ARangeThatHoldsNothingIsSaid) {
+  const TempDir folder;
+  const std::string volume = folder / "volume.nrrd";
+  ASSERT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "9", "-o", volume}).status, 0);
+  const auto empty = run({program("intervale"), "build", volume, "-o", folder / "x.ivm", "--range", "1200", "2000"});
+  EXPECT_EQ(empty.status, 0);
+  EXPECT_THAT(empty.err, HasSubstr("nothing lies in the range: the values are "));
+}
+
+TEST(Programs, AMistakeIsNamedWithTheHelpForIt) {
+  expect_complaint(run({program("intervale"), "bulid", "x"}), 2, "there is no command 'bulid' (see intervale --help)", "intervale: ");
+  expect_complaint(run({program("intervale"), "build", "x", "--rnage"}), 2, "(see intervale build --help)", "intervale: ");
+}
+
 }  // namespace
 }  // namespace intervale
