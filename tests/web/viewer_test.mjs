@@ -392,6 +392,16 @@ test('A server that wants a token is told one, and it never stands in the addres
   const guarded = await serve(data, 0, '--tokens', file);
   const { page, close } = await open(browser, guarded.url);
   await page.waitForSelector('#token-form');
+  assert.equal(await page.isVisible('#token-trouble'), false);
+  await page.fill('#token', 'open-simsim');
+  await page.click('#token-form button[type=submit]');
+  await page.waitForSelector('#token-trouble');
+  assert.match(await page.textContent('#token-trouble'), /not known/);
+  const selected = () => {
+    const { activeElement: field } = document;
+    return field.id === 'token' && field.selectionStart === 0 && field.selectionEnd === field.value.length;
+  };
+  assert.ok(await page.evaluate(selected), 'typing again replaces it');
   await page.fill('#token', 'open-sesame-0123456789abcdef0123456789abcdef');
   await page.click('#token-form button[type=submit]');
   await settled(page);

@@ -101,7 +101,9 @@ function start(): void {
     const listing = await asked;
     element('token-form').hidden = !('needsToken' in listing);
     if ('needsToken' in listing) {
+      element('token-trouble').hidden = live.value.token === null;
       input('token').focus();
+      input('token').select();
       return live.set({ needsToken: true });
     }
     if ('trouble' in listing) return live.set({ trouble: listing.trouble });
@@ -155,6 +157,7 @@ function start(): void {
 
   element('token-form').addEventListener('submit', (event) => {
     event.preventDefault();
+    element('token-trouble').hidden = true;
     live.set({ token: input('token').value });
     void load();
   });
