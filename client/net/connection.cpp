@@ -51,7 +51,7 @@ Result<void> StreamConnection::Socket::shake_hands() {
   if (error == websocket::error::upgrade_declined && response.result() == http::status::service_unavailable) {
     return fail("the server at " + url.authority() + " takes no new sessions now: it is shutting down or full");
   }
-  if (error) return fail(url.authority() + " is not an intervale server: " + error.message());
+  if (error) return fail(http_failure(url, error));
   if (response[http::field::sec_websocket_protocol] != protocol::kSubprotocol) {
     return fail(url.authority() + " is not an intervale server: it does not speak " + protocol::kSubprotocol);
   }

@@ -36,7 +36,7 @@ Result<std::string> http_get(const ServerUrl& url, const std::string& target) {
   auto error = run.within(kAnswerTime, stream, [&](auto done) { http::async_write(stream, request, done); });
   if (!error) error = run.within(kAnswerTime, stream, [&](auto done) { http::async_read(stream, buffer, parser, done); });
   if (error == beast::error::timeout) return fail("no answer from " + url.authority() + " within 10 s: is it an intervale server?");
-  if (error) return fail(url.authority() + " is not an intervale server: " + error.message());
+  if (error) return fail(http_failure(url, error));
   if (!parser.get()[http::field::server].starts_with(protocol::kServerName)) return fail(url.authority() + " is not an intervale server");
   if (parser.get().result() == http::status::unauthorized) return tl::unexpected(unauthorized(url));
   if (parser.get().result() != http::status::ok) {

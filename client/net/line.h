@@ -6,6 +6,7 @@
 #include <boost/beast/core/error.hpp>
 #include <chrono>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "client/net/url.h"
@@ -63,5 +64,8 @@ class BlockingRun {
 
 // "…: certificate has expired; …", if that is what went wrong, or else the error.
 [[nodiscard]] std::string tls_failure(const Stream& stream, const ServerUrl& url, const boost::system::error_code& error);
+
+// "…: is not an intervale server: end of stream; …": what went wrong with an HTTP request, and whether it looks as if TLS was wanted.
+[[nodiscard]] std::string http_failure(const ServerUrl& url, const boost::system::error_code& error);
 
 }  // namespace intervale

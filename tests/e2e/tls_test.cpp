@@ -94,7 +94,13 @@ TEST(Tls, AndWithoutItAreToldApart) {
   const Secured secured;
   ServerUrl plain = secured.url();
   plain.secure = false;
-  EXPECT_FALSE(fetch_coarse(plain));
+  for (const std::string& complaint : {fetch_coarse(plain).error().message, http_get(plain, "/api/datasets").error().message}) {
+    EXPECT_THAT(complaint, testing::AllOf(HasSubstr("is not an intervale server"), HasSubstr("does it want wss://?")));
+  }
+  const Stranger alert(std::string("\x15\x03\x01\x00\x02\x02\x46", 7));  // as OpenSSL's server answers what is no TLS
+  EXPECT_THAT(fetch_coarse(parse_url(alert.url("x")).value()).error().message, HasSubstr("does it want wss://?"));
+  const Stranger page("HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok");
+  EXPECT_THAT(fetch_coarse(parse_url(page.url("x")).value()).error().message, testing::Not(HasSubstr("wss://")));
   const Stranger stranger("220 mail ready\r\n");
   ServerUrl secure = parse_url(stranger.url("x")).value();
   secure.secure = true;
