@@ -55,8 +55,11 @@ asio::awaitable<bool> LoadConnection::open() {
   websocket_->read_message_max(protocol::kMaxServerMessage);
   websocket_->auto_fragment(false);
   websocket_->binary(true);
-  if (const auto [error] = co_await websocket_->async_handshake(plan_.url.authority(), protocol::kPath, kAwait); error) {
-    complaint_ = "no WebSocket to " + plan_.url.authority() + ": " + error.message();
+  websocket::response_type response;
+  const std::string host = plan_.url.authority();
+  if (const auto [error] = co_await websocket_->async_handshake(response, host, protocol::kPath, kAwait); error) {
+    const bool away = error == websocket::error::upgrade_declined && response.result() == http::status::service_unavailable;
+    complaint_ = away ? turned_away(plan_.url, response.body()).message : "no WebSocket to " + host + ": " + error.message();
     co_return false;
   }
   co_return true;

@@ -1,5 +1,6 @@
 #include "client/net/connection.h"
 
+#include <algorithm>
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
 #include <string>
@@ -49,7 +50,7 @@ Result<void> StreamConnection::Socket::shake_hands() {
   if (error == beast::error::timeout) return fail("no answer from " + url.authority() + " within 5 s: is it an intervale server?");
   if (error == websocket::error::upgrade_declined && response.result() == http::status::unauthorized) return tl::unexpected(unauthorized(url));
   if (error == websocket::error::upgrade_declined && response.result() == http::status::service_unavailable) {
-    return fail("the server at " + url.authority() + " takes no new sessions now: it is shutting down or full");
+    return tl::unexpected(turned_away(url, response.body()));
   }
   if (error) return fail(http_failure(url, error));
   if (response[http::field::sec_websocket_protocol] != protocol::kSubprotocol) {
@@ -85,6 +86,13 @@ tl::unexpected<Error> StreamConnection::Socket::faulted(const protocol::Fault& f
 Error unauthorized(const ServerUrl& url) {
   if (url.access.token) return {"the server at " + url.authority() + " does not know the token given"};
   return {"the server at " + url.authority() + " wants a token: --token or INTERVALE_TOKEN"};
+}
+
+Error turned_away(const ServerUrl& url, std::string_view body) {
+  constexpr std::size_t kMost = 80;
+  const std::string_view why = body.substr(0, std::min(body.find_first_of("\r\n"), kMost));
+  const bool told = !why.empty() && why.front() != '<';
+  return {"the server at " + url.authority() + " takes no new sessions now" + (told ? ": " + printable(why) : "")};
 }
 
 StreamConnection::StreamConnection(std::unique_ptr<Socket> socket) : socket_(std::move(socket)) {}

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <string_view>
 
 #include "client/net/url.h"
 #include "common/result.h"
@@ -16,6 +17,9 @@ inline constexpr std::chrono::seconds kSilenceTime{30};  // pings unanswered: th
 
 // The server wants a token, or another one.
 [[nodiscard]] Error unauthorized(const ServerUrl& url);
+
+// The server answered 503 with that body: its first line, cut at 80 bytes, says why, unless it is a page (of some proxy's).
+[[nodiscard]] Error turned_away(const ServerUrl& url, std::string_view body);
 
 // One thread at a time. Every error says which server it is about.
 class StreamConnection {

@@ -4,8 +4,10 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 #include <variant>
 
+#include "client/net/connection.h"
 #include "tests/e2e/support/raw_client.h"
 #include "tests/e2e/support/serving.h"
 
@@ -19,6 +21,7 @@ using protocol::Done;
 using protocol::Open;
 using protocol::Opened;
 using protocol::View;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -65,6 +68,9 @@ TEST(Server, TurnsSessionsAwayAtItsLimits) {
   {
     const auto server = start(options);
     EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
+    const auto opened = StreamConnection::open(parse_url("ws://127.0.0.1:" + std::to_string(server->port())).value());
+    ASSERT_FALSE(opened);
+    EXPECT_THAT(opened.error().message, EndsWith("takes no new sessions now: no room for another session now"));
     EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
   }
   options = {};

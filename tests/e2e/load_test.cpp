@@ -164,6 +164,13 @@ TEST(Load, AServerThatIsNotFoundAgainInTimeIsLost) {
   EXPECT_EQ(figures.at("reconnects"), 0) << finished.out;
 }
 
+TEST(Load, AServerThatIsFullSaysSo) {
+  const ServerProgram narrow(buckyball().string(), {"--max-sessions", "1"});
+  const auto finished = run(command(narrow.url("buckyball"), {"--clients", "4", "--duration", "1"}));
+  EXPECT_EQ(finished.status, 1);
+  EXPECT_THAT(finished.err, testing::EndsWith("takes no new sessions now: no room for another session now\n"));
+}
+
 TEST(Load, ServersThatCannotBeLoadedAreOneLine) {
   expect_complaint(run(command("ws://127.0.0.1:1/x", {"--clients", "1", "--duration", "1"})), 1, "cannot connect to 127.0.0.1:1");
   ServerProgram server;

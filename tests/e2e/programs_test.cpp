@@ -217,6 +217,20 @@ TEST(Programs, AServerThatIsNotOursIsOneLine) {
   expect_complaint(run({client(), "fetch", silent.url("x")}), 1, "no answer from");
 }
 
+TEST(Programs, AServerThatTakesNobodySaysWhy) {
+  const auto complaint_about = [](const std::string& body) {
+    const Stranger stranger("HTTP/1.1 503 Service Unavailable\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+    const auto finished = run({client(), "fetch", stranger.url("x"), "--reconnect", "0"});
+    EXPECT_EQ(finished.status, 1);
+    return finished.err;
+  };
+  EXPECT_THAT(complaint_about("loading\nmore"), testing::EndsWith("takes no new sessions now: loading\n"));
+  EXPECT_THAT(complaint_about("\x1b[2J"), testing::EndsWith("takes no new sessions now: ?[2J\n"));
+  EXPECT_THAT(complaint_about(std::string(500, 'x')), testing::EndsWith("takes no new sessions now: " + std::string(80, 'x') + "\n"));
+  EXPECT_THAT(complaint_about("<html>busy</html>"), testing::EndsWith("takes no new sessions now\n"));
+  EXPECT_THAT(complaint_about(""), testing::EndsWith("takes no new sessions now\n"));
+}
+
 TEST(Programs, APortInUseIsOneLine) {
   ServerProgram server;
   const auto second = run({program("intervale"), "serve", buckyball(), "--listen", "127.0.0.1:" + std::to_string(server.port())});
