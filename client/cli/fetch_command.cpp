@@ -50,7 +50,7 @@ class VolumeSoFar {
 };
 
 Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& options) {
-  Progress progress("receiving " + url.name);
+  Progress progress("receiving " + printable(url.name));
   FetchEvents events;
   events.on_notice = [&progress](const std::string& notice) { progress.note(notice); };
   events.on_batch = [&progress, volume = VolumeSoFar()](const StreamClient& client, const FetchFigures& figures) mutable {

@@ -19,6 +19,7 @@
 #include "client/net/connection.h"
 #include "client/net/fetch.h"
 #include "client/net/line.h"
+#include "common/printable.h"
 #include "common/program/program.h"
 #include "common/program/progress.h"
 
@@ -115,7 +116,7 @@ class Crew {
 
   // Once a second, says on a terminal how far it is; until all have ended.
   void watch(const LoadPlan& plan) {
-    Progress line("loading " + plan.url.name);
+    Progress line("loading " + printable(plan.url.name));
     std::uint64_t updates = 0, bytes = 0;
     std::unique_lock lock(mutex_);
     while (!ended_.wait_for(lock, std::chrono::seconds(1), [this] { return running_ == 0; })) {

@@ -28,6 +28,19 @@ bool is_port(std::string_view port) {
   return failure == std::errc() && stop == port.data() + port.size() && number != 0;
 }
 
+// "a%20b" is "a b"; what is no escape stays as it is.
+std::string unescaped(std::string_view text) {
+  std::string plain;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned char byte = 0;
+    const std::string_view digits = text[i] == '%' ? text.substr(i + 1, 2) : std::string_view();
+    const bool escape = digits.size() == 2 && std::from_chars(digits.data(), digits.data() + 2, byte, 16).ptr == digits.data() + 2;
+    plain += escape ? static_cast<char>(byte) : text[i];
+    i += escape ? 2 : 0;
+  }
+  return plain;
+}
+
 }  // namespace
 
 std::string ServerUrl::authority() const { return (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + port; }
@@ -46,6 +59,7 @@ Result<ServerUrl> parse_url(std::string_view text) {
     rest = rest.substr(0, slash);
   }
   if (!url.name.empty() && url.name.back() == '/') url.name.pop_back();
+  url.name = unescaped(url.name);
   if (url.name.find('/') != std::string::npos) return wrong("a data set's name holds no slash");
 
   const bool bracketed = rest.starts_with('[');

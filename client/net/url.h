@@ -27,8 +27,8 @@ struct ServerUrl {
   [[nodiscard]] std::string server() const { return (secure ? "wss://" : "ws://") + authority(); }
 };
 
-// "ws://host:port" or "ws://host:port/name"; wss:// for TLS. An IPv6 address in brackets; port 80, or 443, if
-// there is none. Misuse: anything else.
+// "ws://host:port" or "ws://host:port/name"; wss:// for TLS. An IPv6 address in brackets; port 80, or 443, if there is none. In the name "%20" is a
+// space and so on, as browsers write it; a % without two hexadecimal digits behind it is itself. Misuse: anything else.
 [[nodiscard]] Result<ServerUrl> parse_url(std::string_view text);
 
 }  // namespace intervale

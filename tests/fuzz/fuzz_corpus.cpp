@@ -123,6 +123,7 @@ void add_accesses(const Corpus& corpus) {
   corpus.add("access", "origin", {3}, "https://Example.org:8080\nexample.ORG:8080\nnull");
   corpus.add("access", "origin-listed", {3}, "http://b:1\na\nhttp://b:1");
   corpus.add("access", "url", {4}, "ws://localhost:8080/bucky ball.2/");
+  corpus.add("access", "url-escapes", {4}, "ws://a:1/50%25%%2g%");
   corpus.add("access", "url-6", {4}, "wss://[fe80::1%eth0]:9/x");
   corpus.add("access", "url-bare", {4}, "ws://a-b_c.example");
 }

@@ -28,6 +28,16 @@ TEST(Url, NameAndPortMayBeMissing) {
   EXPECT_EQ(parse_url("ws://a.example:81/x/").value().name, "x");
 }
 
+TEST(Url, EscapesInTheNameAreReadAndOthersStay) {
+  const auto name_of = [](const std::string& name) { return parse_url("ws://a:1/" + name).value().name; };
+  EXPECT_EQ(name_of("bucky%20ball.2"), "bucky ball.2");
+  EXPECT_EQ(name_of("%C3%a9t%C3%A9"), "\u00e9t\u00e9");
+  EXPECT_EQ(name_of("50%25"), "50%");
+  EXPECT_EQ(name_of("%2525"), "%25") << "once only";
+  for (const char* name : {"50%", "%2", "%2g", "%-1", "%+1", "%0x", "% 1", "a+b"}) EXPECT_EQ(name_of(name), name);
+  EXPECT_FALSE(parse_url("ws://a:1/x%2Fy")) << "it is a slash all the same";
+}
+
 TEST(Url, SaysWhetherTheLineIsToBeSecure) {
   EXPECT_EQ(parse_url("ws://a:1/x").value().server(), "ws://a:1");
   EXPECT_EQ(parse_url("wss://a:1/x").value().server(), "wss://a:1");
