@@ -78,7 +78,6 @@ tl::unexpected<Error> StreamConnection::Socket::faulted(const protocol::Fault& f
   }
   if (fault.code == CloseCode::unauthorized) return tl::unexpected(unauthorized(url));
   if (fault.code == CloseCode::forbidden) return fail("the token given does not open '" + url.name + "' at " + url.server());
-  if (fault.code == CloseCode::going_away) return fail("the server at " + url.authority() + " is shutting down");
   return fail("the server at " + url.authority() + " ended the session: " + text + " (code " + std::to_string(static_cast<unsigned>(fault.code)) +
               ")");
 }

@@ -86,15 +86,5 @@ TEST(Http, WhatIsNoRequestIsToldSo) {
   EXPECT_THAT(talk(server->port(), upgrade), StartsWith("HTTP/1.1 400"));  // our subprotocol is not offered
 }
 
-TEST(Http, WhatThereIsIsNotToldBeforeItIsKnown) {
-  ServeOptions options;
-  options.listen = "127.0.0.1:0";
-  const auto server = Server::start(options);
-  ASSERT_TRUE(server);
-  EXPECT_THAT(get((*server)->port(), "/api/datasets"), testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading")));
-  (*server)->offer({});
-  EXPECT_THAT(get((*server)->port(), "/api/datasets"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("[]")));
-}
-
 }  // namespace
 }  // namespace intervale

@@ -422,7 +422,7 @@ TEST(Programs, SigtermEndsTheServerInOrderWhileAClientStreams) {
   EXPECT_THAT(served.err, HasSubstr("stopped"));
   // Whether the last batch or the signal was first is not for the test to say.
   if (fetched.status != 0) {
-    expect_complaint(fetched, 1, "shutting down");
+    expect_complaint(fetched, 1, "the server shuts down");
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   }
 }

@@ -13,7 +13,7 @@ export class Thickness {
   readonly trouble: string | null; // why it cannot be drawn, or not well
   readonly possible: boolean;
   most = 1; // world units at the end of the ramp; follows the picture
-  onMost: () => void = () => {}; // it has changed: to be drawn again
+  onMost: () => void = () => {}; // it has changed, or may: to be drawn again
   private precise: boolean;
   private target: WebGLRenderTarget | null = null;
   private overMaterial = overMaterial(kThicknessOverFragment, { sums: { value: null }, most: { value: 1 } });
@@ -23,6 +23,7 @@ export class Thickness {
   private mostTarget = new WebGLRenderTarget(kBlocks, kBlocks, { type: FloatType, depthBuffer: false });
   private mosts = new Float32Array(4 * kBlocks * kBlocks);
   private reading = false;
+  private missed = false; // a picture was drawn meanwhile, perhaps another one
 
   constructor(renderer: WebGLRenderer) {
     this.possible = renderer.extensions.has('EXT_color_buffer_float');
@@ -50,8 +51,12 @@ export class Thickness {
   // Looks for the greatest thickness in the picture, without waiting for it. The ramp's end is a round number above that, and stays while the
   // greatest is above a third of it: so colours are still while one turns.
   private async follow(renderer: WebGLRenderer, camera: Camera): Promise<void> {
-    if (this.reading) return;
+    if (this.reading) {
+      this.missed = true;
+      return;
+    }
     this.reading = true;
+    this.missed = false;
     renderer.setRenderTarget(this.mostTarget);
     renderer.render(this.mostOver, camera);
     try {
@@ -62,9 +67,9 @@ export class Thickness {
       this.reading = false;
     }
     const greatest = this.mosts.reduce((most, x, i) => (i % 4 === 0 && x > most ? x : most), 0);
-    if (!(greatest > 0) || (greatest <= this.most && greatest > this.most / 3)) return;
-    this.most = roundAbove(greatest);
-    this.onMost();
+    const fits = !(greatest > 0) || (greatest <= this.most && greatest > this.most / 3);
+    if (!fits) this.most = roundAbove(greatest);
+    if (!fits || this.missed) this.onMost();
   }
 
   private obtained(renderer: WebGLRenderer): WebGLRenderTarget {
