@@ -51,6 +51,9 @@ TEST(Faults, WithoutDescriptorsWhoIsInGoesOnAndOthersComeInLater) {
 
 // What the server reads while it runs, it reads once it can: a token that was taken out must not stay.
 TEST(Faults, WithoutDescriptorsFilesAreReadLater) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer opens a pipe to look at an object of a new type, and takes it for none if it cannot";
+#endif
   const TempDir folder;
   const std::filesystem::path data = folder / "data", tokens = folder.file("tokens", "old\n");
   std::filesystem::create_directory(data);
