@@ -198,7 +198,8 @@ void LoadClient::take(const protocol::Done& done) {
 
 void LoadClient::take(const protocol::Fault& fault) {
   ++figures_.protocol_closes;
-  const std::string what = "the server ended the session: " + printable(fault.text) + " (code " + std::to_string(static_cast<unsigned>(fault.code)) + ")";
+  const std::string what =
+      "the server ended the session: " + printable(fault.text) + " (code " + std::to_string(static_cast<unsigned>(fault.code)) + ")";
   if (is_to_be_found_again(static_cast<unsigned>(fault.code))) return lose(what);
   fail(what);
 }

@@ -61,10 +61,10 @@ struct HttpState {
 };
 
 // GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists
-// the data sets. A query is ignored. Pages of allowed origins may read /api/datasets, with a token (CORS, Fetch standard, 3.2); until it is known what
-// there is, it is 503. With no scope 401 for
-// what tells of data sets; with one that is not everything 403 for /metrics, which tells of all, unless it has a door of its own. 405 for other
-// methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET; whoever sends it leaves the body out.
+// the data sets. A query is ignored. Pages of allowed origins may read /api/datasets, with a token (CORS, Fetch standard, 3.2); until it is known
+// what there is, it is 503. With no scope 401 for what tells of data sets; with one that is not everything 403 for /metrics, which tells of all,
+// unless it has a door of its own. 405 for other methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET;
+// whoever sends it leaves the body out.
 [[nodiscard]] HttpAnswer answer(const HttpRequest& request, const HttpState& state);
 
 }  // namespace intervale
