@@ -268,11 +268,12 @@ void print_rows(const std::vector<Row>& rows) {
     fmt::print(" {:.2f} |\n", r.done_bytes / r.least_bytes);
   }
   fmt::print(
-      "\nBytes until 99 % of {} points on the full mesh's surface, those in the picture of 1920 x 1080, are off by no more than that on the screen;\n"
-      "between measurements by interpolation. Ideal: one update at a time, greatest projected error first, each with the ancestors it lacks, and "
-      "its\n"
-      "bytes are the fewest that the updates so far can be had for, as if they had come at once. By level: coarse before fine, as a level-of-detail\n"
-      "pyramid comes. By field error: the same wherever one looks. When done: what was sent for a pixel error of 1, and the fewest bytes for that.\n",
+      "\nBytes until 99 % of {} points are off by at most that many pixels on the screen. The points lie on the surface of the\n"
+      "full mesh, within the picture of 1920 x 1080. Values between measurements are interpolated. Ideal: one update at a time,\n"
+      "the greatest projected error first, each with the ancestors that it lacks; its bytes are what the updates so far would\n"
+      "take in one batch, the fewest possible. By level: coarse before fine, as a level-of-detail pyramid is sent. By field\n"
+      "error: the same order whatever the view. When done: the bytes sent for a pixel error of 1, over the fewest bytes for\n"
+      "that.\n",
       kPoints);
 }
 

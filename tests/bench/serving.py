@@ -88,8 +88,8 @@ with tempfile.TemporaryDirectory() as folder:
         for server in servers.values():
             server.process.kill()
     first = next(iter(servers))
-    print(f"{options.clients} clients at once, each the whole stream of {updates:,.0f} updates; {options.runs} rounds, the servers in turns; median (least, greatest). The processor time is the server's.\n")
-    print("| server | CPU s | to the first | updates a second | to the first |\n|---|---|---|---|---|")
+    print(f"{options.clients} clients at once, each receiving the whole stream of {updates:,.0f} updates; {options.runs} rounds, the servers in turn; median\n(least, greatest). The processor time is the server's.\n")
+    print("| server | CPU s | relative to the first | updates a second | relative to the first |\n|---|---|---|---|---|")
     for name in servers:
         time, speed = times[name], speeds[name]
         ratios = [statistics.median(a / b for a, b in zip(these[name], these[first])) for these in (times, speeds)]

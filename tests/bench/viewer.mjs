@@ -42,9 +42,9 @@ rmSync(folder, { recursive: true });
 const rows = [
   ['updates decoded and applied in the worker, a second', median(figures.speed).toLocaleString('en', { maximumFractionDigits: 0 })],
   ['the native client, the same stream', median(figures.native).toLocaleString('en', { maximumFractionDigits: 0 })],
-  ['share of the native speed', median(figures.speed.map((speed, i) => speed / figures.native[i])).toFixed(2)],
-  ['longest time that the page was held up by streaming', `${median(figures.block).toFixed(1)} ms`],
-  ['downloaded before data, gzipped', `${(median(figures.size) / 1000).toFixed(0)} kB`],
+  ['relative to the native speed', median(figures.speed.map((speed, i) => speed / figures.native[i])).toFixed(2)],
+  ['longest time that streaming blocked the page', `${median(figures.block).toFixed(1)} ms`],
+  ['downloaded before any data, gzipped', `${(median(figures.size) / 1000).toFixed(0)} kB`],
   [`from navigation to the first mesh of ${smallName}`, `${median(figures.first).toFixed(0)} ms`],
   ['memory of the worker\'s core for a million updates', `${(median(figures.memory) / 1e6).toFixed(0)} MB`],
 ];

@@ -162,8 +162,8 @@ def main():
     options = parser.parse_args()
     if options.runs < 1:
         parser.error("--runs: at least 1")
-    print(f"VTK {vtkVersion.GetVTKVersion()}, one thread; ours on one core; {options.runs} runs in turn, medians.\n")
-    print("| volume, range | | ms | cells | as tetrahedra | M cells/s | M tetrahedra/s | its time / ours | our tetrahedra/s / its | its volume |")
+    print(f"VTK {vtkVersion.GetVTKVersion()} with one thread; Intervale on one core; medians of {options.runs} interleaved runs.\n")
+    print("| volume, range | | ms | cells | as tetrahedra | M cells/s | M tetrahedra/s | time of VTK / ours | our tetrahedra/s / VTK's | VTK's volume |")
     print("|---|---|--:|--:|--:|--:|--:|--:|--:|--:|")
     all_ratios = []
     for text in options.cases:
@@ -172,10 +172,10 @@ def main():
         all_ratios.append(ratios)
         for row in rows:
             print("| " + " | ".join(row) + " |", flush=True)
-    print("\nAs tetrahedra: a wedge 3, a hexahedron or voxel 5, a pyramid 2. Volume: against ours; in an image VTK interpolates otherwise.")
-    for to_tets, what in ((True, "made into tetrahedra"), (False, "as its mixed cells are, counted as tetrahedra")):
+    print("\nAs tetrahedra: a wedge counts 3, a hexahedron or voxel 5, a pyramid 2. Volume: relative to ours; in an image VTK\ninterpolates differently.")
+    for to_tets, what in ((True, "converted to tetrahedra"), (False, "with mixed cells")):
         of_leb = [ratios["LEB", to_tets] for ratios in all_ratios]
-        print(f"\nOurs against VTK's two clips of the same LEB tetrahedra, {what}: {min(of_leb):.1f} to {max(of_leb):.1f} times the tetrahedra a second.")
+        print(f"\nTetrahedra a second, ours over VTK's two clips of the same LEB tetrahedra, {what}: {min(of_leb):.1f} to {max(of_leb):.1f}.")
 
 
 if __name__ == "__main__":
