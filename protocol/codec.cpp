@@ -1,6 +1,6 @@
 #include "protocol/codec.h"
 
-#include "common/split_names.h"
+#include "common/codec/split_names.h"
 
 #include <cmath>
 #include <cstring>

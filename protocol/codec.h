@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "protocol/messages.h"
 
 namespace intervale::protocol {

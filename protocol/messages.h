@@ -7,9 +7,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/description.h"
-#include "common/lod.h"
-#include "common/supercube.h"
+#include "common/diamond/supercube.h"
+#include "common/patch/description.h"
+#include "common/view/lod.h"
 #include "protocol/limits.h"
 
 namespace intervale::protocol {
@@ -83,7 +83,7 @@ struct Batch {
   double remaining_error = 0;   // the largest saturated error; field units
   double remaining_pixels = 0;  // the largest error on the camera's screen; 0 without a camera
   std::uint64_t updates_to_go = 0;
-  std::vector<std::uint8_t> payload;  // updates; see common/update_codec.h
+  std::vector<std::uint8_t> payload;  // updates; see common/codec/batch.h
   friend bool operator==(const Batch&, const Batch&) = default;
 };
 // The credit that a Batch takes: client and server count alike, and never less than the message's bytes.

@@ -10,13 +10,13 @@
 #include "client/cli/commands.h"
 #include "client/net/fetch.h"
 #include "client/program/access_options.h"
-#include "common/mesh_digest.h"
-#include "common/mesh_writer.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "common/mesh/mesh_digest.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
-#include "common/printable.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
+#include "common/util/printable.h"
 
 namespace intervale {
 namespace {

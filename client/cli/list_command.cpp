@@ -7,7 +7,7 @@
 #include "client/cli/commands.h"
 #include "client/net/http_get.h"
 #include "client/program/access_options.h"
-#include "common/printable.h"
+#include "common/util/printable.h"
 
 namespace intervale {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/view.h"
+#include "common/view/screen_error.h"
 
 namespace intervale {
 namespace {

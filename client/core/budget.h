@@ -9,8 +9,8 @@
 #include <functional>
 #include <vector>
 
-#include "common/front.h"
-#include "common/lod.h"
+#include "common/front/front.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base.h"
-#include "common/update_codec.h"
+#include "common/codec/root_patch.h"
+#include "common/front/batch_decoder.h"
 
 namespace intervale {
 

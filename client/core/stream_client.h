@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "client/core/budget.h"
-#include "common/description.h"
-#include "common/front.h"
-#include "common/mesh.h"
-#include "common/result.h"
+#include "common/front/front.h"
+#include "common/mesh/mesh.h"
+#include "common/patch/description.h"
+#include "common/util/result.h"
 
 namespace intervale {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "common/lod.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <variant>
 
-#include "common/printable.h"
+#include "common/util/printable.h"
 #include "protocol/codec.h"
 
 namespace intervale {

@@ -10,7 +10,7 @@
 #include "client/core/stream_client.h"
 #include "client/load/camera_paths.h"
 #include "client/net/url.h"
-#include "common/description.h"
+#include "common/patch/description.h"
 
 namespace intervale {
 

@@ -19,9 +19,9 @@
 #include "client/net/connection.h"
 #include "client/net/fetch.h"
 #include "client/net/line.h"
-#include "common/printable.h"
 #include "common/program/program.h"
 #include "common/program/progress.h"
+#include "common/util/printable.h"
 
 namespace intervale {
 namespace {

@@ -9,7 +9,7 @@
 #include "client/load/camera_paths.h"
 #include "client/load/figures.h"
 #include "client/net/url.h"
-#include "common/result.h"
+#include "common/util/result.h"
 #include "protocol/limits.h"
 
 namespace intervale {

@@ -11,7 +11,7 @@
 #include "client/core/stream_client.h"
 #include "client/load/figures.h"
 #include "client/load/load_plan.h"
-#include "common/result.h"
+#include "common/util/result.h"
 #include "protocol/messages.h"
 
 namespace intervale {

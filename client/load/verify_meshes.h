@@ -6,8 +6,8 @@
 #include <span>
 
 #include "client/core/stream_client.h"
-#include "common/front.h"
-#include "common/mesh.h"
+#include "common/front/front.h"
+#include "common/mesh/mesh.h"
 
 namespace intervale {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "client/net/line.h"
-#include "common/printable.h"
+#include "common/util/printable.h"
 #include "protocol/codec.h"
 
 namespace intervale {

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "client/net/url.h"
-#include "common/result.h"
+#include "common/util/result.h"
 #include "protocol/messages.h"
 
 namespace intervale {

@@ -9,8 +9,8 @@
 
 #include "client/core/stream_client.h"
 #include "client/net/url.h"
-#include "common/lod.h"
-#include "common/result.h"
+#include "common/util/result.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "client/net/url.h"
-#include "common/result.h"
+#include "common/util/result.h"
 
 namespace intervale {
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "client/net/url.h"
-#include "common/result.h"
+#include "common/util/result.h"
 #include "protocol/transport/stream.h"
 
 namespace intervale {

@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "common/front.h"
-#include "common/front_patches.h"
+#include "common/front/front.h"
+#include "common/front/front_patches.h"
 
 namespace intervale {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/view/skin.h"
-#include "common/lod.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 

@@ -12,8 +12,8 @@
 
 #include "client/core/grants.h"
 #include "client/core/stream_client.h"
-#include "common/lod.h"
-#include "common/result.h"
+#include "common/util/result.h"
+#include "common/view/lod.h"
 #include "protocol/messages.h"
 
 namespace intervale {

@@ -9,7 +9,7 @@
 
 #include "common/picture/triangles.h"
 #include "common/picture/viewpoint.h"
-#include "common/result.h"
+#include "common/util/result.h"
 
 namespace intervale {
 

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <optional>
 
-#include "common/lod.h"
-#include "common/mesh.h"
-#include "common/plane_cut.h"
-#include "common/result.h"
+#include "common/mesh/mesh.h"
+#include "common/mesh/plane_cut.h"
+#include "common/util/result.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 

@@ -5,7 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "common/mesh_writer.h"
+#include "common/mesh/boundary.h"
+#include "common/mesh/io/mesh_writer.h"
 
 namespace intervale {
 namespace {

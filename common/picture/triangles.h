@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "common/mesh.h"
+#include "common/mesh/mesh.h"
 #include "common/picture/viewpoint.h"
 
 namespace intervale {

@@ -4,8 +4,8 @@
 #include <array>
 #include <optional>
 
-#include "common/lod.h"
-#include "common/plane_cut.h"
+#include "common/mesh/plane_cut.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 

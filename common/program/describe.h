@@ -3,7 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "common/description.h"
+#include "common/patch/description.h"
 
 namespace intervale {
 

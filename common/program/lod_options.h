@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "common/lod.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 

@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "common/printable.h"
+#include "common/util/printable.h"
 
 namespace intervale {
 namespace {

@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/result.h"
+#include "common/util/result.h"
 
 namespace intervale {
 

@@ -12,7 +12,7 @@
 #include <span>
 #include <string>
 
-#include "common/result.h"
+#include "common/util/result.h"
 
 namespace intervale {
 

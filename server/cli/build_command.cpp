@@ -8,10 +8,10 @@
 #include <memory>
 #include <optional>
 
-#include "common/ivm_file.h"
+#include "common/ivm/ivm_file.h"
 #include "common/program/progress.h"
-#include "server/build/all_cores.h"
-#include "server/build/field_hierarchy.h"
+#include "server/builder/all_cores.h"
+#include "server/builder/field_hierarchy.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"

@@ -5,9 +5,9 @@
 
 #include <array>
 
-#include "common/printable.h"
 #include "common/program/describe.h"
 #include "common/program/program.h"
+#include "common/util/printable.h"
 
 namespace intervale {
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "common/interval_volume.h"
+#include "common/ivm/interval_volume.h"
 
 namespace intervale {
 

@@ -7,16 +7,16 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "common/extraction.h"
-#include "common/ivm_file.h"
-#include "common/mesh_digest.h"
-#include "common/mesh_writer.h"
+#include "common/ivm/extraction.h"
+#include "common/ivm/ivm_file.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "common/mesh/mesh_digest.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
-#include "common/printable.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
-#include "server/build/all_cores.h"
+#include "common/util/printable.h"
+#include "server/builder/all_cores.h"
 #include "server/cli/commands.h"
 
 namespace intervale {

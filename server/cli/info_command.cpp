@@ -1,8 +1,9 @@
 #include <filesystem>
 #include <memory>
 
-#include "common/ivm_file.h"
-#include "common/printable.h"
+#include "common/ivm/ivm_file.h"
+#include "common/ivm/verify.h"
+#include "common/util/printable.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 
@@ -30,7 +31,7 @@ Result<void> info(const InfoCommand& options) {
 Result<void> verify(const InfoCommand& options) {
   const auto volume = load_ivm(options.file);
   if (!volume) return tl::unexpected(volume.error());
-  if (auto valid = (*volume)->validate(); !valid) return fail(options.file + ": " + valid.error().message);
+  if (auto valid = validate(**volume); !valid) return fail(options.file + ": " + valid.error().message);
   if (options.json) return print_json({{"file", options.file}, {"valid", true}, {"updates", (*volume)->size()}});
   return print(printable(options.file) + ": all checksums and invariants hold (" + std::to_string((*volume)->size()) + " updates)\n");
 }

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/result.h"
+#include "common/util/result.h"
 
 namespace intervale {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include "common/printable.h"
+#include "common/util/printable.h"
 #include "protocol/limits.h"
 
 namespace intervale {

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "common/interval_volume.h"
-#include "common/result.h"
+#include "common/ivm/interval_volume.h"
+#include "common/util/result.h"
 
 namespace intervale {
 

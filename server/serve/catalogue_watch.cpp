@@ -7,7 +7,7 @@
 #include <system_error>
 #include <utility>
 
-#include "common/ivm_file.h"
+#include "common/ivm/ivm_file.h"
 #include "server/serve/guard.h"
 
 namespace intervale {

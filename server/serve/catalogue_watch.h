@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/file_stamp.h"
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/serve/context.h"
 #include "server/serve/http_routes.h"
 

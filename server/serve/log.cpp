@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "common/printable.h"
+#include "common/util/printable.h"
 
 namespace intervale {
 namespace {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/serve/log.h"
 #include "server/serve/options.h"
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/options.h"
 

@@ -7,12 +7,12 @@
 #include <string>
 #include <utility>
 
+#include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 #include "server/serve/access.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/replaceable.h"
-#include "server/serve/stream_plan.h"
 
 namespace intervale {
 

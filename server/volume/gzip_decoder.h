@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/volume/input_file.h"
 
 namespace intervale {

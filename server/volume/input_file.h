@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/volume/volume.h"
 
 namespace intervale {

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/volume/volume.h"
 
 namespace intervale {

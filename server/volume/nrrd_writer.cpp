@@ -3,7 +3,7 @@
 #include <charconv>
 #include <string>
 
-#include "common/atomic_file.h"
+#include "common/util/atomic_file.h"
 
 namespace intervale {
 namespace {

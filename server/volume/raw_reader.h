@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/volume/volume.h"
 
 namespace intervale {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/volume/raw_reader.h"
 #include "server/volume/volume.h"
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "common/result.h"
+#include "common/util/result.h"
 #include "server/volume/volume.h"
 
 namespace intervale {

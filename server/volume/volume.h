@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/grid.h"
+#include "common/diamond/grid.h"
 
 namespace intervale {
 

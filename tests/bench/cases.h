@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "common/description.h"
-#include "common/result.h"
+#include "common/patch/description.h"
+#include "common/util/result.h"
 #include "server/volume/volume.h"
 
 namespace intervale::bench {

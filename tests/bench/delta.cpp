@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "common/base.h"
-#include "common/supercube.h"
-#include "server/build/interpolation_error.h"
-#include "server/build/outline.h"
+#include "common/codec/root_patch.h"
+#include "common/diamond/supercube.h"
+#include "server/builder/interpolation_error.h"
+#include "server/builder/outline.h"
 
 namespace intervale::bench {
 namespace {

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "common/description.h"
-#include "common/front.h"
+#include "common/front/front.h"
+#include "common/patch/description.h"
 #include "server/volume/volume.h"
 
 namespace intervale::bench {

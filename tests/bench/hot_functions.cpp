@@ -6,15 +6,16 @@
 
 #include "bench/cases.h"
 #include "bench/delta.h"
-#include "common/base.h"
-#include "common/extraction.h"
-#include "common/ivm_file.h"
-#include "common/prediction.h"
-#include "common/refinement.h"
-#include "common/update_codec.h"
+#include "common/codec/prediction.h"
+#include "common/codec/root_patch.h"
+#include "common/front/batch_decoder.h"
+#include "common/ivm/batch_encoder.h"
+#include "common/ivm/extraction.h"
+#include "common/ivm/ivm_file.h"
+#include "common/ivm/refinement.h"
+#include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
-#include "server/build/field_hierarchy.h"
-#include "server/serve/stream_plan.h"
+#include "server/builder/field_hierarchy.h"
 
 namespace intervale::bench {
 namespace {

@@ -12,11 +12,11 @@
 
 #include "bench/cases.h"
 #include "bench/timing.h"
-#include "common/extraction.h"
-#include "common/ivm_file.h"
-#include "common/mesh_writer.h"
+#include "common/ivm/extraction.h"
+#include "common/ivm/ivm_file.h"
+#include "common/mesh/io/mesh_writer.h"
 #include "common/program/program.h"
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 
 namespace intervale::bench {
 namespace {

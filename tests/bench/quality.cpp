@@ -21,11 +21,13 @@
 
 #include "bench/cases.h"
 #include "client/core/stream_client.h"
-#include "common/mesh_writer.h"
-#include "common/refinement.h"
+#include "common/front/batch_decoder.h"
+#include "common/ivm/refinement.h"
+#include "common/mesh/boundary.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
-#include "server/build/field_hierarchy.h"
-#include "server/serve/stream_plan.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/cameras.h"
 #include "support/surfaces.h"
 

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <string>
 
-#include "common/ivm_file.h"
-#include "common/refinement.h"
-#include "common/update_codec.h"
+#include "common/ivm/ivm_file.h"
+#include "common/ivm/refinement.h"
+
 #include "fuzz/small_volumes.h"
 #include "protocol/codec.h"
 #include "support/batches.h"

@@ -12,7 +12,7 @@
 #include <string>
 
 #include "fuzz/lines.h"
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 #include "server/serve/http_routes.h"
 #include "support/analytic_fields.h"
 #include "support/temp_dir.h"

@@ -1,7 +1,8 @@
 // Bytes as an interval volume file, without the shield of checksums and compression (plain_sections.cpp).
 #include <cstdlib>
 
-#include "common/ivm_file.h"
+#include "common/ivm/ivm_file.h"
+#include "common/ivm/verify.h"
 #include "fuzz/small_volumes.h"
 
 namespace {
@@ -24,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (decoded.error().message.empty()) std::abort();
     return 0;
   }
-  (void)decoded->validate();
+  (void)validate(*decoded);
   if (!intervale::decode_ivm(intervale::encode_ivm(*decoded), "again")) std::abort();
   return 0;
 }

@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "common/refinement.h"
-#include "common/update_codec.h"
+#include "common/front/batch_decoder.h"
+#include "common/ivm/refinement.h"
 #include "fuzz/small_volumes.h"
 #include "support/batches.h"
 

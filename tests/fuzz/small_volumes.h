@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "common/interval_volume.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/interval_volume.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 
 namespace intervale::testing {

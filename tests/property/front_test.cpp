@@ -1,5 +1,5 @@
 // Laws of the front: the mesh depends only on which diamonds are split, and merging undoes splitting.
-#include "common/front.h"
+#include "common/front/front.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <random>
 #include <set>
 
-#include "common/extraction.h"
-#include "common/update.h"
-#include "server/build/field_hierarchy.h"
+#include "common/front/split_update.h"
+#include "common/ivm/extraction.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/mesh_laws.h"
 

@@ -4,9 +4,10 @@
 #include <limits>
 #include <random>
 
-#include "common/extraction.h"
-#include "common/mesh_writer.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/extraction.h"
+#include "common/ivm/verify.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/mesh_laws.h"
 #include "support/naive_volume.h"
@@ -89,7 +90,7 @@ TEST_P(Property, EveryLevelOfDetailIsRight) {
   const FieldHierarchy delta(trial.volume, trial.options);
   const auto sigma = delta.compact();
   ASSERT_TRUE(sigma) << sigma.error().message;
-  const auto valid = sigma->validate();
+  const auto valid = validate(*sigma);
   ASSERT_TRUE(valid) << valid.error().message;
 
   std::mt19937 random(GetParam() + 1000);
@@ -129,7 +130,7 @@ TEST_P(Property, EveryLevelOfDetailIsRight) {
     EXPECT_NEAR(volume_of(mesh) / unit, naive.volume, 0.01 * naive.cut_volume + 1e-9);
     // The same mesh from the field's hierarchy.
     if (level < 3) {
-      const double threshold = error_of(lod, sigma->description());
+      const double threshold = error_of(lod, sigma->description().max_error);
       const SplitSet from_delta = select(delta.set(), [&](const Place& p) { return threshold == 0 || double(sigma->error(p.index)) > threshold; });
       EXPECT_EQ(from_delta, split);
       const auto again = extract(g, delta.base(), delta.set(), from_delta, [&](Front& front, Front::Handle handle, const Place& p) {
@@ -153,7 +154,7 @@ TEST_P(Property, BoxesThatDoNotNestKeepTheGuaranteeAtSamples) {
   ASSERT_TRUE(sigma);
   Lod lod;
   lod.error_percent = 15;
-  const double epsilon = error_of(lod, sigma->description());
+  const double epsilon = error_of(lod, sigma->description().max_error);
   const auto extracted = extract(*sigma, lod);
   ASSERT_TRUE(extracted);
   const Mesh mesh = extracted->front.mesh();

@@ -1,5 +1,5 @@
 // Laws of what a camera gets: on its screen the mesh is as far from the full one as was asked for, and no further.
-#include "common/view.h"
+#include "common/view/screen_error.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "common/extraction.h"
-#include "common/mesh_writer.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/extraction.h"
+#include "common/mesh/boundary.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/cameras.h"
 #include "support/surfaces.h"

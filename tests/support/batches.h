@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "common/update_codec.h"
+#include "common/ivm/batch_encoder.h"
 
 namespace intervale::testing {
 

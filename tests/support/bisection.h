@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "common/diamond.h"
+#include "common/diamond/diamond.h"
 
 namespace intervale::testing {
 

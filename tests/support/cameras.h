@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "common/grid.h"
-#include "common/lod.h"
+#include "common/diamond/grid.h"
+#include "common/view/lod.h"
 
 namespace intervale::testing {
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "common/grid.h"
-#include "common/mesh.h"
+#include "common/diamond/grid.h"
+#include "common/mesh/mesh.h"
 
 namespace intervale::testing {
 

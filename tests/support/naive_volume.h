@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "common/domain.h"
+#include "common/diamond/domain.h"
 #include "support/analytic_fields.h"
 #include "support/bisection.h"
 

@@ -1,7 +1,7 @@
 // An interval volume taken apart, for tests that put it together wrongly.
 #pragma once
 
-#include "common/interval_volume.h"
+#include "common/ivm/interval_volume.h"
 
 namespace intervale::testing {
 

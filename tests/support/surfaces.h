@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "common/mesh.h"
+#include "common/mesh/mesh.h"
 #include "support/cameras.h"
 
 namespace intervale::testing {

@@ -1,4 +1,4 @@
-#include "common/atomic_file.h"
+#include "common/util/atomic_file.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -9,9 +9,9 @@
 #include <random>
 
 #include "client/core/stream_client.h"
-#include "common/extraction.h"
-#include "server/build/field_hierarchy.h"
-#include "server/serve/stream_plan.h"
+#include "common/ivm/extraction.h"
+#include "common/selection/stream_plan.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/cameras.h"
 #include "support/mesh_laws.h"

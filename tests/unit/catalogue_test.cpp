@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 #include "server/serve/http_routes.h"
 #include "support/analytic_fields.h"
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "common/ivm_file.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/ivm_file.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/temp_dir.h"
 

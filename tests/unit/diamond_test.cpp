@@ -1,4 +1,4 @@
-#include "common/diamond.h"
+#include "common/diamond/diamond.h"
 
 #include <gtest/gtest.h>
 

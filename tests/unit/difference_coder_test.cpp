@@ -1,4 +1,4 @@
-#include "common/difference_coder.h"
+#include "common/codec/difference_coder.h"
 
 #include <gtest/gtest.h>
 

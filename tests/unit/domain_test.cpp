@@ -1,4 +1,4 @@
-#include "common/domain.h"
+#include "common/diamond/domain.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
@@ -13,8 +13,9 @@
 #include <random>
 #include <set>
 
-#include "common/ivm_file.h"
-#include "server/build/error_levels.h"
+#include "common/ivm/ivm_file.h"
+#include "common/ivm/verify.h"
+#include "server/builder/error_levels.h"
 #include "support/analytic_fields.h"
 #include "support/bisection.h"
 
@@ -246,7 +247,7 @@ TEST_P(Extremes, AreBuiltInSecondsAndAreValid) {
   if (volume.grid.sample_count() > 8) {
     EXPECT_GT(sigma->size(), 0u);
   }
-  const auto valid = sigma->validate();
+  const auto valid = validate(*sigma);
   EXPECT_TRUE(valid) << valid.error().message;
 }
 

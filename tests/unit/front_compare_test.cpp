@@ -3,10 +3,10 @@
 
 #include <random>
 
-#include "common/base.h"
-#include "common/extraction.h"
-#include "common/front.h"
-#include "server/build/field_hierarchy.h"
+#include "common/codec/root_patch.h"
+#include "common/front/front.h"
+#include "common/ivm/extraction.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/mesh_laws.h"
 

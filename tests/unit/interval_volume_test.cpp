@@ -1,4 +1,5 @@
-#include "common/interval_volume.h"
+#include "common/ivm/interval_volume.h"
+#include "common/ivm/verify.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "server/build/field_hierarchy.h"
-#include "server/build/surface_moves.h"
+#include "server/builder/field_hierarchy.h"
+#include "server/builder/surface_moves.h"
 #include "support/analytic_fields.h"
 #include "support/parts.h"
 
@@ -25,7 +26,7 @@ class IntervalVolumeValidate : public ::testing::Test {
 
 TEST_F(IntervalVolumeValidate, PassesWhatWasBuilt) {
   ASSERT_TRUE(made_);
-  EXPECT_TRUE(made_->validate());
+  EXPECT_TRUE(validate(*made_));
   const auto again = IntervalVolume::assemble(testing::parts_of(*made_));
   ASSERT_TRUE(again);
   EXPECT_EQ(again->description(), made_->description());
@@ -34,16 +35,16 @@ TEST_F(IntervalVolumeValidate, PassesWhatWasBuilt) {
 TEST_F(IntervalVolumeValidate, FindsALargestErrorThatIsNone) {
   auto parts = testing::parts_of(*made_);
   parts.description.max_error = 1e6;
-  EXPECT_FALSE(IntervalVolume::assemble(std::move(parts))->validate());
+  EXPECT_FALSE(validate(*IntervalVolume::assemble(std::move(parts))));
 }
 
 TEST_F(IntervalVolumeValidate, FindsAFullMeshOfAnotherSize) {
   auto parts = testing::parts_of(*made_);
   ++parts.description.full.vertices;
-  EXPECT_FALSE(IntervalVolume::assemble(std::move(parts))->validate());
+  EXPECT_FALSE(validate(*IntervalVolume::assemble(std::move(parts))));
   parts = testing::parts_of(*made_);
   --parts.description.full.tets;
-  EXPECT_FALSE(IntervalVolume::assemble(std::move(parts))->validate());
+  EXPECT_FALSE(validate(*IntervalVolume::assemble(std::move(parts))));
 }
 
 TEST_F(IntervalVolumeValidate, FindsAnErrorGreaterThanItsParents) {
@@ -52,7 +53,7 @@ TEST_F(IntervalVolumeValidate, FindsAnErrorGreaterThanItsParents) {
   last = UpdateCode(std::uint16_t((last.bits() & 127) | (parts.error_levels.size() - 1) << 7));
   UpdateCode& root = parts.codes.front();
   root = UpdateCode(std::uint16_t(root.bits() & 127));
-  EXPECT_FALSE(IntervalVolume::assemble(std::move(parts))->validate());
+  EXPECT_FALSE(validate(*IntervalVolume::assemble(std::move(parts))));
 }
 
 TEST_F(IntervalVolumeValidate, FindsASideThatDoesNotFitItsCoefficients) {
@@ -62,7 +63,7 @@ TEST_F(IntervalVolumeValidate, FindsASideThatDoesNotFitItsCoefficients) {
     auto parts = testing::parts_of(*made_);
     const std::uint16_t bits = parts.codes[i].bits();
     parts.codes[i] = UpdateCode(std::uint16_t((bits & ~3u) | ((bits & 3u) + 1) % 3));
-    found += !IntervalVolume::assemble(std::move(parts))->validate();
+    found += !validate(*IntervalVolume::assemble(std::move(parts)));
   }
   EXPECT_GT(found, 15);
 }

@@ -1,4 +1,5 @@
-#include "common/ivm_file.h"
+#include "common/ivm/ivm_file.h"
+#include "common/ivm/verify.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +9,7 @@
 #include <memory>
 #include <random>
 
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/parts.h"
 #include "support/temp_dir.h"
@@ -79,7 +80,7 @@ TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
     ASSERT_TRUE(loaded) << loaded.error().message;
     EXPECT_EQ((*loaded)->description().name, "first.second");
     expect_equal(sigma, **loaded);
-    const auto valid = (*loaded)->validate();
+    const auto valid = validate(**loaded);
     EXPECT_TRUE(valid) << valid.error().message;
   }
 }
@@ -244,7 +245,7 @@ TEST(Assemble, PartsThatFitButMeanNothingAreNotValid) {
     auto parts = testing::parts_of(sigma);
     spoil(parts);
     const auto assembled = IntervalVolume::assemble(std::move(parts));
-    return !assembled || !assembled->validate();
+    return !assembled || !validate(*assembled);
   };
   EXPECT_FALSE(refused([](auto&) {}));
   EXPECT_TRUE(refused([](auto& p) { ++p.description.full.tets; }));

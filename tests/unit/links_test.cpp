@@ -1,8 +1,8 @@
-#include "common/links.h"
+#include "common/diamond/links.h"
 
 #include <gtest/gtest.h>
 
-#include "common/supercube.h"
+#include "common/diamond/supercube.h"
 
 namespace intervale {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/lod.h"
+#include "common/view/lod.h"
 
 #include <gtest/gtest.h>
 

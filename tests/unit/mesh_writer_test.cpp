@@ -1,4 +1,5 @@
-#include "common/mesh_writer.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "common/mesh/boundary.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,10 +5,10 @@
 #include <numbers>
 #include <vector>
 
-#include "common/extraction.h"
-#include "common/mesh_writer.h"
+#include "common/ivm/extraction.h"
+#include "common/mesh/io/mesh_writer.h"
 #include "common/picture/triangles.h"
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/cameras.h"
 

@@ -1,4 +1,4 @@
-#include "common/plane_cut.h"
+#include "common/mesh/plane_cut.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "common/prediction.h"
+#include "common/codec/prediction.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 
 namespace intervale {

@@ -1,4 +1,4 @@
-#include "common/printable.h"
+#include "common/util/printable.h"
 
 #include <gtest/gtest.h>
 

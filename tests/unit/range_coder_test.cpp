@@ -1,4 +1,4 @@
-#include "common/range_coder.h"
+#include "common/codec/range_coder.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "common/range.h"
+#include "common/patch/range.h"
 
 #include <gtest/gtest.h>
 

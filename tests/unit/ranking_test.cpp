@@ -1,4 +1,4 @@
-#include "common/ranking.h"
+#include "common/ivm/ranking.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <random>
 #include <vector>
 
-#include "common/refinement.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/refinement.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/cameras.h"
 
@@ -135,7 +135,7 @@ TEST_P(Ranks, WantedIsWhatTheNaiveModelWants) {
   std::size_t wanted = 0;
   for (int trial = 0; trial < 40; ++trial) {
     const Lod lod = random_lod(volume_, random_);
-    const double threshold = error_of(lod, volume_.description());
+    const double threshold = error_of(lod, volume_.description().max_error);
     std::optional<View> view;
     if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
     const Ranking ranking(volume_, lod);

@@ -1,4 +1,4 @@
-#include "common/refinement.h"
+#include "common/ivm/refinement.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 
 namespace intervale {
@@ -86,7 +86,7 @@ TEST_P(Select, IsClosedUnderParentsAndWantsNothingElse) {
     const SplitSet chosen = select(v, lod);
     expect_closed(v, chosen);
     // The naive set: all that is finer than the error and whose cube of side 2h meets the box; then ancestors.
-    const double threshold = error_of(lod, v.description());
+    const double threshold = error_of(lod, v.description().max_error);
     SplitSet expected(v.size());
     v.set().for_each_up([&](const Place& p) {
       const Diamond d(v.set().centre(p));

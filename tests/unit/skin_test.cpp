@@ -10,10 +10,11 @@
 #include "client/core/stream_client.h"
 #include "client/view/cross_section.h"
 #include "client/view/tets_in_box.h"
-#include "common/extraction.h"
-#include "common/mesh_writer.h"
-#include "server/build/field_hierarchy.h"
-#include "server/serve/stream_plan.h"
+#include "common/ivm/extraction.h"
+#include "common/mesh/boundary.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "common/selection/stream_plan.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 
 namespace intervale {

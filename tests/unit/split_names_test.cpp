@@ -1,4 +1,4 @@
-#include "common/split_names.h"
+#include "common/codec/split_names.h"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
 // What a server knows of a client's mesh, against the front of one that has it.
-#include "common/split_set.h"
+#include "common/diamond/split_set.h"
 
 #include <gtest/gtest.h>
 
 #include <bit>
 #include <random>
 
-#include "common/extraction.h"
-#include "common/refinement.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/extraction.h"
+#include "common/ivm/refinement.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 
 namespace intervale {

@@ -1,4 +1,4 @@
-#include "server/serve/stream_plan.h"
+#include "common/selection/stream_plan.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
-#include "common/refinement.h"
-#include "common/update_codec.h"
-#include "server/build/field_hierarchy.h"
+#include "common/front/batch_decoder.h"
+#include "common/ivm/refinement.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 
 namespace intervale {

@@ -1,4 +1,4 @@
-#include "common/supercube.h"
+#include "common/diamond/supercube.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/build/surface_moves.h"
+#include "server/builder/surface_moves.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "common/interval_volume.h"
-#include "common/range.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/interval_volume.h"
+#include "common/patch/range.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/bisection.h"
 

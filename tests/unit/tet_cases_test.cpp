@@ -1,4 +1,4 @@
-#include "common/tet_cases.h"
+#include "common/patch/tet_cases.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-#include "common/domain.h"
+#include "common/diamond/domain.h"
 
 namespace intervale {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/update_codec.h"
+#include "common/front/batch_decoder.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <memory>
 #include <random>
 
-#include "common/extraction.h"
-#include "server/build/field_hierarchy.h"
+#include "common/ivm/extraction.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 #include "support/batches.h"
 #include "support/mesh_laws.h"

@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "server/build/field_hierarchy.h"
-#include "server/serve/stream_plan.h"
+#include "common/selection/stream_plan.h"
+#include "server/builder/field_hierarchy.h"
 #include "support/analytic_fields.h"
 
 namespace intervale {

@@ -1,4 +1,4 @@
-#include "common/view.h"
+#include "common/view/screen_error.h"
 
 #include <gtest/gtest.h>
 

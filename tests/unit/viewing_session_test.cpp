@@ -5,9 +5,9 @@
 #include <deque>
 #include <memory>
 
-#include "common/extraction.h"
+#include "common/ivm/extraction.h"
 #include "protocol/codec.h"
-#include "server/build/field_hierarchy.h"
+#include "server/builder/field_hierarchy.h"
 #include "server/serve/access.h"
 #include "server/serve/replaceable.h"
 #include "server/serve/session_state.h"

@@ -15,8 +15,8 @@
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
 #include "client/web/core/memory_file.h"
-#include "common/mesh_digest.h"
-#include "common/mesh_writer.h"
+#include "common/mesh/io/mesh_writer.h"
+#include "common/mesh/mesh_digest.h"
 
 namespace intervale {
 namespace {

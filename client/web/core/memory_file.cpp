@@ -1,9 +1,9 @@
-// AtomicFile (common/atomic_file.h) for a program without a file system.
+// AtomicFile (common/util/atomic_file.h) for a program without a file system.
 #include "client/web/core/memory_file.h"
 
 #include <utility>
 
-#include "common/atomic_file.h"
+#include "common/util/atomic_file.h"
 
 namespace intervale {
 namespace {

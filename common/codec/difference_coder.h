@@ -1,0 +1,51 @@
+// The differences of updates as bits, in file and on the wire alike.
+//
+// What a difference may depend on is what both sides know, and a server has no mesh: only the update itself, its class, and what went before in it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "common/codec/prediction.h"
+#include "common/codec/range_coder.h"
+
+namespace intervale {
+
+struct DifferenceCoder {
+  // No chances: 2 bits a side and 8 a cut, so that there is a most that an update can take, however little it is like those before.
+  bool is_plain = false;
+  std::array<Chance, 2> side;
+  // By class; whether it is the second surface's, which the first's has foretold; whether the centre's side was foretold wrong; how many cuts.
+  std::array<std::array<std::array<std::array<DifferenceModel, 5>, 2>, 2>, 3> first;
+  // By which one it is, the third standing for all further ones; how many bits the one before has. The nearer the last, the nearer the next.
+  std::array<std::array<DifferenceModel, 9>, 3> other;
+
+  // The difference of the centre's side, 0 to 2.
+  template <class Coder>
+  unsigned code_side(Coder& coder, unsigned value = 0) {
+    if (is_plain) return coder.even_bits(2, value);
+    if (!coder.bit(side[0], value != 0)) return 0;
+    return coder.bit(side[1], value == 2) ? 2 : 1;
+  }
+
+  // The differences of an update's `all` cuts, `firsts` of them the first of their surface; see Prediction::encode. Written from there, or read into
+  // there.
+  template <class Coder>
+  void code_cuts(Coder& coder, int cls, unsigned side_difference, unsigned all, unsigned firsts, std::uint8_t* differences) {
+    if (is_plain) {
+      for (unsigned i = 0; i < all; ++i) differences[i] = std::uint8_t(coder.even_bits(8, differences[i]));
+      return;
+    }
+    static constexpr std::array<std::uint8_t, kMaxCuts + 1> kHowMany{0, 0, 1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4};
+    for (unsigned i = 0; i < firsts; ++i) differences[i] = first[cls][i][side_difference != 0][kHowMany[all]].code(coder, differences[i]);
+    unsigned before = 0;
+    for (unsigned i = firsts; i < all; ++i) {
+      const std::uint8_t d = differences[i] = other[std::min(i - firsts, 2u)][before].code(coder, differences[i]);
+      before = std::bit_width(unsigned(d < 128 ? d : 256 - d));
+    }
+  }
+};
+
+}  // namespace intervale

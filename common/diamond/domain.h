@@ -1,0 +1,98 @@
+// The sampled box inside the virtual grid of (2^N + 1)^3 vertices (design note in FORMAT.md, "The box").
+//
+// A vertex stands for the sample that its coordinates clamp to, in value and in position. Clamping is monotone on each axis, so no tetrahedron is
+// turned inside out; those outside the box become flat and do not exist.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "common/diamond/diamond.h"
+#include "common/diamond/grid.h"
+
+namespace intervale {
+
+class Domain {
+ public:
+  // Sides in [kMinSide, kMaxSide].
+  explicit Domain(const std::array<std::int32_t, 3>& dims)
+      : last_{dims[0] - 1, dims[1] - 1, dims[2] - 1},
+        levels_(std::max(1, int(std::bit_width(std::uint32_t(std::max({last_.x, last_.y, last_.z}) - 1))))) {}
+
+  [[nodiscard]] int levels() const { return levels_; }  // N: smallest, at least 1, with a virtual grid no smaller than the box
+  [[nodiscard]] Vertex last() const { return last_; }   // the sample furthest from (0, 0, 0)
+  [[nodiscard]] Vertex root() const { return {1 << (levels_ - 1), 1 << (levels_ - 1), 1 << (levels_ - 1)}; }  // centre of the root
+  [[nodiscard]] bool is_whole() const {  // whether the box is the whole virtual grid, so that nothing ever clamps
+    return last_.x == 1 << levels_ && last_.y == 1 << levels_ && last_.z == 1 << levels_;
+  }
+
+  [[nodiscard]] Vertex clamp(Vertex v) const { return {std::clamp(v.x, 0, last_.x), std::clamp(v.y, 0, last_.y), std::clamp(v.z, 0, last_.z)}; }
+  [[nodiscard]] bool contains(Vertex v) const { return v == clamp(v); }
+
+  // Whether all vertices of the diamond lie in the box: its tetrahedra then all exist, and none is moved by clamping.
+  [[nodiscard]] bool is_interior(const Diamond& d) const {
+    return contains({d.centre.x - d.h, d.centre.y - d.h, d.centre.z - d.h}) && contains({d.centre.x + d.h, d.centre.y + d.h, d.centre.z + d.h});
+  }
+
+  // Whether no vertex is moved by clamping but those of tetrahedra that lie outside the virtual grid: the others are as they are in the interior.
+  [[nodiscard]] bool is_unmoved(const Diamond& d) const {
+    const auto unmoved = [&d, n = std::int32_t(1) << levels_](std::int32_t c, std::int32_t last) { return c + d.h <= last || (last == n && c == n); };
+    return unmoved(d.centre.x, last_.x) && unmoved(d.centre.y, last_.y) && unmoved(d.centre.z, last_.z);
+  }
+
+  // One bit for each tetrahedron of the diamond that exists: that is not flat once clamped. 0: the diamond is as good as absent.
+  [[nodiscard]] unsigned tets(const Diamond& d) const {
+    const unsigned all = (1u << d.row->tets) - 1;
+    if (is_interior(d)) return all;
+    if ((d.centre.x | d.centre.y | d.centre.z) >= 0 && is_unmoved(d)) {
+      // Only a diamond in a face of the virtual grid reaches beyond it, with half of what it has.
+      const auto outside = [&d](int axis, std::int32_t c, std::int32_t last) {
+        return (c == 0 ? d.row->beyond[axis][0] : 0) | (c == last ? d.row->beyond[axis][1] : 0);
+      };
+      return all & ~(outside(0, d.centre.x, last_.x) | outside(1, d.centre.y, last_.y) | outside(2, d.centre.z, last_.z));
+    }
+    unsigned mask = 0;
+    for (int i = 0; i < d.row->tets; ++i) mask |= unsigned(exists(positions(d, d.row->tet(i)))) << i;
+    return mask;
+  }
+
+  // One bit for each local vertex (kCentre not among them) of a tetrahedron in the mask.
+  [[nodiscard]] static unsigned vertices(const DiamondType& row, unsigned tets) {
+    unsigned mask = 0;
+    for (; tets != 0; tets &= tets - 1) mask |= row.tet_vertices[std::countr_zero(tets)];
+    return mask;
+  }
+
+  // One bit for each edge of a tetrahedron in the mask, in local numbers.
+  [[nodiscard]] static unsigned edges(const DiamondType& row, unsigned tets) {
+    unsigned mask = 0;
+    for (; tets != 0; tets &= tets - 1) mask |= row.tet_edges[std::countr_zero(tets)];
+    return mask;
+  }
+
+  // Splitting it would give back what is there: class 2 with h = 1 whose clamped centre is an end of its spine. Needs no update, and is never split.
+  [[nodiscard]] bool is_idle(const Diamond& d) const {
+    if (d.row->cls != 2 || d.h != 1) return false;
+    const Vertex c = clamp(d.centre);
+    return c == clamp(d.vertex(0)) || c == clamp(d.vertex(1));
+  }
+
+  // Clamped positions of four local vertices (kCentre may be among them).
+  [[nodiscard]] std::array<Vertex, 4> positions(const Diamond& d, const std::array<std::uint8_t, 4>& local) const {
+    return {clamp(d.vertex(local[0])), clamp(d.vertex(local[1])), clamp(d.vertex(local[2])), clamp(d.vertex(local[3]))};
+  }
+
+  // Whether a tetrahedron is not flat.
+  [[nodiscard]] static bool exists(const std::array<Vertex, 4>& p) {
+    const auto d = [&p](int i) { return std::array<std::int64_t, 3>{p[i].x - p[0].x, p[i].y - p[0].y, p[i].z - p[0].z}; };
+    const auto a = d(1), b = d(2), c = d(3);
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0]) != 0;
+  }
+
+ private:
+  Vertex last_;
+  int levels_;
+};
+
+}  // namespace intervale

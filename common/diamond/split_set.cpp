@@ -1,0 +1,152 @@
+#include "common/diamond/split_set.h"
+
+#include <algorithm>
+#include <bit>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace intervale {
+
+namespace {
+
+// Puts the lowest bits of `bits` where `mask` has ones, in their order.
+std::uint64_t deposit_by_hand(std::uint64_t bits, std::uint64_t mask) {
+  std::uint64_t result = 0;
+  for (std::uint64_t left = mask; left != 0; left &= left - 1, bits >>= 1) result |= left & (~left + 1) & (~(bits & 1) + 1);
+  return result;
+}
+#if defined(__x86_64__)
+__attribute__((target("bmi2"))) std::uint64_t deposit_at_once(std::uint64_t bits, std::uint64_t mask) { return _pdep_u64(bits, mask); }
+const bool kAtOnce = __builtin_cpu_supports("bmi2") != 0;
+std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return kAtOnce ? deposit_at_once(bits, mask) : deposit_by_hand(bits, mask); }
+#else
+std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return deposit_by_hand(bits, mask); }
+#endif
+
+}  // namespace
+
+std::uint64_t SplitSet::count() const {
+  std::uint64_t n = 0;
+  for (std::uint64_t w : words_) n += std::uint64_t(std::popcount(w));
+  return n;
+}
+
+std::uint64_t SplitSet::slots(UpdateIndex first, std::uint64_t occupancy) const {
+  return deposit(some(first, unsigned(std::popcount(occupancy))), occupancy);
+}
+
+std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {
+  std::vector<SlotGroup> groups;
+  const auto bricks = set.bricks();
+  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
+    const UpdateIndex first = bricks[b].first, end = b + 1 < bricks.size() ? bricks[b + 1].first : set.size();
+    const auto from = words_.begin() + first / 64, to = words_.begin() + (end + 63) / 64;
+    if (std::all_of(from, to, [](std::uint64_t w) { return w == 0; })) continue;
+    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+      if (const std::uint64_t some = slots(set.first(b, s), set.occupancy()[s])) groups.push_back({b, s, key, some});
+    });
+  }
+  return groups;
+}
+
+namespace {
+
+// What the diamonds of a supercube inside the box wait for, by the supercubes where their parents are.
+struct Need {
+  int where = 0;
+  std::uint64_t parents = 0;             // slots there
+  std::uint64_t all = 0;                 // slots here that wait for any of them
+  std::vector<std::uint64_t> by_parent;  // slots here, for each of `parents`
+};
+
+std::vector<Need> needs_of(const std::array<Links, kSlots>& links) {
+  std::array<std::array<std::uint64_t, 64>, kCorner> waiting{};
+  for (int slot = 0; slot < kSlots; ++slot) {
+    for (int k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
+      const Link link = links[slot].vertex[links[slot].parent[k]];
+      waiting[link.where][link.slot] |= std::uint64_t(1) << slot;
+    }
+  }
+  std::vector<Need> needs;
+  for (int where = 0; where < kCorner; ++where) {
+    Need need;
+    need.where = where;
+    for (int slot = 0; slot < kSlots; ++slot) {
+      if (waiting[where][slot] == 0) continue;
+      need.parents |= std::uint64_t(1) << slot;
+      need.all |= waiting[where][slot];
+      need.by_parent.push_back(waiting[where][slot]);
+    }
+    if (need.parents != 0) needs.push_back(std::move(need));
+  }
+  // Those that most wait for come first: where they are missing, the others are not looked for.
+  std::stable_sort(needs.begin(), needs.end(), [](const Need& a, const Need& b) { return std::popcount(a.all) > std::popcount(b.all); });
+  return needs;
+}
+
+// By the parity of the supercube's position, as in link_table().
+const std::vector<Need>& needs(Vertex position) {
+  static const auto table = [] {
+    std::array<std::vector<Need>, 8> all;
+    for (std::size_t parity = 0; parity < 8; ++parity) all[parity] = needs_of(link_table()[parity]);
+    return all;
+  }();
+  return table[std::size_t(position.x & 1) | std::size_t(position.y & 1) << 1 | std::size_t(position.z & 1) << 2];
+}
+
+}  // namespace
+
+void Readiness::move_to(SupercubeKey key) {
+  around_.move_to(key);
+  known_ = 0;
+}
+
+std::uint64_t Readiness::split_slots(int where) {
+  std::uint64_t& slots = slots_[std::size_t(where)];
+  if (!(known_ >> where & 1)) {
+    known_ |= std::uint64_t(1) << where;
+    if (where >= kCoarser && around_.scale() + 1 == domain_.levels()) {
+      slots = ~std::uint64_t(0);  // the corners of the domain
+    } else {
+      const Surroundings::Seen& seen = around_.at(where);
+      slots = seen.occupancy == 0 ? 0 : split_.slots(seen.first, seen.occupancy);
+    }
+  }
+  return slots;
+}
+
+std::uint64_t Readiness::ready_inside() {
+  std::uint64_t ready = (std::uint64_t(1) << kSlots) - 1;
+  for (const Need& need : needs(around_.position())) {
+    if ((need.all & ready) == 0) continue;
+    for (std::uint64_t missing = need.parents & ~split_slots(need.where); missing != 0; missing &= missing - 1) {
+      ready &= ~need.by_parent[std::size_t(std::popcount(need.parents & ((missing & (~missing + 1)) - 1)))];
+    }
+  }
+  return ready;
+}
+
+std::uint64_t Readiness::ready() {
+  const int scale = around_.scale();
+  if (scale >= domain_.levels()) return 0;
+  if (is_interior(domain_, scale, around_.position())) return ready_inside();
+  std::uint64_t ready = 0;
+  for (int slot = 0; slot < kSlots; ++slot) {
+    const Diamond d(centre_of(scale, around_.position(), slot));
+    const unsigned tets = domain_.tets(d);
+    if (tets == 0 || domain_.is_idle(d)) continue;
+    const DiamondType& row = *d.row;
+    const std::uint32_t vertices = Domain::vertices(row, tets);
+    const Links& links = around_.links(slot);
+    bool all = true;
+    for (int k = 0; k < row.parents && all; ++k) {
+      const int v = links.parent[k];
+      all = !(vertices >> v & 1) || (split_slots(links.vertex[v].where) >> links.vertex[v].slot & 1) != 0;
+    }
+    ready |= std::uint64_t(all) << slot;
+  }
+  return ready;
+}
+
+}  // namespace intervale

@@ -1,0 +1,139 @@
+#include "common/diamond/supercube.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace intervale {
+namespace {
+
+constexpr std::array<std::uint8_t, kSlots> types_by_slot() {
+  std::array<std::uint8_t, kSlots> types{};
+  int n = 0;
+  for (int cls = 0; cls < 3; ++cls) {
+    for (unsigned type = 0; type < 64; ++type) {
+      const int odd = int(type & 1) + int(type >> 2 & 1) + int(type >> 4 & 1);
+      if (odd == 3 - cls) types[n++] = std::uint8_t(type);
+    }
+  }
+  return types;
+}
+
+constexpr std::array<std::uint8_t, 64> slots_by_type() {
+  std::array<std::uint8_t, 64> slots{};
+  const auto types = types_by_slot();
+  for (int s = 0; s < kSlots; ++s) slots[types[s]] = std::uint8_t(s);
+  return slots;
+}
+
+// Bits 0, 1, 2, ... to bits 0, 3, 6, ..., and back; 21 bits.
+constexpr std::uint64_t spread(std::uint64_t v) {
+  v &= 0x1fffff;
+  v = (v | v << 32) & 0x1f00000000ffff;
+  v = (v | v << 16) & 0x1f0000ff0000ff;
+  v = (v | v << 8) & 0x100f00f00f00f00f;
+  v = (v | v << 4) & 0x10c30c30c30c30c3;
+  return (v | v << 2) & 0x1249249249249249;
+}
+constexpr std::int32_t gather(std::uint64_t v) {
+  v &= 0x1249249249249249;
+  v = (v | v >> 2) & 0x10c30c30c30c30c3;
+  v = (v | v >> 4) & 0x100f00f00f00f00f;
+  v = (v | v >> 8) & 0x1f0000ff0000ff;
+  v = (v | v >> 16) & 0x1f00000000ffff;
+  return std::int32_t((v | v >> 32) & 0x1fffff);
+}
+
+}  // namespace
+
+constinit const std::array<std::uint8_t, kSlots> kTypeOfSlot = types_by_slot();
+constinit const std::array<std::uint8_t, 64> kSlotOfType = slots_by_type();
+
+SupercubeKey supercube_key(int scale, Vertex p) {
+  return std::uint64_t(kMaxLevels - scale) << 57 | spread(std::uint64_t(p.x)) | spread(std::uint64_t(p.y)) << 1 | spread(std::uint64_t(p.z)) << 2;
+}
+
+Vertex position_of_key(SupercubeKey key) {
+  const std::uint64_t morton = key & ((std::uint64_t(1) << 57) - 1);
+  return {gather(morton), gather(morton >> 1), gather(morton >> 2)};
+}
+
+Vertex centre_of(SupercubeKey key, int slot) { return centre_of(scale_of_key(key), position_of_key(key), slot); }
+
+SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy) : occupancy_(std::move(occupancy)) {
+  assert(keys.size() == occupancy_.size() && "one word for each supercube");
+  first_in_brick_.reserve(keys.size());
+  for (std::uint32_t s = 0; s < keys.size(); ++s) {
+    const SupercubeKey brick = keys[s] & ~SupercubeKey(63);
+    if (bricks_.empty() || bricks_.back().key != brick) bricks_.push_back({brick, 0, s, size_});
+    bricks_.back().mask |= std::uint64_t(1) << (keys[s] & 63);
+    first_in_brick_.push_back(std::uint16_t(size_ - bricks_.back().first));
+    size_ += UpdateIndex(std::popcount(occupancy_[s]));
+  }
+  bricks_.shrink_to_fit();
+  directory_.assign(bricks_.size() + bricks_.size() / 2 + 1, 0);
+  for (std::uint32_t b = 0; b < bricks_.size(); ++b) {
+    std::size_t i = home(bricks_[b].key);
+    while (directory_[i] != 0) i = i + 1 == directory_.size() ? 0 : i + 1;
+    directory_[i] = b + 1;
+  }
+  for (std::size_t level = 0; level < scale_begin_.size(); ++level) {
+    const auto before = [](const Brick& b, SupercubeKey key) { return b.key < key; };
+    scale_begin_[level] = std::uint32_t(std::lower_bound(bricks_.begin(), bricks_.end(), std::uint64_t(level) << 57, before) - bricks_.begin());
+  }
+}
+
+std::size_t SupercubeSet::home(SupercubeKey brick_key) const {
+  std::uint64_t h = (brick_key >> 6) * 0x9e3779b97f4a7c15u;
+  h ^= h >> 32;
+  h *= 0xd6e8feb86659fd93u;
+  return std::size_t((unsigned __int128)(h)*directory_.size() >> 64);
+}
+
+std::optional<std::uint32_t> SupercubeSet::find_brick(SupercubeKey brick_key) const {
+  if (bricks_.empty()) return {};
+  for (std::size_t i = home(brick_key); directory_[i] != 0; i = i + 1 == directory_.size() ? 0 : i + 1) {
+    if (bricks_[directory_[i] - 1].key == brick_key) return directory_[i] - 1;
+  }
+  return {};
+}
+
+std::optional<std::uint32_t> SupercubeSet::find_brick(int scale, Vertex position) const {
+  if (scale >= kMaxLevels) return {};
+  return find_brick(supercube_key(scale, {4 * position.x, 4 * position.y, 4 * position.z}));
+}
+
+std::optional<SupercubeSet::Supercube> SupercubeSet::find_supercube(int scale, Vertex position) const {
+  if (scale >= kMaxLevels) return {};
+  const SupercubeKey key = supercube_key(scale, position);
+  const auto b = find_brick(key & ~SupercubeKey(63));
+  const std::uint64_t bit = std::uint64_t(1) << (key & 63);
+  if (!b || !(bricks_[*b].mask & bit)) return {};
+  return Supercube{*b, bricks_[*b].first_supercube + std::uint32_t(std::popcount(bricks_[*b].mask & (bit - 1))), key};
+}
+
+std::optional<Place> SupercubeSet::find(const Diamond& d) const {
+  if (d.row->cls == 3) return {};
+  const int up = d.scale + 2;
+  const auto found = find_supercube(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
+  const int slot = kSlotOfType[d.type];
+  if (!found || !(occupancy_[found->supercube] >> slot & 1)) return {};
+  return place_in(found->brick, found->supercube, found->key, slot);
+}
+
+Place SupercubeSet::place(UpdateIndex index) const {
+  const auto after = [](UpdateIndex i, const Brick& b) { return i < b.first; };
+  const auto brick = std::uint32_t(std::upper_bound(bricks_.begin(), bricks_.end(), index, after) - bricks_.begin() - 1);
+  std::uint32_t s = bricks_[brick].first_supercube;
+  std::uint64_t mask = bricks_[brick].mask;
+  UpdateIndex skip = index - bricks_[brick].first;
+  for (; skip >= UpdateIndex(std::popcount(occupancy_[s])); ++s, mask &= mask - 1) skip -= UpdateIndex(std::popcount(occupancy_[s]));
+  std::uint64_t word = occupancy_[s];
+  for (; skip > 0; --skip) word &= word - 1;
+  return {bricks_[brick].key + unsigned(std::countr_zero(mask)), brick, s, std::uint32_t(std::countr_zero(word)), index};
+}
+
+std::size_t SupercubeSet::memory_bytes() const {
+  return bricks_.size() * sizeof(Brick) + occupancy_.size() * 8 + first_in_brick_.size() * 2 + directory_.size() * 4;
+}
+
+}  // namespace intervale

@@ -1,0 +1,175 @@
+// Supercubes: sets of diamonds found by their centres, at a little over a bit for each.
+//
+// Kenneth Weiss and Leila De Floriani, "Supercubes: A High-Level Primitive for Diamond Hierarchies", 2009. The 56 types of diamonds of one
+// scale that share the centre's higher bits, centre >> (scale + 2), form one supercube. A set of diamonds holds, for each supercube that is not
+// empty, its name and one word of occupancy; counting bits gives each diamond its number.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/diamond/diamond.h"
+
+namespace intervale {
+
+// A diamond's place in its supercube: 0..7 class 0, 8..31 class 1, 32..55 class 2, so that parents come before children.
+inline constexpr int kSlots = 56;
+extern const std::array<std::uint8_t, kSlots> kTypeOfSlot;
+extern const std::array<std::uint8_t, 64> kSlotOfType;
+[[nodiscard]] constexpr int class_of_slot(int slot) { return slot < 8 ? 0 : slot < 32 ? 1 : 2; }
+inline constexpr std::array<std::uint64_t, 3> kSlotsOfClass{0xffu, 0xffffff00u, 0xffffff00000000u};
+
+// A supercube's name. Ascending: coarse scales before fine ones, then along a Morton curve.
+using SupercubeKey = std::uint64_t;
+[[nodiscard]] SupercubeKey supercube_key(int scale, Vertex position);  // position: centre >> (scale + 2); coordinates below 2^19
+[[nodiscard]] inline int scale_of_key(SupercubeKey key) { return kMaxLevels - int(key >> 57); }
+[[nodiscard]] Vertex position_of_key(SupercubeKey key);
+[[nodiscard]] Vertex centre_of(SupercubeKey key, int slot);
+[[nodiscard]] inline Vertex centre_of(int scale, Vertex position, int slot) {
+  const unsigned type = kTypeOfSlot[slot];
+  const auto coordinate = [scale](std::int32_t high, unsigned low) { return std::int32_t((std::uint32_t(high) << 2 | (low & 3)) << scale); };
+  return {coordinate(position.x, type), coordinate(position.y, type >> 2), coordinate(position.z, type >> 4)};
+}
+
+// Number of a diamond in a set.
+using UpdateIndex = std::uint32_t;
+
+struct Place {
+  SupercubeKey key = 0;
+  std::uint32_t brick = 0, supercube = 0;  // numbers in the set
+  std::uint32_t slot = 0;
+  UpdateIndex index = 0;
+};
+
+// Some diamonds of one supercube.
+struct SlotGroup {
+  std::uint32_t brick = 0, supercube = 0;  // numbers in the set
+  SupercubeKey key = 0;
+  std::uint64_t slots = 0;
+  friend bool operator==(const SlotGroup&, const SlotGroup&) = default;
+};
+
+// Goes through groups whose keys ascend strictly, children before parents: visit(group, slots) with some of the group's slots at a time, none of
+// which is another's ancestor.
+template <class Visit>
+void for_each_finest_first(std::span<const SlotGroup> groups, Visit&& visit) {
+  for (std::size_t end = groups.size(), begin = end; end > 0; end = begin) {
+    while (begin > 0 && scale_of_key(groups[begin - 1].key) == scale_of_key(groups[end - 1].key)) --begin;
+    for (int cls = 2; cls >= 0; --cls) {
+      for (std::size_t i = begin; i < end; ++i) {
+        if (const std::uint64_t slots = groups[i].slots & kSlotsOfClass[std::size_t(cls)]) visit(groups[i], slots);
+      }
+    }
+  }
+}
+
+// An immutable set of diamonds. Supercubes in turn stand in bricks: the 4 x 4 x 4 of one scale whose keys differ in the lowest six bits only.
+class SupercubeSet {
+ public:
+  SupercubeSet() = default;
+  // keys strictly ascending; occupancy not 0 and within kSlots bits, one for each key. Fewer than 2^32 diamonds.
+  SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy);
+
+  struct Brick {
+    SupercubeKey key = 0;    // of its first supercube, were that there: the lowest six bits are 0
+    std::uint64_t mask = 0;  // which of its 64 supercubes are there
+    std::uint32_t first_supercube = 0;
+    UpdateIndex first = 0;  // number of its first diamond
+  };
+
+  [[nodiscard]] std::span<const Brick> bricks() const { return bricks_; }
+  [[nodiscard]] std::size_t supercubes() const { return occupancy_.size(); }
+  [[nodiscard]] UpdateIndex size() const { return size_; }
+  [[nodiscard]] std::span<const std::uint64_t> occupancy() const { return occupancy_; }  // by supercube
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+  // Where a diamond is in the set, if it is. O(1). centre: coordinates in [0, 2^20], not all 0.
+  [[nodiscard]] std::optional<Place> find(Vertex centre) const { return find(Diamond(centre)); }
+  [[nodiscard]] std::optional<Place> find(const Diamond& d) const;
+
+  // The supercube at a position (not negative), if it is in the set. O(1).
+  struct Supercube {
+    std::uint32_t brick = 0, supercube = 0;
+    SupercubeKey key = 0;
+  };
+  [[nodiscard]] std::optional<Supercube> find_supercube(int scale, Vertex position) const;
+  // The brick at a position, in bricks; not negative.
+  [[nodiscard]] std::optional<std::uint32_t> find_brick(int scale, Vertex position) const;
+
+  [[nodiscard]] static Vertex centre(const Place& p) { return centre_of(p.key, int(p.slot)); }
+
+  // The place of a number. O(log bricks).
+  [[nodiscard]] Place place(UpdateIndex index) const;
+
+  // Bricks of one scale: [begin, end).
+  [[nodiscard]] std::array<std::uint32_t, 2> of_scale(int scale) const {
+    return {scale_begin_[kMaxLevels - scale], scale_begin_[kMaxLevels - scale + 1]};
+  }
+
+  // Calls visit(supercube, key) for the supercubes of a brick, ascending.
+  template <class Visit>
+  void for_each_supercube(std::uint32_t brick, Visit&& visit) const {
+    const Brick& b = bricks_[brick];
+    std::uint32_t supercube = b.first_supercube;
+    for (std::uint64_t left = b.mask; left != 0; left &= left - 1) visit(supercube++, b.key + unsigned(std::countr_zero(left)));
+  }
+  // Calls visit(Place) for those of a brick's diamonds whose slots are among `slots`, in order of their numbers.
+  template <class Visit>
+  void for_each_in_brick(std::uint32_t brick, std::uint64_t slots, Visit&& visit) const {
+    for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+      for (std::uint64_t left = occupancy_[s] & slots; left != 0; left &= left - 1) visit(place_in(brick, s, key, std::countr_zero(left)));
+    });
+  }
+  // ... of one scale and class.
+  template <class Visit>
+  void for_each(int scale, int cls, Visit&& visit) const {
+    const auto [begin, end] = of_scale(scale);
+    for (std::uint32_t b = begin; b < end; ++b) for_each_in_brick(b, kSlotsOfClass[cls], visit);
+  }
+  // ... of all, parents before children; or children before parents.
+  template <class Visit>
+  void for_each_down(Visit&& visit) const {
+    for (int scale = kMaxLevels - 1; scale >= 0; --scale) {
+      for (int cls = 0; cls < 3; ++cls) for_each(scale, cls, visit);
+    }
+  }
+  template <class Visit>
+  void for_each_up(Visit&& visit) const {
+    for (int scale = 0; scale < kMaxLevels; ++scale) {
+      for (int cls = 2; cls >= 0; --cls) for_each(scale, cls, visit);
+    }
+  }
+  // The number of a supercube's first diamond.
+  [[nodiscard]] UpdateIndex first(std::uint32_t brick, std::uint32_t supercube) const { return bricks_[brick].first + first_in_brick_[supercube]; }
+  [[nodiscard]] Place place_in(std::uint32_t brick, std::uint32_t supercube, SupercubeKey key, int slot) const {
+    const std::uint64_t before = occupancy_[supercube] & ((std::uint64_t(1) << slot) - 1);
+    return {key, brick, supercube, std::uint32_t(slot), first(brick, supercube) + UpdateIndex(std::popcount(before))};
+  }
+
+ private:
+  [[nodiscard]] std::size_t home(SupercubeKey brick_key) const;
+  [[nodiscard]] std::optional<std::uint32_t> find_brick(SupercubeKey brick_key) const;
+  std::vector<Brick> bricks_;
+  std::vector<std::uint64_t> occupancy_;
+  std::vector<std::uint16_t> first_in_brick_;  // at most 63 * 56
+  std::vector<std::uint32_t> directory_;       // open addressing: brick number + 1, 0 for an empty place
+  std::array<std::uint32_t, kMaxLevels + 2> scale_begin_{};
+  UpdateIndex size_ = 0;
+};
+
+// Calls visit(number) for those of a diamond's parents that are in the set.
+template <class Visit>
+void for_each_parent(const SupercubeSet& set, const Place& p, Visit&& visit) {
+  const Diamond d(set.centre(p));
+  for (int k = 0; k < d.row->parents; ++k) {
+    const Vertex c = d.parent(k);
+    if ((c.x | c.y | c.z) < 0) continue;
+    if (const auto parent = set.find(c)) visit(parent->index);
+  }
+}
+
+}  // namespace intervale

@@ -1,0 +1,74 @@
+#include "common/front/batch_decoder.h"
+
+#include <bit>
+#include <string>
+
+#include "common/codec/batch.h"
+#include "common/codec/byte_planes.h"
+#include "common/codec/difference_coder.h"
+#include "common/codec/split_names.h"
+
+namespace intervale {
+namespace {
+
+tl::unexpected<Error> damaged(const char* what) { return fail(std::string("a batch is damaged: ") + what); }
+
+}  // namespace
+
+Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::uint64_t max_tets) {
+  const auto keys = take_supercubes(bytes, kBatchUpdatesMost);
+  if (!keys) return damaged(keys.error().message.c_str());
+  const auto length = take_varint(bytes);
+  if (!length || *length != bytes.size()) return damaged("its length");
+
+  std::uint64_t updates = 0;
+  const char* wrong = nullptr;
+  RangeDecoder coder(bytes);
+  FlagModel flags;
+  DifferenceCoder differences;
+  differences.is_plain = coder.even_bits(1) != 0;
+  Front::Cursor cursor(front);
+  // Splits the diamond looked at if the batch says so. False if that is the end.
+  const auto take = [&](int cls) {
+    const bool is_split = flags.code(coder, cls, cursor.context().is_mixed(), differences.is_plain);
+    if (coder.is_overdrawn()) {
+      wrong = "it says too little of what it splits";
+      return false;
+    }
+    if (!is_split) return true;
+    if (updates == kBatchUpdatesMost) {
+      wrong = "it has too many updates";
+      return false;
+    }
+    const DiamondContext& context = cursor.look_closer();
+    Prediction prediction(context);
+    const unsigned side_difference = differences.code_side(coder);
+    const Side side = Side((unsigned(prediction.side()) + side_difference) % 3);
+    const auto count = context.count_cuts(side);
+    std::array<std::uint8_t, kMaxCuts> coded{}, cuts;
+    differences.code_cuts(coder, cls, side_difference, unsigned(count.all), unsigned(count.first), coded.data());
+    if (coder.is_overdrawn()) {
+      wrong = "it has fewer bytes than its updates call for";
+      return false;
+    }
+    prediction.decode(side, std::span(coded).first(std::size_t(count.all)), cuts.data());
+    cursor.split(side, std::span(cuts).first(std::size_t(count.all)), max_tets);
+    ++updates;
+    return true;
+  };
+  for_each_class(
+      keys->size(), [&](std::size_t g) { return (*keys)[g]; },
+      [&](std::size_t g, int cls) {
+        cursor.move_to((*keys)[g]);
+        for (std::uint64_t left = kSlotsOfClass[cls] & ~cursor.split_slots(); left != 0; left &= left - 1) {
+          if (!cursor.find(std::countr_zero(left))) continue;
+          if (!take(cls)) return false;
+        }
+        return true;
+      });
+  if (wrong != nullptr) return damaged(wrong);
+  if (!coder.is_spent()) return damaged("it has more than its updates call for");
+  return updates;
+}
+
+}  // namespace intervale

@@ -1,0 +1,149 @@
+#include "common/ivm/interval_volume.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "common/codec/root_patch.h"
+
+namespace intervale {
+namespace {
+
+std::uint64_t hash(const void* data, std::size_t bytes, std::uint64_t seed) { return XXH3_64bits_withSeed(data, bytes, seed); }
+
+template <class T>
+std::uint64_t hash(std::span<const T> values, std::uint64_t seed) {
+  return hash(values.data(), values.size_bytes(), seed);
+}
+
+std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& parts) {
+  std::uint64_t h = 0;
+  h = hash(std::span<const std::int32_t>(d.grid.dims), h);
+  h = hash(std::span<const double>(d.grid.spacing), h);
+  h = hash(std::span<const double>(d.grid.origin), h);
+  const double range[2] = {d.range.alpha, d.range.beta};
+  h = hash(range, sizeof range, h);
+  h = hash(std::span<const std::uint8_t>(d.base), h);
+  for (const SupercubeSet::Brick& b : parts.set.bricks()) {
+    const std::uint64_t brick[2] = {b.key, b.mask};
+    h = hash(brick, sizeof brick, h);
+  }
+  h = hash(parts.set.occupancy(), h);
+  h = hash(std::span<const UpdateCode>(parts.codes), h);
+  h = hash(std::span<const std::uint8_t>(parts.differences), h);
+  h = hash(std::span<const float>(parts.error_levels), h);
+  return hash(std::span<const Yield>(parts.yields), h);
+}
+
+}  // namespace
+
+namespace {
+
+// Steps an octave, and the step of a ratio of 1: near ones go from 2^-12 to 2^20, far ones as well.
+constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
+constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
+
+}  // namespace
+
+Yield Yield::at_least(double ratio, double unit, bool is_far) {
+  if (!(ratio > 0)) return Yield(0);
+  const auto step = [&](int steps, int one) { return std::ceil(steps * std::log2(ratio / unit) - 1e-9) + one; };
+  if (is_far) return Yield(std::uint8_t(std::clamp(step(kFarSteps, kFarOne), double(kFirstFar), double(kNoBoundFar))));
+  return Yield(std::uint8_t(std::clamp(step(kNearSteps, kNearOne), 1.0, double(kNoBound))));
+}
+
+bool Yield::is_far() const { return step_ >= kFirstFar; }
+
+float Yield::ratio(float unit) const {
+  if (step_ == 0) return 0;
+  if (step_ == kNoBound || step_ == kNoBoundFar) return std::numeric_limits<float>::max();
+  if (is_far()) return unit * std::exp2(float(int(step_) - kFarOne) / kFarSteps);
+  return unit * std::exp2(float(int(step_) - kNearOne) / kNearSteps);
+}
+
+double yield_unit(const Grid& grid, double max_error) {
+  return max_error > 0 ? std::min({grid.spacing[0], grid.spacing[1], grid.spacing[2]}) / max_error : 1.0;
+}
+
+double diamond_width(const Grid& grid) { return 2 * std::hypot(grid.spacing[0], grid.spacing[1], grid.spacing[2]); }
+
+IntervalVolume::IntervalVolume(Parts parts)
+    : description_(std::move(parts.description)),
+      domain_(description_.grid.dims),
+      set_(std::move(parts.set)),
+      codes_(std::move(parts.codes)),
+      differences_(std::move(parts.differences)),
+      error_levels_(std::move(parts.error_levels)),
+      yields_(std::move(parts.yields)),
+      reach_(float(diamond_width(description_.grid) / 2)) {
+  const auto unit = float(yield_unit(description_.grid, error_levels_.empty() ? 0.0 : double(error_levels_.back())));
+  for (unsigned step = 0; step < factor_.size(); ++step) factor_[step] = Yield(std::uint8_t(step)).ratio(unit);
+  brick_object_error_.resize(set_.bricks().size());
+  supercube_level_.reserve(set_.supercubes());
+  brick_first_.reserve(set_.bricks().size());
+  first_in_brick_.reserve(set_.supercubes());
+  brick_level_.reserve(set_.bricks().size());
+  std::uint32_t n = 0;
+  for (std::uint32_t b = 0; b < set_.bricks().size(); ++b) {
+    brick_first_.push_back(n);
+    brick_level_.push_back(0);
+    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+      first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
+      const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
+      unsigned most = 0;
+      for (UpdateIndex i = first; i < end; ++i) {
+        n += codes_[i].coefficients();
+        most = std::max(most, codes_[i].error_level());
+      }
+      supercube_level_.push_back(half_of_level(most));
+      brick_level_[b] = std::max(brick_level_[b], std::uint16_t(most));
+      brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
+    });
+  }
+}
+
+Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
+  const Description& d = parts.description;
+  if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
+  if (parts.codes.size() != parts.set.size() || parts.yields.size() != parts.set.supercubes()) return fail("updates and supercubes do not fit");
+  if (parts.error_levels.size() > kErrorLevels || (parts.error_levels.empty() && !parts.codes.empty())) return fail("error levels out of range");
+  for (std::size_t i = 0; i < parts.error_levels.size(); ++i) {
+    if (!std::isfinite(parts.error_levels[i]) || parts.error_levels[i] < (i == 0 ? 0.0f : parts.error_levels[i - 1]))
+      return fail("error levels do not ascend");
+  }
+  const int levels = Domain(d.grid.dims).levels();
+  for (const SupercubeSet::Brick& brick : parts.set.bricks()) {
+    if (scale_of_key(brick.key) >= levels) return fail("a brick is coarser than the box");
+  }
+  std::uint64_t coefficients = 0;
+  for (UpdateCode c : parts.codes) {
+    if (c.side_difference() > 2 || c.coefficients() > kMaxCuts || c.error_level() >= parts.error_levels.size())
+      return fail("an update's code is none");
+    coefficients += c.coefficients();
+  }
+  if (coefficients != parts.differences.size()) return fail("updates and coefficients do not fit");
+  if (coefficients > std::numeric_limits<std::uint32_t>::max()) return fail("more than 2^32 coefficients");
+  const Domain domain(d.grid.dims);
+  if (auto base = decode_base(d.base, domain); !base) return tl::unexpected(base.error());
+  parts.description.updates = parts.codes.size();
+  parts.description.coefficients = coefficients;
+  parts.description.content_hash = content_hash(d, parts);
+  return IntervalVolume(std::move(parts));
+}
+
+UpdateView IntervalVolume::update(const Place& p) const {
+  std::uint32_t difference = first_difference(p.brick, p.supercube);
+  for (UpdateIndex i = set_.first(p.brick, p.supercube); i < p.index; ++i) difference += codes_[i].coefficients();
+  return update(p.index, difference);
+}
+
+std::size_t IntervalVolume::memory_bytes() const {
+  return sizeof *this + description_.base.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
+         brick_level_.size() * 2 + brick_object_error_.size() * 4 + yields_.size() + supercube_level_.size() + first_in_brick_.size() * 2 +
+         differences_.size() + error_levels_.size() * sizeof(float);
+}
+
+}  // namespace intervale

@@ -1,0 +1,413 @@
+#include "common/ivm/ivm_file.h"
+
+#include <xxhash.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <utility>
+
+#include "common/codec/byte_planes.h"
+#include "common/codec/difference_coder.h"
+#include "common/util/atomic_file.h"
+
+namespace intervale {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "arrays are stored as they lie in memory: little endian");
+
+constexpr char kMagic[8] = {'\x89', 'I', 'V', 'M', '\r', '\n', '\x1a', '\n'};
+constexpr int kCompression = 9;               // zstd; 19 gains a few percent and takes ten times as long
+constexpr unsigned kSlotBytes = 7;            // of an occupancy word: 56 slots
+constexpr std::uint64_t kMaxRatio = 1 << 15;  // zstd's own: a block of 128 KiB in 4 bytes; a range coder's is less
+
+enum Section : std::uint32_t { kMeta, kBase, kErrors, kBricks, kMasks, kOccupancy, kYields, kLevels, kShapes, kDifferences, kSections };
+constexpr const char* kSectionNames[kSections] = {"meta",      "base",   "errors", "bricks", "masks",
+                                                  "occupancy", "yields", "levels", "shapes", "differences"};
+
+struct Header {
+  char magic[8];
+  std::uint32_t version, sections;
+  std::uint64_t file_bytes;
+  std::uint64_t checksum;  // XXH3 of header and section table, this field 0
+};
+struct Entry {
+  std::uint32_t section, reserved;
+  std::uint64_t offset, stored_bytes, raw_bytes;
+  std::uint64_t checksum;  // XXH3 of the stored bytes
+};
+struct Meta {
+  std::int32_t dims[3];
+  std::uint32_t refine;
+  double spacing[3], origin[3], range[2], max_error;
+  std::uint64_t updates, coefficients, supercubes, bricks, full_vertices, full_tets, content_hash;
+};
+static_assert(sizeof(Header) == 32 && sizeof(Entry) == 40 && sizeof(Meta) == 144, "no padding");
+
+constexpr std::size_t kTableBytes = sizeof(Header) + kSections * sizeof(Entry);
+
+// What a section holds, in the file and decompressed.
+struct Stored {
+  std::vector<std::uint8_t> bytes;
+  std::uint64_t raw_bytes = 0;
+};
+
+Stored compressed(const std::vector<std::uint8_t>& raw) {
+  Stored s{std::vector<std::uint8_t>(ZSTD_compressBound(raw.size())), raw.size()};
+  s.bytes.resize(ZSTD_compress(s.bytes.data(), s.bytes.size(), raw.data(), raw.size(), kCompression));
+  return s;
+}
+
+// The three below write what is in their last argument, or read into it: by number of the update.
+
+// An error is no smaller than its children's, and often their largest. Fine to coarse.
+template <class Coder>
+void code_levels(Coder& coder, const SupercubeSet& set, std::span<std::uint16_t> levels) {
+  std::array<std::array<NumberModel<9>, 2>, 3> without_children;
+  std::array<std::array<SmallNumberModel, 2>, 3> above_children;
+  std::vector<std::uint16_t> least(set.size());  // the largest level of a child and 1, 0 without children
+  static_assert(kErrorLevels == 512);
+  set.for_each_up([&](const Place& p) {
+    const int cls = class_of_slot(int(p.slot)), finest = scale_of_key(p.key) == 0;
+    std::uint16_t& level = levels[p.index];
+    const unsigned from = least[p.index];
+    if (from == 0) {
+      level = std::uint16_t(without_children[cls][finest].code(coder, level));
+    } else {
+      level = std::uint16_t((from - 1 + above_children[cls][finest].code(coder, (level - from + 1) & 511u)) & 511u);
+    }
+    for_each_parent(set, p, [&](UpdateIndex parent) { least[parent] = std::max(least[parent], std::uint16_t(level + 1)); });
+  });
+}
+
+// Where the parents have many cuts, so has an update. Coarse to fine.
+template <class Coder>
+void code_shapes(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> shapes) {
+  std::array<std::array<std::array<NumberModel<7>, 16>, 2>, 3> model;
+  set.for_each_down([&](const Place& p) {
+    unsigned cuts = 0;
+    for_each_parent(set, p, [&](UpdateIndex parent) { cuts += UpdateCode(shapes[parent]).coefficients(); });
+    std::uint8_t& shape = shapes[p.index];
+    shape = std::uint8_t(model[class_of_slot(int(p.slot))][scale_of_key(p.key) == 0][std::min(cuts, 15u)].code(coder, shape));
+  });
+}
+
+template <class Coder>
+void code_differences(Coder& coder, const SupercubeSet& set, std::span<const std::uint8_t> shapes, std::span<std::uint8_t> differences) {
+  DifferenceCoder model;
+  std::uint8_t* next = differences.data();
+  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+    set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
+      const UpdateCode code(shapes[p.index]);
+      model.code_cuts(coder, class_of_slot(int(p.slot)), code.side_difference(), code.coefficients(), code.first_cuts(), next);
+      next += code.coefficients();
+    });
+  }
+}
+
+template <class T>
+std::vector<std::uint8_t> bytes_of(std::span<const T> values) {
+  const auto* const first = reinterpret_cast<const std::uint8_t*>(values.data());
+  return {first, first + values.size_bytes()};
+}
+
+Meta meta_of(const IntervalVolume& volume) {
+  const Description& d = volume.description();
+  Meta meta{};
+  for (int i = 0; i < 3; ++i) {
+    meta.dims[i] = d.grid.dims[i];
+    meta.spacing[i] = d.grid.spacing[i];
+    meta.origin[i] = d.grid.origin[i];
+  }
+  meta.refine = std::uint32_t(d.refine);
+  meta.range[0] = d.range.alpha;
+  meta.range[1] = d.range.beta;
+  meta.max_error = d.max_error;
+  meta.updates = d.updates;
+  meta.coefficients = d.coefficients;
+  meta.supercubes = volume.set().supercubes();
+  meta.bricks = volume.set().bricks().size();
+  meta.full_vertices = d.full.vertices;
+  meta.full_tets = d.full.tets;
+  meta.content_hash = d.content_hash;
+  return meta;
+}
+
+Stored stored(const IntervalVolume& volume, Section section) {
+  std::vector<std::uint8_t> raw;
+  const SupercubeSet& set = volume.set();
+  const auto codes = volume.codes();
+  switch (section) {
+    case kMeta: {
+      const Meta meta = meta_of(volume);
+      return compressed(bytes_of(std::span<const Meta>(&meta, 1)));
+    }
+    case kBase:
+      return compressed(volume.description().base);
+    case kErrors:
+      return compressed(bytes_of(volume.error_levels()));
+    case kBricks: {
+      std::uint64_t previous = 0;
+      for (const SupercubeSet::Brick& b : set.bricks()) append_varint(raw, (b.key >> 6) - std::exchange(previous, b.key >> 6));
+      return compressed(raw);
+    }
+    case kMasks: {
+      std::vector<std::uint64_t> masks;
+      for (const SupercubeSet::Brick& b : set.bricks()) masks.push_back(b.mask);
+      return compressed(split_bytes(masks, 8));
+    }
+    case kOccupancy:
+      return compressed(split_bytes(set.occupancy(), kSlotBytes));
+    case kYields:
+      return compressed(bytes_of(volume.yields()));
+    case kLevels:
+    case kShapes:
+    case kDifferences:
+    case kSections:
+      break;
+  }
+  RangeEncoder coder;
+  if (section == kLevels) {
+    std::vector<std::uint16_t> levels;
+    levels.reserve(codes.size());
+    for (const UpdateCode c : codes) levels.push_back(std::uint16_t(c.error_level()));
+    code_levels(coder, set, levels);
+    return {coder.finish(), 2 * levels.size()};
+  }
+  for (const UpdateCode c : codes) raw.push_back(c.shape());
+  if (section == kShapes) {
+    code_shapes(coder, set, raw);
+    return {coder.finish(), raw.size()};
+  }
+  std::vector<std::uint8_t> differences(volume.differences().begin(), volume.differences().end());
+  code_differences(coder, set, raw, differences);
+  return {coder.finish(), differences.size()};
+}
+
+std::uint64_t table_checksum(std::span<const std::byte> table) {
+  std::vector<std::byte> copy(table.begin(), table.end());
+  std::memset(copy.data() + offsetof(Header, checksum), 0, 8);
+  return XXH3_64bits(copy.data(), copy.size());
+}
+
+tl::unexpected<Error> does_not_decompress(const Entry& e) {
+  return fail(std::string("section '") + kSectionNames[e.section] + "' does not decompress");
+}
+
+// The raw bytes of a section that zstd compressed.
+Result<std::vector<std::uint8_t>> read(std::span<const std::uint8_t> file, const Entry& e) {
+  const auto bytes = file.subspan(e.offset, e.stored_bytes);
+  std::vector<std::uint8_t> raw(e.raw_bytes);
+  const std::size_t got = ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size());
+  if (ZSTD_isError(got) || got != raw.size()) return does_not_decompress(e);
+  return raw;
+}
+
+// The supercubes' keys from bricks and masks; ascending.
+Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> steps, std::span<const std::uint64_t> masks, std::uint64_t count) {
+  std::vector<SupercubeKey> keys;
+  keys.reserve(count);
+  std::uint64_t brick = 0;
+  for (std::size_t b = 0; b < masks.size(); ++b) {
+    const auto step = take_varint(steps);
+    if (!step || (b > 0 && *step == 0) || *step >= (std::uint64_t(1) << 56) - brick || masks[b] == 0) return fail("bricks do not ascend");
+    brick += *step;
+    const SupercubeKey first = brick << 6;
+    if (scale_of_key(first) < 0 || scale_of_key(first) >= kMaxLevels) return fail("a brick is of no scale");
+    for (std::uint64_t mask = masks[b]; mask != 0; mask &= mask - 1) {
+      if (keys.size() == count) return fail("more supercubes than there should be");
+      keys.push_back(first + unsigned(std::countr_zero(mask)));
+      const Vertex p = position_of_key(keys.back());
+      if (std::max({p.x, p.y, p.z}) > (1 << kMaxLevels) >> (scale_of_key(first) + 2)) return fail("a supercube beyond any grid");
+    }
+  }
+  if (keys.size() != count || !steps.empty()) return fail("bricks and supercubes do not fit");
+  return keys;
+}
+
+// That a file of so many bytes may begin like this: with its header and section table, or with all there is of them.
+Result<void> check_start(std::span<const std::byte> start, std::uint64_t bytes) {
+  Header header;
+  if (start.size() < sizeof kMagic || std::memcmp(start.data(), kMagic, sizeof kMagic) != 0) return fail("not an interval volume file (.ivm)");
+  if (start.size() < kTableBytes) return fail("the file ends within its header");
+  std::memcpy(&header, start.data(), sizeof header);
+  if (header.version != kIvmVersion) {
+    return fail("version " + std::to_string(header.version) + " of the format, this program reads version " + std::to_string(kIvmVersion) +
+                (header.version > kIvmVersion ? "; a newer program is wanted" : "; build the file again"));
+  }
+  if (header.checksum != table_checksum(start.first(kTableBytes))) return fail("the header is damaged (checksum)");
+  if (header.sections != kSections)
+    return fail("the header names " + std::to_string(header.sections) + " sections, not " + std::to_string(kSections));
+  if (header.file_bytes != bytes) {
+    return fail("the file has " + std::to_string(bytes) + " bytes, " + std::to_string(header.file_bytes) + " expected: it was cut short or added to");
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel) {
+  std::vector<std::byte> file(kTableBytes);
+  Header header{};
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  header.version = kIvmVersion;
+  header.sections = kSections;
+  // Only what is to be stored is kept: all sections as they are would be as large as the volume that they come from.
+  std::array<Stored, kSections> sections;
+  parallel(kSections, [&](std::size_t s) { sections[s] = stored(volume, Section(s)); });
+  for (std::size_t s = 0; s < kSections; ++s) {
+    const auto bytes = std::as_bytes(std::span(sections[s].bytes));
+    const Entry e{std::uint32_t(s), 0, file.size(), bytes.size(), sections[s].raw_bytes, XXH3_64bits(bytes.data(), bytes.size())};
+    std::memcpy(file.data() + sizeof(Header) + s * sizeof(Entry), &e, sizeof e);
+    file.insert(file.end(), bytes.begin(), bytes.end());
+    sections[s] = Stored();
+  }
+  header.file_bytes = file.size();
+  std::memcpy(file.data(), &header, sizeof header);
+  header.checksum = table_checksum(std::span(file).first(kTableBytes));
+  std::memcpy(file.data(), &header, sizeof header);
+  return file;
+}
+
+Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string name) {
+  if (auto checked = check_start(file.first(std::min(file.size(), kTableBytes)), file.size()); !checked) return tl::unexpected(checked.error());
+  Entry entries[kSections];
+  std::uint64_t next = kTableBytes;
+  for (int s = 0; s < int(kSections); ++s) {
+    Entry& e = entries[s];
+    std::memcpy(&e, file.data() + sizeof(Header) + s * sizeof(Entry), sizeof e);
+    if (e.section != std::uint32_t(s) || e.reserved != 0 || e.offset != next || e.stored_bytes > file.size() - next)
+      return fail("the section table is damaged");
+    next += e.stored_bytes;
+    if (XXH3_64bits(file.data() + e.offset, e.stored_bytes) != e.checksum)
+      return fail(std::string("section '") + kSectionNames[s] + "' is damaged (checksum)");
+    if (e.raw_bytes / kMaxRatio > e.stored_bytes + 4)
+      return fail(std::string("section '") + kSectionNames[s] + "' claims more bytes than it can hold");
+  }
+  if (next != file.size()) return fail("bytes after the last section");
+
+  const auto is_size = [&entries](Section section, std::uint64_t expected) -> Result<void> {
+    const std::uint64_t bytes = entries[section].raw_bytes;
+    if (bytes == expected) return {};
+    return fail(std::string("section '") + kSectionNames[section] + "' has " + std::to_string(bytes) + " bytes, " + std::to_string(expected) +
+                " expected");
+  };
+  const std::span all(reinterpret_cast<const std::uint8_t*>(file.data()), file.size());
+  if (auto ok = is_size(kMeta, sizeof(Meta)); !ok) return tl::unexpected(ok.error());
+  const auto meta_bytes = read(all, entries[kMeta]);
+  if (!meta_bytes) return tl::unexpected(meta_bytes.error());
+  Meta meta;
+  std::memcpy(&meta, meta_bytes->data(), sizeof meta);
+  IntervalVolume::Parts parts;
+  Description& d = parts.description;
+  d.name = std::move(name);
+  for (int i = 0; i < 3; ++i) {
+    d.grid.dims[i] = meta.dims[i];
+    d.grid.spacing[i] = meta.spacing[i];
+    d.grid.origin[i] = meta.origin[i];
+  }
+  if (meta.refine > 1) return fail("the way of refining is none");
+  d.refine = Refine(meta.refine);
+  d.range = {meta.range[0], meta.range[1]};
+  d.max_error = meta.max_error;
+  d.full = {meta.full_vertices, meta.full_tets};
+  // Counts before contents: each must be what its section holds.
+  if (entries[kErrors].raw_bytes > kErrorLevels * sizeof(float) || entries[kErrors].raw_bytes % sizeof(float) != 0)
+    return fail("error levels out of range");
+  if (meta.bricks > meta.supercubes || meta.supercubes > meta.updates || meta.updates > meta.supercubes * kSlots ||
+      meta.coefficients > meta.updates * kMaxCuts || meta.updates > std::numeric_limits<UpdateIndex>::max()) {
+    return fail("the counts do not fit");
+  }
+  const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},  {kOccupancy, meta.supercubes * kSlotBytes},
+                                                        {kYields, meta.supercubes}, {kLevels, 2 * meta.updates},
+                                                        {kShapes, meta.updates},    {kDifferences, meta.coefficients}};
+  for (const auto& [section, bytes] : expected) {
+    if (auto ok = is_size(section, bytes); !ok) return tl::unexpected(ok.error());
+  }
+  Result<std::vector<std::uint8_t>> raw[kLevels];
+  for (int s = kBase; s < int(kLevels); ++s) {
+    raw[s] = read(all, entries[s]);
+    if (!raw[s]) return tl::unexpected(raw[s].error());
+  }
+  const auto keys = supercube_keys(*raw[kBricks], join_bytes(*raw[kMasks], 8), meta.supercubes);
+  if (!keys) return tl::unexpected(keys.error());
+  auto occupancy = join_bytes(*raw[kOccupancy], kSlotBytes);
+  std::uint64_t slots = 0;
+  for (std::uint64_t word : occupancy) {
+    if (word == 0) return fail("a supercube without a diamond");
+    slots += std::popcount(word);
+  }
+  if (slots != meta.updates) return fail("updates and supercubes do not fit");
+  d.base = std::move(*raw[kBase]);
+  parts.error_levels.resize(raw[kErrors]->size() / sizeof(float));
+  if (!parts.error_levels.empty()) std::memcpy(parts.error_levels.data(), raw[kErrors]->data(), raw[kErrors]->size());
+  for (const std::uint8_t step : *raw[kYields]) parts.yields.emplace_back(step);
+  parts.set = SupercubeSet(*keys, std::move(occupancy));
+  const auto coded = [&](Section section) { return all.subspan(entries[section].offset, entries[section].stored_bytes); };
+  std::vector<std::uint16_t> levels(meta.updates);
+  RangeDecoder level_coder(coded(kLevels));
+  code_levels(level_coder, parts.set, levels);
+  if (!level_coder.is_spent()) return does_not_decompress(entries[kLevels]);
+  std::vector<std::uint8_t> shapes(meta.updates);
+  RangeDecoder shape_coder(coded(kShapes));
+  code_shapes(shape_coder, parts.set, shapes);
+  if (!shape_coder.is_spent()) return does_not_decompress(entries[kShapes]);
+  parts.codes.reserve(meta.updates);
+  std::uint64_t coefficients = 0;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const UpdateCode code(std::uint16_t(shapes[i] | levels[i] << 7));
+    if (code.side_difference() > 2 || code.coefficients() > kMaxCuts) return fail("an update's code is none");
+    parts.codes.push_back(code);
+    coefficients += code.coefficients();
+  }
+  if (coefficients != meta.coefficients) return fail("updates and coefficients do not fit");
+  parts.differences.resize(meta.coefficients);
+  RangeDecoder difference_coder(coded(kDifferences));
+  code_differences(difference_coder, parts.set, shapes, parts.differences);
+  if (!difference_coder.is_spent()) return does_not_decompress(entries[kDifferences]);
+  auto volume = IntervalVolume::assemble(std::move(parts));
+  if (volume && volume->description().content_hash != meta.content_hash) return fail("the contents are not those that were written (content hash)");
+  return volume;
+}
+
+Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (auto ok = file->write(encode_ivm(volume, parallel)); !ok) return ok;
+  return file->commit();
+}
+
+Result<std::vector<std::byte>> read_ivm(const std::filesystem::path& path) {
+  const auto because = [&path](const std::string& why) { return fail(path.string() + ": " + why); };
+  std::error_code code;
+  if (std::filesystem::is_directory(path, code)) return because("is a folder, not an interval volume file (.ivm)");
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in) return because(std::strerror(errno));
+  const std::streamoff size = in.tellg();
+  if (size < 0) return because("not a file that can be read at once");
+  std::vector<std::byte> bytes(std::min(kTableBytes, static_cast<std::size_t>(size)));
+  in.seekg(0);
+  in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
+  const auto read = bytes.size();
+  if (in) {
+    if (auto checked = check_start(bytes, std::uint64_t(size)); !checked) return because(checked.error().message);
+    bytes.resize(static_cast<std::size_t>(size));
+    in.read(reinterpret_cast<char*>(bytes.data() + read), std::streamsize(bytes.size() - read));
+  }
+  if (!in) return because("could not be read to its end");
+  return bytes;
+}
+
+Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path) {
+  const auto bytes = read_ivm(path);
+  if (!bytes) return tl::unexpected(bytes.error());
+  auto volume = decode_ivm(*bytes, path.stem().string());
+  if (!volume) return fail(path.string() + ": " + volume.error().message);
+  return std::make_shared<const IntervalVolume>(std::move(*volume));
+}
+
+}  // namespace intervale

@@ -1,0 +1,77 @@
+#include "common/ivm/refinement.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "common/ivm/ranking.h"
+
+namespace intervale {
+
+SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>& wants) {
+  SplitSet chosen(set.size());
+  set.for_each_up([&](const Place& p) {
+    if (!chosen.contains(p.index)) {
+      if (!wants(p)) return;
+      chosen.insert(p.index);
+    }
+    for_each_parent(set, p, [&](UpdateIndex parent) { chosen.insert(parent); });
+  });
+  return chosen;
+}
+
+SplitSet select(const IntervalVolume& volume, const Lod& lod) {
+  // Bricks that want nothing are passed over.
+  const Ranking ranking(volume, lod);
+  SplitSet wanted(volume.size());
+  const SupercubeSet& set = volume.set();
+  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+    const Ranking::Brick brick = ranking.of_brick(b);
+    if (brick.bound() == 0) continue;
+    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+      const Ranking::Supercube rank = brick.supercube(s, key);
+      UpdateIndex i = set.first(b, s);
+      for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
+        if (rank(i, std::countr_zero(left)) != 0) wanted.insert(i);
+      }
+    });
+  }
+  if (!lod.roi && !lod.camera) return wanted;  // saturated errors are closed as they are
+  return select(set, [&wanted](const Place& p) { return wanted.contains(p.index); });
+}
+
+std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& updates, const Lod& lod) {
+  const Ranking ranking(volume, lod);
+  const SupercubeSet& set = volume.set();
+  std::vector<Ranking::Rank> ranks(volume.size());
+  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+    const Ranking::Brick brick = ranking.of_brick(b);
+    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+      const Ranking::Supercube rank = brick.supercube(s, key);
+      UpdateIndex i = set.first(b, s);
+      for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
+        if (updates.contains(i)) ranks[i] = rank(i, std::countr_zero(left));
+      }
+    });
+  }
+  if (lod.roi || lod.camera) {
+    set.for_each_up([&](const Place& p) {
+      if (!updates.contains(p.index)) return;
+      for_each_parent(set, p, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
+    });
+  }
+  // A counting sort over the coarse to fine order.
+  constexpr std::size_t kRanks = std::numeric_limits<Ranking::Rank>::max() + std::size_t(1);
+  std::vector<std::uint32_t> begin(kRanks + 1, 0);
+  for (UpdateIndex i = 0; i < volume.size(); ++i) {
+    if (updates.contains(i)) ++begin[kRanks - ranks[i]];
+  }
+  for (std::size_t k = 0; k < kRanks; ++k) begin[k + 1] += begin[k];
+  std::vector<UpdateIndex> order(begin[kRanks]);
+  set.for_each_down([&](const Place& p) {
+    if (updates.contains(p.index)) order[begin[kRanks - 1 - ranks[p.index]]++] = p.index;
+  });
+  return order;
+}
+
+}  // namespace intervale

@@ -1,0 +1,46 @@
+// An indexed tetrahedral mesh of an interval volume.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <utility>
+#include <vector>
+
+namespace intervale {
+
+// What a mesh point lies on: a grid vertex inside the range, the alpha surface or the beta surface.
+enum class Surface : std::uint8_t { inside = 0, alpha = 1, beta = 2 };
+
+// A vector whose new elements are not set to anything until they are written: a large mesh is written once, by many threads.
+template <class T>
+struct Unset : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = Unset<U>;
+  };
+  template <class U>
+  void construct(U* p) {
+    ::new (static_cast<void*>(p)) U;
+  }
+  template <class U, class... Args>
+  void construct(U* p, Args&&... args) {
+    ::new (static_cast<void*>(p)) U(std::forward<Args>(args)...);
+  }
+};
+template <class T>
+using MeshArray = std::vector<T, Unset<T>>;
+
+// Points in world coordinates, each used by a tetrahedron and given once; tetrahedra as four point indices, positively oriented:
+// (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).
+struct Mesh {
+  MeshArray<std::array<double, 3>> points;
+  MeshArray<Surface> surface;  // one for each point
+  MeshArray<std::array<std::uint32_t, 4>> tets;
+};
+
+// The sum of the volumes of the tetrahedra, world units cubed; compensated, so that it does not depend on their order to 1e-12 relative.
+[[nodiscard]] double volume_of(const Mesh& mesh);
+
+}  // namespace intervale

@@ -1,0 +1,50 @@
+// What there is to know about an interval volume before its first update.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/diamond/grid.h"
+#include "common/util/result.h"
+
+namespace intervale {
+
+enum class Refine : std::uint8_t { boundary = 0, uniform = 1 };  // which diamonds count; see relevance.h
+
+// The closed range of values kept, alpha <= beta; either may be infinite.
+struct Range {
+  double alpha = 0;
+  double beta = 0;
+  friend bool operator==(const Range&, const Range&) = default;
+};
+
+// Size of the mesh at error 0.
+struct FullMesh {
+  std::uint64_t vertices = 0;
+  std::uint64_t tets = 0;
+  [[nodiscard]] std::uint64_t indexed_bytes() const { return 12 * vertices + 16 * tets; }  // three floats a vertex, four indices a tetrahedron
+  friend bool operator==(const FullMesh&, const FullMesh&) = default;
+};
+
+// Everything about an interval volume but its updates. A client starts from this.
+struct Description {
+  std::string name;
+  Grid grid;
+  Range range;
+  Refine refine = Refine::boundary;
+  double max_error = 0;            // the largest error of a relevant diamond, in the field's units; 0 if there is none
+  std::uint64_t updates = 0;       // relevant diamonds
+  std::uint64_t coefficients = 0;  // cuts on their subdivision edges
+  FullMesh full;
+  std::uint64_t content_hash = 0;  // equal for equal contents, whatever the name
+  std::vector<std::uint8_t> base;  // the sides of the 8 corners and the cuts on the root's edges; see base.h
+  friend bool operator==(const Description&, const Description&) = default;
+};
+
+// Checks a description from outside: sides within bounds, the box finite and not flat, a range, numbers that can be. The base is checked by
+// decode_base.
+[[nodiscard]] Result<void> check_description(const Description& description);
+
+}  // namespace intervale

@@ -1,0 +1,54 @@
+// Sides of a range, and where its two surfaces cut an edge.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "common/patch/description.h"
+
+namespace intervale {
+
+// R(v): below alpha, in [alpha, beta], above beta.
+enum class Side : std::uint8_t { below = 0, inside = 1, above = 2 };
+
+[[nodiscard]] constexpr Side side_of(double value, const Range& range) {
+  return value < range.alpha ? Side::below : value > range.beta ? Side::above : Side::inside;
+}
+
+// Whether an edge between these sides is cut by the alpha surface, by the beta surface, and by how many of the two.
+[[nodiscard]] constexpr bool alpha_cuts(Side a, Side b) { return (a == Side::below) != (b == Side::below); }
+[[nodiscard]] constexpr bool beta_cuts(Side a, Side b) { return (a == Side::above) != (b == Side::above); }
+[[nodiscard]] constexpr int cut_count(Side a, Side b) { return a > b ? int(a) - int(b) : int(b) - int(a); }
+
+// The cuts on one edge, alpha before beta, as steps of 1/256 of the edge from its first end: the cut lies at (q + 0.5) / 256.
+struct Cuts {
+  std::uint8_t count = 0;
+  std::uint8_t q[2] = {0, 0};
+};
+
+// The same cuts seen from the edge's other end.
+[[nodiscard]] constexpr Cuts reversed(Cuts c) {
+  c.q[0] = std::uint8_t(255 - c.q[0]);
+  c.q[1] = std::uint8_t(255 - c.q[1]);
+  return c;
+}
+
+// Cuts of the edge whose ends hold the finite values `from` and `to`; seen from the other end they are the same. Where alpha < beta and both surfaces
+// cut, the cut nearer to `from` stays strictly nearer.
+[[nodiscard]] inline Cuts cuts_between(double from, double to, const Range& range) {
+  const double low = std::min(from, to), high = std::max(from, to);
+  const Side a = side_of(low, range), b = side_of(high, range);
+  const double whole = high / 2 - low / 2;  // halved: the difference of two doubles can overflow
+  const auto quantised = [low, whole](double kappa) { return std::uint8_t(std::clamp((kappa / 2 - low / 2) / whole * 256, 0.0, 255.0)); };
+  Cuts cuts;
+  if (alpha_cuts(a, b)) cuts.q[cuts.count++] = quantised(range.alpha);
+  if (beta_cuts(a, b)) cuts.q[cuts.count++] = quantised(range.beta);
+  if (cuts.count == 2 && range.alpha < range.beta && cuts.q[0] >= cuts.q[1]) {
+    if (cuts.q[0] == 255) cuts.q[0] = 254;
+    cuts.q[1] = std::uint8_t(cuts.q[0] + 1);
+  }
+  return from > to ? reversed(cuts) : cuts;
+}
+
+}  // namespace intervale

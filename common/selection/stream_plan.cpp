@@ -1,0 +1,307 @@
+#include "common/selection/stream_plan.h"
+
+#include <algorithm>
+#include <bit>
+#include <boost/unordered/unordered_flat_map.hpp>
+#include <boost/unordered/unordered_flat_set.hpp>
+
+#include "common/diamond/links.h"
+#include "common/diamond/surroundings.h"
+#include "common/ivm/batch_encoder.h"
+#include "common/ivm/refinement.h"
+
+namespace intervale {
+namespace {
+
+constexpr std::size_t kBrickBytes = 18;       // naming one takes at most: a step and a mask
+constexpr std::size_t kSupercubeBytes = 7;    // a word of slots
+constexpr std::size_t kPlaneBytes = 64;       // lengths of all planes
+constexpr std::size_t kSmallBatch = 8 << 10;  // a band's end closes a batch no smaller than this
+constexpr std::uint32_t kTurn = 1 << 16;      // updates looked at before others get their turn
+
+}  // namespace
+
+// The batch being put together.
+struct StreamPlan::Chunk {
+  Surroundings around;              // of the supercube looked into
+  std::vector<Surroundings> above;  // of ancestors, by scale
+  std::vector<SlotGroup> groups;
+  boost::unordered_flat_map<std::uint32_t, std::uint32_t> group_of;  // by supercube
+  boost::unordered_flat_set<std::uint32_t> bricks;
+  std::size_t max_bytes = 0, bytes = kPlaneBytes;
+  std::uint32_t updates = 0;
+  std::uint32_t seen = 0;  // updates looked at
+
+  Chunk(const IntervalVolume& volume, std::size_t most) : around(volume.set()), above(kMaxLevels, Surroundings(volume.set())), max_bytes(most) {}
+  SlotGroup* find(std::uint32_t supercube) {
+    if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
+    const auto found = group_of.find(supercube);
+    return found == group_of.end() ? nullptr : &groups[found->second];
+  }
+  SlotGroup& add(const SlotGroup& group) {
+    group_of.emplace(group.supercube, std::uint32_t(groups.size()));
+    return groups.emplace_back(group);
+  }
+};
+
+StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()) {
+  const auto bricks = volume_->set().bricks();
+  waiting_.resize(bricks.size());
+  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
+    const UpdateIndex end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
+    waiting_[b].unsent = std::uint16_t(end - bricks[b].first);
+    waiting_[b].level = std::uint16_t(volume_->brick_error_level(b));
+    waiting_[b].object_error = Up16(volume_->brick_object_error(b));
+  }
+  const auto half_levels = volume_->supercube_half_levels();
+  half_levels_.assign(half_levels.begin(), half_levels.end());
+}
+
+bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
+  const SupercubeSet& set = volume_->set();
+  const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
+  if (!found || (slots & ~set.occupancy()[found->supercube]) != 0) return false;
+  for (; slots != 0; slots &= slots - 1) {
+    const UpdateIndex i = set.place_in(found->brick, found->supercube, key, std::countr_zero(slots)).index;
+    if (sent_.contains(i)) continue;
+    sent_.insert(i);
+    ++sent_count_;
+    --waiting_[found->brick].unsent;
+  }
+  return true;
+}
+
+bool StreamPlan::forget(std::span<const SlotGroup> groups) {
+  const SupercubeSet& set = volume_->set();
+  const auto find = [&set](SupercubeKey key) { return set.find_supercube(scale_of_key(key), position_of_key(key)); };
+  for (const SlotGroup& g : groups) {
+    const auto found = find(g.key);
+    if (!found || (g.slots & ~set.occupancy()[found->supercube]) != 0) return false;
+  }
+  const auto has_sent_child = [&](const Diamond& d) {
+    for (int k = 0; k < d.row->children && d.has_children(); ++k) {
+      const Vertex c = d.child(k);
+      if ((c.x | c.y | c.z) < 0) continue;
+      const auto child = set.find(c);
+      if (child && sent_.contains(child->index)) return true;
+    }
+    return false;
+  };
+  for_each_finest_first(groups, [&](const SlotGroup& g, std::uint64_t slots) {
+    const auto found = *find(g.key);
+    Waiting& waiting = waiting_[found.brick];
+    for (std::uint64_t left = slots; left != 0; left &= left - 1) {
+      const Place place = set.place_in(found.brick, found.supercube, g.key, std::countr_zero(left));
+      if (!sent_.contains(place.index) || has_sent_child(Diamond(set.centre(place)))) continue;
+      sent_.erase(place.index);
+      --sent_count_;
+      ++waiting.unsent;
+      const unsigned level = volume_->error_level(place.index);
+      waiting.level = std::max(waiting.level, std::uint16_t(level));
+      waiting.object_error = Up16(std::max(float(waiting.object_error), volume_->object_error(found.supercube, scale_of_key(g.key), level)));
+      half_levels_[found.supercube] = std::max(half_levels_[found.supercube], volume_->half_of_level(level));
+    }
+  });
+  return true;
+}
+
+void StreamPlan::set_lod(const Lod& lod) {
+  only_.reset();
+  if (lod.max_updates) {
+    SplitSet wanted = select(*volume_, lod);
+    if (wanted.count() > *lod.max_updates) {
+      const auto order = in_order(*volume_, wanted, lod);
+      for (std::size_t i = *lod.max_updates; i < order.size(); ++i) wanted.erase(order[i]);
+    }
+    only_ = std::move(wanted);
+  }
+  ranking_.emplace(*volume_, lod);
+  for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
+    const Waiting& w = waiting_[b];
+    if (w.unsent == 0) continue;
+    set_waiting(b, std::max(ranking_->of_brick(b, w.level, float(w.object_error)).bound(), only_ ? Rank(1) : Rank(0)), w.unsent);
+  }
+  begin_band();
+}
+
+void StreamPlan::set_waiting(std::uint32_t brick, Rank rank, unsigned wanted) {
+  Waiting& w = waiting_[brick];
+  if (w.unsent == 0) rank = 0;
+  wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, w.unsent);
+  wanted_count_ += wanted - std::uint64_t(w.wanted);
+  waiting_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(w.rank != 0);
+  w.rank = rank;
+  w.wanted = std::uint16_t(wanted);
+}
+
+void StreamPlan::begin_band() {
+  next_brick_ = std::uint32_t(waiting_.size());
+  Rank top = 0;
+  for (const Waiting& w : waiting_) top = std::max(top, w.rank);
+  band_ = top == 0 ? Rank(0) : ranking_->band_below(top);
+}
+
+StreamPlan::ToGo StreamPlan::to_go() const {
+  Rank top = 0;
+  for (const Waiting& w : waiting_) top = std::max(top, w.rank);
+  ToGo to_go{wanted_count_, 0, 0};
+  if (top == 0) return to_go;
+  if (!ranking_->has_camera()) {
+    to_go.error = ranking_->bound(top);
+    return to_go;
+  }
+  to_go.pixels = ranking_->bound(top);
+  unsigned level = 0;
+  for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
+    if (waiting_[b].rank != 0) level = std::max(level, unsigned(waiting_[b].level));
+  }
+  to_go.error = volume_->error_levels()[level];
+  return to_go;
+}
+
+// Puts an update into the batch, after the ancestors it lacks. around: of its supercube; those of ancestors are kept too, for the next ones are near
+// by. False if the batch is full first; what went in is closed under parents all the same.
+bool StreamPlan::take(const Place& place, Surroundings& around, Chunk& chunk) {
+  const Links& links = around.links(int(place.slot));
+  const int parents = diamond_type(kTypeOfSlot[place.slot]).parents;
+  for (int k = 0; k < parents; ++k) {
+    const Link link = links.vertex[links.parent[k]];
+    around.move_to(place.key);  // an ancestor of the same scale may have moved it
+    const Surroundings::Seen& seen = around.at(link.where);
+    if (!seen.has(link.slot) || sent_.contains(seen.number(link.slot))) continue;
+    const Place parent = seen.place(link.slot);
+    Surroundings& above = chunk.above[std::size_t(scale_of_key(parent.key))];
+    above.move_to(parent.key);
+    if (!take(parent, above, chunk)) return false;
+  }
+  return sent_.contains(place.index) || put(place, chunk);
+}
+
+bool StreamPlan::put(const Place& place, Chunk& chunk) {
+  std::size_t bytes = 1 + volume_->codes()[place.index].coefficients();
+  SlotGroup* group = chunk.find(place.supercube);
+  const bool new_brick = group == nullptr && !chunk.bricks.contains(place.brick);
+  if (group == nullptr) bytes += kSupercubeBytes + (new_brick ? kBrickBytes : 0);
+  if (chunk.bytes + bytes > chunk.max_bytes || chunk.updates == kBatchUpdatesMost || sent_count_ >= room_) return false;
+  chunk.bytes += bytes;
+  ++chunk.updates;
+  if (new_brick) chunk.bricks.insert(place.brick);
+  if (group == nullptr) group = &chunk.add({place.brick, place.supercube, place.key, 0});
+  group->slots |= std::uint64_t(1) << place.slot;
+  sent_.insert(place.index);
+  ++sent_count_;
+  Waiting& w = waiting_[place.brick];
+  --w.unsent;
+  if (w.wanted > w.unsent) set_waiting(place.brick, w.rank, w.unsent);
+  return true;
+}
+
+// Takes what the band wants of a brick. False if the batch is full first.
+bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
+  const SupercubeSet& set = volume_->set();
+  const Ranking::Brick ranking = ranking_->of_brick(brick);
+  // Of what is left: no lower than any of it.
+  Rank most = 0;
+  unsigned left_wanted = 0, level = 0;
+  float object_error = 0;
+  bool full = false;
+  set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+    if (full) return;
+    const UpdateIndex first = set.first(brick, s);
+    const std::uint64_t occupancy = set.occupancy()[s];
+    const auto count = unsigned(std::popcount(occupancy));
+    ++chunk.seen;
+    const std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
+    const std::uint64_t may_be_sent = only_ ? unsent & only_->some(first, count) : unsent;
+    unsigned level_here = 0;
+    if (may_be_sent != 0) {
+      const Ranking::Supercube here = ranking.supercube(s, key);
+      level_here = volume_->level_of_half(half_levels_[s]);
+      const Rank bound = std::max(here.bound(level_here), only_ ? Rank(1) : Rank(0));  // only_ has ancestors too: they come last
+      if (bound < band_) {
+        most = std::max(most, bound);
+        left_wanted += bound == 0 ? 0 : unsigned(std::popcount(may_be_sent));
+      } else {
+        chunk.seen += count;
+        chunk.around.move_to(key);
+        const Left left = look_into(here, {key, brick, s, 0, first}, occupancy, may_be_sent, chunk);
+        full = left.full;
+        if (full) return;
+        most = std::max(most, left.most);
+        left_wanted += left.wanted;
+        level_here = left.level;
+        for (std::uint64_t others = unsent & ~may_be_sent; others != 0; others &= others - 1) {
+          level_here = std::max(level_here, volume_->error_level(first + UpdateIndex(std::countr_zero(others))));
+        }
+        half_levels_[s] = volume_->half_of_level(level_here);
+      }
+    } else if (unsent != 0) {
+      level_here = volume_->level_of_half(half_levels_[s]);
+    }
+    if (unsent == 0) return;
+    level = std::max(level, level_here);
+    object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), level_here));
+  });
+  if (full) return false;
+  set_waiting(brick, most, left_wanted);
+  waiting_[brick].level = std::uint16_t(level);
+  waiting_[brick].object_error = Up16(object_error);
+  return true;
+}
+
+// Takes what the band wants of a supercube. place: its first update. may_be_sent: a bit for each of its updates, in their order.
+StreamPlan::Left StreamPlan::look_into(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent,
+                                       Chunk& chunk) {
+  const float in_band = ranking.least(band_), least = only_ ? ranking.least(1) : 0;
+  const UpdateIndex first = place.index;
+  Left left;
+  float most = 0;
+  unsigned at = 0;  // of the update last looked at, its number in the supercube, and 1
+  for (; may_be_sent != 0; may_be_sent &= may_be_sent - 1) {
+    const auto k = unsigned(std::countr_zero(may_be_sent));
+    for (; at <= k; ++at, occupancy &= occupancy - 1) place.slot = std::uint32_t(std::countr_zero(occupancy));
+    const unsigned level = volume_->error_level(first + k);
+    float importance = ranking.importance(level);
+    if (importance > 0 && !ranking.meets_roi(int(place.slot))) importance = 0;
+    importance = std::max(importance, least);
+    if (importance > 0 && importance >= in_band) {
+      place.index = first + k;
+      if (!take(place, chunk.around, chunk)) {
+        left.full = true;
+        return left;
+      }
+      continue;
+    }
+    left.level = std::max(left.level, level);
+    left.wanted += importance > 0;
+    most = std::max(most, importance);
+  }
+  left.most = ranking.rank(most);
+  return left;
+}
+
+std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
+  Chunk chunk(*volume_, max_bytes);
+  while (!done()) {
+    if (next_brick_ == 0) {
+      if (chunk.bytes >= kSmallBatch) break;
+      begin_band();
+    }
+    if (waiting_[next_brick_ - 1].rank < band_) {
+      --next_brick_;
+      continue;
+    }
+    if (!look_into(next_brick_ - 1, chunk)) break;
+    --next_brick_;
+    if (chunk.seen >= kTurn) break;
+  }
+  if (chunk.updates == 0) return {};
+  std::vector<SlotGroup>& groups = chunk.groups;
+  std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
+  Batch batch;
+  batch.payload = encode_batch(*volume_, sent_, groups);
+  batch.updates = chunk.updates;
+  return batch;
+}
+
+}  // namespace intervale

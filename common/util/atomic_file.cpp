@@ -1,0 +1,146 @@
+#include "common/util/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cassert>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace intervale {
+namespace {
+
+constexpr std::size_t kBufferBytes = 1 << 20;
+constexpr int kNameAttempts = 16;
+
+tl::unexpected<Error> failed(const char* what, const std::filesystem::path& path, int error) {
+  return fail(std::string("cannot ") + what + " '" + path.string() + "': " + std::generic_category().message(error));
+}
+
+// A link is followed, so that the file it points to is replaced and not the link itself.
+std::filesystem::path followed(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_symlink(path, ignored)) return path;
+  const auto target = std::filesystem::canonical(path, ignored);
+  return target.empty() ? path : target;
+}
+
+// Short whatever the final name is: a name beside one of 255 bytes must itself fit into 255.
+std::string unique_name() {
+  static std::atomic<std::uint64_t> counter{0};
+  static const std::uint64_t salt = std::random_device{}();
+  return ".intervale-" + std::to_string(::getpid()) + "-" + std::to_string(salt) + "-" + std::to_string(counter.fetch_add(1)) + ".part";
+}
+
+Result<void> write_all(int descriptor, const std::byte* data, std::size_t size, const std::filesystem::path& path) {
+  while (size > 0) {
+    const ssize_t written = ::write(descriptor, data, size);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return failed("write", path, errno);
+    }
+    data += written;
+    size -= static_cast<std::size_t>(written);
+  }
+  return {};
+}
+
+// Makes the renaming itself survive a power cut. File systems that cannot sync a folder say so with EINVAL, which harms nothing.
+Result<void> sync_folder(const std::filesystem::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0)
+    return errno == EACCES ? Result<void>{} : failed("open the folder", folder, errno);  // writable but not readable: no way to sync
+  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
+  ::close(descriptor);
+  if (error != 0 && error != EINVAL) return failed("sync the folder", folder, error);
+  return {};
+}
+
+std::filesystem::path folder_of(const std::filesystem::path& path) { return path.has_parent_path() ? path.parent_path() : "."; }
+
+}  // namespace
+
+AtomicFile::AtomicFile(std::filesystem::path path, std::filesystem::path beside, int descriptor)
+    : path_(std::move(path)), beside_(std::move(beside)), descriptor_(descriptor) {
+  buffer_.reserve(kBufferBytes);
+}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      beside_(std::move(other.beside_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      buffer_(std::move(other.buffer_)) {}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  if (!beside_.empty()) ::unlink(beside_.c_str());
+}
+
+Result<AtomicFile> AtomicFile::create(const std::filesystem::path& wanted) {
+  if (wanted.empty()) return misuse("the output file has no name");
+  const auto path = followed(wanted);
+  struct stat status {};
+  const bool exists = ::stat(path.c_str(), &status) == 0;
+  if (exists && S_ISDIR(status.st_mode)) return fail("cannot write '" + path.string() + "': it is a folder; name a file in it");
+  if (exists && !S_ISREG(status.st_mode)) {
+    // A device or a pipe: to rename over it would destroy it, and there is nothing half written to hide. beside_ stays empty.
+    const int descriptor = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    if (descriptor < 0) return failed("write", path, errno);
+    return AtomicFile(path, {}, descriptor);
+  }
+  if (!path.has_filename()) return fail("cannot write '" + path.string() + "': it names a folder; name a file in it");
+  const auto folder = folder_of(path);
+  for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
+    auto beside = folder / unique_name();
+    const int descriptor = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
+      if (exists) (void)::fchmod(descriptor, status.st_mode & 07777);  // a replaced file keeps its permissions where the system lets it
+      return AtomicFile(path, std::move(beside), descriptor);
+    }
+    if (errno == ENOENT) return fail("cannot write '" + path.string() + "': the folder '" + folder.string() + "' does not exist; make it first");
+    if (errno != EEXIST) return failed("write", path, errno);
+  }
+  return failed("find a free name beside", path, EEXIST);
+}
+
+Result<void> AtomicFile::flush() {
+  auto result = write_all(descriptor_, buffer_.data(), buffer_.size(), path_);
+  buffer_.clear();
+  return result;
+}
+
+Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
+  assert(descriptor_ >= 0 && "written after commit()");
+  if (buffer_.size() + bytes.size() > kBufferBytes) {
+    if (auto flushed = flush(); !flushed) return flushed;
+    if (bytes.size() >= kBufferBytes) return write_all(descriptor_, bytes.data(), bytes.size(), path_);
+  }
+  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  return {};
+}
+
+Result<void> AtomicFile::commit() {
+  assert(descriptor_ >= 0 && "committed twice");
+  if (auto flushed = flush(); !flushed) return flushed;
+  // Without the sync before the rename a power cut may leave the new name with no contents. Pipes and some devices cannot sync.
+  if (::fsync(descriptor_) != 0 && !beside_.empty()) return failed("write", path_, errno);
+  const int descriptor = std::exchange(descriptor_, -1);
+  const int close_error = ::close(descriptor) == 0 ? 0 : errno;
+  if (beside_.empty()) return close_error == 0 ? Result<void>{} : failed("write", path_, close_error);
+  const int error = close_error != 0 ? close_error : (::rename(beside_.c_str(), path_.c_str()) == 0 ? 0 : errno);
+  if (error != 0) {
+    ::unlink(beside_.c_str());
+    return failed("write", path_, error);
+  }
+  return sync_folder(folder_of(path_));
+}
+
+}  // namespace intervale

@@ -1,0 +1,102 @@
+#include "common/view/screen_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace intervale {
+namespace {
+
+using Vector = std::array<double, 3>;
+
+// Errors shrink to 1 / (1 + kFade) at a right angle to the edge of the picture, and beyond.
+constexpr double kFade = 15;
+
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double reach_along(const Vector& reach, const Vector& n) { return reach[0] * std::abs(n[0]) + reach[1] * std::abs(n[1]) + reach[2] * std::abs(n[2]); }
+Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+Vector unit(const Vector& v) {
+  const double n = std::hypot(v[0], v[1], v[2]);
+  return {v[0] / n, v[1] / n, v[2] / n};
+}
+
+}  // namespace
+
+View::View(const Camera& camera, const Grid& grid) : origin_(grid.origin), spacing_(grid.spacing), eye_(camera.eye) {
+  ahead_ = unit({camera.look_at[0] - eye_[0], camera.look_at[1] - eye_[1], camera.look_at[2] - eye_[2]});
+  right_ = unit(cross(ahead_, unit(camera.up)));
+  up_ = cross(right_, ahead_);
+  tan_y_ = std::tan(camera.fov * (std::numbers::pi / 360));
+  tan_x_ = tan_y_ * camera.viewport[0] / camera.viewport[1];
+  scale_ = camera.viewport[1] / (2 * tan_y_);
+  cos_corner_ = 1 / std::hypot(1.0, tan_x_, tan_y_);
+  least_depth_ = 1e-3 * std::min({spacing_[0], spacing_[1], spacing_[2]});
+  const auto side = [this](const Vector& across, double sign, double tangent) {
+    Vector n, e;
+    for (int i = 0; i < 3; ++i) {
+      n[i] = tangent * ahead_[i] + sign * across[i];
+      e[i] = ahead_[i] - sign * tangent * across[i];
+    }
+    return Side{unit(n), unit(e)};
+  };
+  sides_ = {side(right_, 1, tan_x_), side(right_, -1, tan_x_), side(up_, 1, tan_y_), side(up_, -1, tan_y_)};
+}
+
+double View::pixels_per_unit(const Region& region) const {
+  Vector at, reach;
+  double gap2 = 0, far2 = 0;  // to the nearest point of the region, and to its furthest corner
+  for (int i = 0; i < 3; ++i) {
+    at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
+    reach[i] = spacing_[i] * region.reach[i];
+    const double gap = std::max(0.0, std::abs(at[i]) - reach[i]);
+    gap2 += gap * gap;
+    far2 += (std::abs(at[i]) + reach[i]) * (std::abs(at[i]) + reach[i]);
+  }
+  // What the picture shows of the region is no nearer than that.
+  const double depth = std::max({dot(at, ahead_) - reach_along(reach, ahead_), std::sqrt(gap2) * cos_corner_, least_depth_});
+  // How far the whole region is beyond a side of what is seen; from a right angle on, how far from the side's edge line.
+  double outside = 0;
+  for (const Side& s : sides_) {
+    const double beyond = -dot(at, s.inward) - reach_along(reach, s.inward), behind = -dot(at, s.edge) - reach_along(reach, s.edge);
+    if (beyond > 0) outside = std::max(outside, behind > 0 ? std::hypot(beyond, behind) : beyond);
+  }
+  if (outside == 0) return scale_ / depth;
+  return scale_ / (depth * (1 + kFade * outside / std::sqrt(far2)));
+}
+
+bool View::is_near(const Region& region) const {
+  double across2 = 0, gap2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double at = origin_[i] + spacing_[i] * region.middle[i] - eye_[i], reach = spacing_[i] * region.reach[i];
+    const double gap = std::max(0.0, std::abs(at) - reach);
+    across2 += 4 * reach * reach;
+    gap2 += gap * gap;
+  }
+  return gap2 < 9 * across2;
+}
+
+bool View::is_central(const Region& region) const {
+  Vector at;
+  for (int i = 0; i < 3; ++i) at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
+  const double depth = dot(at, ahead_);
+  return std::abs(dot(at, right_)) <= tan_x_ / 2 * depth && std::abs(dot(at, up_)) <= tan_y_ / 2 * depth;
+}
+
+// Diamonds reach h further down than their supercubes, and no further up.
+View::Region region_of(const Domain& domain, SupercubeKey key, std::int32_t cells) {
+  const int scale = scale_of_key(key);
+  const Vertex p = position_of_key(key), last = domain.last();
+  const std::int32_t h = 1 << scale;
+  View::Region region;
+  const auto along = [&](int axis, std::int32_t at, std::int32_t end) {
+    const double low = std::max(0.0, 4.0 * at * h - h), high = std::min(double(end), 4.0 * (at + cells) * h);
+    region.middle[axis] = (low + high) / 2;
+    region.reach[axis] = std::max(0.0, (high - low) / 2);
+  };
+  along(0, p.x, last.x);
+  along(1, p.y, last.y);
+  along(2, p.z, last.z);
+  return region;
+}
+
+}  // namespace intervale
