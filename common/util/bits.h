@@ -1,0 +1,50 @@
+// Sets of small numbers as the bits of one word.
+#pragma once
+
+#include <bit>
+#include <concepts>
+#include <cstddef>
+#include <iterator>
+
+namespace intervale {
+
+// The positions of the bits that are set, ascending: for (const int i : set_bits(word)).
+template <std::unsigned_integral Word>
+class SetBits {
+ public:
+  class Iterator {
+   public:
+    using value_type = int;
+    using difference_type = std::ptrdiff_t;
+    constexpr Iterator() = default;
+    constexpr explicit Iterator(Word left) : left_(left) {}
+    [[nodiscard]] constexpr int operator*() const { return std::countr_zero(left_); }
+    constexpr Iterator& operator++() {
+      left_ &= Word(left_ - 1);
+      return *this;
+    }
+    [[nodiscard]] constexpr bool operator==(std::default_sentinel_t) const { return left_ == 0; }
+
+   private:
+    Word left_ = 0;
+  };
+  constexpr explicit SetBits(Word word) : word_(word) {}
+  [[nodiscard]] constexpr Iterator begin() const { return Iterator(word_); }
+  [[nodiscard]] static constexpr std::default_sentinel_t end() { return {}; }
+
+ private:
+  Word word_;
+};
+
+template <std::unsigned_integral Word>
+[[nodiscard]] constexpr SetBits<Word> set_bits(Word word) {
+  return SetBits<Word>(word);
+}
+
+// How many bits below position i are set. i: less than the width of the word.
+template <std::unsigned_integral Word>
+[[nodiscard]] constexpr int count_below(Word word, int i) {
+  return std::popcount(Word(word & ((Word(1) << i) - 1)));
+}
+
+}  // namespace intervale
