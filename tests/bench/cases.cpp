@@ -1,4 +1,4 @@
-#include "bench/cases.h"
+#include "tests/bench/cases.h"
 
 #include <fmt/core.h>
 
@@ -11,7 +11,7 @@
 
 #include "server/volume/read_volume.h"
 #include "server/volume/samples.h"
-#include "support/split.h"
+#include "tests/support/split.h"
 
 namespace intervale::bench {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/delta.h"
+#include "tests/bench/delta.h"
 
 #include <oneapi/tbb/parallel_for.h>
 

@@ -4,8 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include "bench/cases.h"
-#include "bench/delta.h"
 #include "common/codec/prediction.h"
 #include "common/codec/root_patch.h"
 #include "common/front/batch_decoder.h"
@@ -16,6 +14,8 @@
 #include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
 #include "server/builder/field_hierarchy.h"
+#include "tests/bench/cases.h"
+#include "tests/bench/delta.h"
 
 namespace intervale::bench {
 namespace {

@@ -10,13 +10,13 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "bench/cases.h"
-#include "bench/timing.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/program/program.h"
 #include "server/builder/field_hierarchy.h"
+#include "tests/bench/cases.h"
+#include "tests/bench/timing.h"
 
 namespace intervale::bench {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/paper.h"
+#include "tests/bench/paper.h"
 
 #include <algorithm>
 #include <cctype>

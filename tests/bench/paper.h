@@ -5,7 +5,7 @@
 #include <limits>
 #include <string_view>
 
-#include "bench/cases.h"
+#include "tests/bench/cases.h"
 
 namespace intervale::bench {
 

@@ -19,7 +19,6 @@
 #include <string>
 #include <vector>
 
-#include "bench/cases.h"
 #include "client/core/stream_client.h"
 #include "common/front/batch_decoder.h"
 #include "common/ivm/refinement.h"
@@ -28,8 +27,9 @@
 #include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/cameras.h"
-#include "support/surfaces.h"
+#include "tests/bench/cases.h"
+#include "tests/support/cameras.h"
+#include "tests/support/surfaces.h"
 
 namespace intervale::bench {
 namespace {

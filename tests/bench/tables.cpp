@@ -15,10 +15,6 @@
 #include <string>
 #include <vector>
 
-#include "bench/cases.h"
-#include "bench/delta.h"
-#include "bench/paper.h"
-#include "bench/timing.h"
 #include "client/core/stream_client.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
@@ -28,6 +24,10 @@
 #include "server/builder/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/volume/samples.h"
+#include "tests/bench/cases.h"
+#include "tests/bench/delta.h"
+#include "tests/bench/paper.h"
+#include "tests/bench/timing.h"
 
 namespace intervale::bench {
 namespace {

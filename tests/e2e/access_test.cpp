@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
-#include "tests/e2e/support/raw_client.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

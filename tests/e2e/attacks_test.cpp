@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "protocol/codec.h"
-#include "tests/e2e/support/raw_client.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/serving.h"
 
 namespace intervale {
 namespace {

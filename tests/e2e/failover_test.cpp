@@ -19,8 +19,8 @@
 
 #include "client/net/http_get.h"
 #include "client/net/url.h"
-#include "tests/e2e/support/programs.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/programs.h"
+#include "tests/support/serving.h"
 
 namespace intervale {
 namespace {

@@ -19,8 +19,8 @@
 
 #include "protocol/codec.h"
 #include "server/serve/guard.h"
-#include "tests/e2e/support/programs.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/programs.h"
+#include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

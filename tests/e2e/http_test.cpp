@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "tests/e2e/support/serving.h"
+#include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

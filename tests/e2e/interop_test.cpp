@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/e2e/support/programs.h"
+#include "tests/support/programs.h"
 
 namespace intervale {
 namespace {

@@ -8,9 +8,9 @@
 #include <thread>
 
 #include "server/serve/catalogue_watch.h"
-#include "tests/e2e/support/programs.h"
-#include "tests/e2e/support/raw_client.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/programs.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/serving.h"
 
 namespace intervale {
 namespace {

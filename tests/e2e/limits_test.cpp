@@ -8,8 +8,8 @@
 #include <variant>
 
 #include "client/net/connection.h"
-#include "tests/e2e/support/raw_client.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/serving.h"
 
 namespace intervale {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/e2e/support/peers.h"
-#include "tests/e2e/support/programs.h"
+#include "tests/support/peers.h"
+#include "tests/support/programs.h"
 
 namespace intervale {
 namespace {

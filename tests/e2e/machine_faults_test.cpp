@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "server/serve/catalogue_watch.h"
-#include "tests/e2e/support/programs.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/programs.h"
+#include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

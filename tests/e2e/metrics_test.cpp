@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string>
 
-#include "tests/e2e/support/raw_client.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/serving.h"
 
 namespace intervale {
 namespace {

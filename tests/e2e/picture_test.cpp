@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/e2e/support/programs.h"
+#include "tests/support/programs.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "tests/e2e/support/complaints.h"
-#include "tests/e2e/support/peers.h"
-#include "tests/e2e/support/programs.h"
+#include "tests/support/complaints.h"
+#include "tests/support/peers.h"
+#include "tests/support/programs.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

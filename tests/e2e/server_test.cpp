@@ -6,8 +6,8 @@
 #include <variant>
 
 #include "protocol/codec.h"
-#include "tests/e2e/support/raw_client.h"
-#include "tests/e2e/support/serving.h"
+#include "tests/support/raw_client.h"
+#include "tests/support/serving.h"
 
 namespace intervale {
 namespace {

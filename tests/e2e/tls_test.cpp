@@ -12,10 +12,10 @@
 #include "client/net/http_get.h"
 #include "server/serve/catalogue_watch.h"
 #include "server/serve/server.h"
-#include "tests/e2e/support/certificates.h"
-#include "tests/e2e/support/peers.h"
-#include "tests/e2e/support/programs.h"
-#include "tests/e2e/support/raw_client.h"
+#include "tests/support/certificates.h"
+#include "tests/support/peers.h"
+#include "tests/support/programs.h"
+#include "tests/support/raw_client.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "client/net/url.h"
-#include "fuzz/lines.h"
 #include "server/serve/access.h"
+#include "tests/fuzz/lines.h"
 
 using namespace intervale;
 using intervale::testing::require;

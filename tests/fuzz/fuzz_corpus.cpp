@@ -9,9 +9,9 @@
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/refinement.h"
 
-#include "fuzz/small_volumes.h"
 #include "protocol/codec.h"
-#include "support/batches.h"
+#include "tests/fuzz/small_volumes.h"
+#include "tests/support/batches.h"
 
 using namespace intervale;
 

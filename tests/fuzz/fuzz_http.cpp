@@ -11,11 +11,11 @@
 #include <set>
 #include <string>
 
-#include "fuzz/lines.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/serve/http_routes.h"
-#include "support/analytic_fields.h"
-#include "support/temp_dir.h"
+#include "tests/fuzz/lines.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/temp_dir.h"
 
 using namespace intervale;
 

@@ -3,7 +3,7 @@
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/verify.h"
-#include "fuzz/small_volumes.h"
+#include "tests/fuzz/small_volumes.h"
 
 namespace {
 

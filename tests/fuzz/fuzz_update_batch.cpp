@@ -5,8 +5,8 @@
 
 #include "common/front/batch_decoder.h"
 #include "common/ivm/refinement.h"
-#include "fuzz/small_volumes.h"
-#include "support/batches.h"
+#include "tests/fuzz/small_volumes.h"
+#include "tests/support/batches.h"
 
 using namespace intervale;
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "support/split.h"
+#include "tests/support/split.h"
 
 namespace intervale::testing {
 

@@ -5,7 +5,7 @@
 
 #include "common/ivm/interval_volume.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
+#include "tests/support/analytic_fields.h"
 
 namespace intervale::testing {
 

@@ -10,22 +10,14 @@
 #include "common/front/split_update.h"
 #include "common/ivm/extraction.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/mesh_laws.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/mesh_laws.h"
 
 namespace intervale {
 namespace {
 
 using testing::broken_law;
 using testing::canonical;
-
-IntervalVolume made(const Volume& volume, const Range& range) {
-  BuildOptions options;
-  options.range = range;
-  auto sigma = FieldHierarchy(volume, options).compact();
-  EXPECT_TRUE(sigma);
-  return std::move(*sigma);
-}
 
 class FrontLaws : public ::testing::TestWithParam<unsigned> {
  protected:
@@ -47,7 +39,7 @@ class FrontLaws : public ::testing::TestWithParam<unsigned> {
 };
 
 TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
-  const IntervalVolume sigma = made(volume, range);
+  const IntervalVolume sigma = testing::build(volume, {.range = range});
   const Base base = *decode_base(sigma.description().base, sigma.domain());
   const testing::Canonical expected = canonical(extract(sigma, {})->front.mesh());
   for (unsigned trial = 0; trial < 3; ++trial) {
@@ -79,7 +71,7 @@ TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
 }
 
 TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
-  const IntervalVolume sigma = made(volume, range);
+  const IntervalVolume sigma = testing::build(volume, {.range = range});
   const Base base = *decode_base(sigma.description().base, sigma.domain());
   std::mt19937 random(GetParam());
   Front front(volume.grid, base);
@@ -131,7 +123,7 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
 
 // What is hidden is no part of the mesh; what comes back is as it was.
 TEST_P(FrontLaws, HidingIsLeavingOut) {
-  const IntervalVolume sigma = made(volume, range);
+  const IntervalVolume sigma = testing::build(volume, {.range = range});
   const Base base = *decode_base(sigma.description().base, sigma.domain());
   Front front = extract(sigma, {})->front;
   const testing::Canonical full = canonical(front.mesh());
@@ -195,7 +187,7 @@ INSTANTIATE_TEST_SUITE_P(Random, FrontLaws, ::testing::Range(1u, 25u));
 
 TEST(Front, RefusesWhatCannotBeSplit) {
   const Volume volume = testing::gyroid({9, 9, 9});
-  const IntervalVolume sigma = made(volume, {-0.3, 0.2});
+  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
   const Front front(volume.grid, *decode_base(sigma.description().base, sigma.domain()));
   EXPECT_TRUE(front.find({4, 4, 4}));
   for (const Vertex v : {Vertex{0, 0, 0}, Vertex{8, 8, 8}, Vertex{2, 2, 2}, Vertex{-4, 4, 4}, Vertex{4, 4, 1 << 30}}) EXPECT_FALSE(front.find(v));
@@ -203,7 +195,7 @@ TEST(Front, RefusesWhatCannotBeSplit) {
 
 TEST(Front, TheBudgetIsNeverPassed) {
   const Volume volume = testing::gyroid({17, 17, 17});
-  const IntervalVolume sigma = made(volume, {-0.3, 0.2});
+  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
   for (std::uint64_t most : {0u, 100u, 1000u, 5000u}) {
     Lod lod;
     lod.max_tets = most;

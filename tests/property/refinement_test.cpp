@@ -8,9 +8,9 @@
 #include "common/ivm/verify.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/mesh_laws.h"
-#include "support/naive_volume.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/mesh_laws.h"
+#include "tests/support/naive_volume.h"
 
 namespace intervale {
 namespace {

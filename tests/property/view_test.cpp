@@ -14,9 +14,9 @@
 #include "common/mesh/boundary.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/cameras.h"
-#include "support/surfaces.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/cameras.h"
+#include "tests/support/surfaces.h"
 
 namespace intervale {
 namespace {
@@ -35,7 +35,7 @@ struct Trial {
   std::string text;
 };
 
-Trial made(unsigned seed) {
+Trial trial_of_seed(unsigned seed) {
   Trial trial;
   switch (seed % 5) {
     case 0:
@@ -92,7 +92,7 @@ std::vector<double> pixels_off(const Triangles& from, const Triangles& to, int p
 class Pictures : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Pictures, AreOffByNoMoreThanWasAskedFor) {
-  const Trial trial = made(GetParam());
+  const Trial trial = trial_of_seed(GetParam());
   SCOPED_TRACE(trial.text);
   const auto sigma = FieldHierarchy(trial.volume, {.range = trial.range}).compact();
   ASSERT_TRUE(sigma) << sigma.error().message;

@@ -7,8 +7,8 @@
 #include <functional>
 
 #include "common/diamond/domain.h"
-#include "support/analytic_fields.h"
-#include "support/bisection.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/bisection.h"
 
 namespace intervale::testing {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/mesh/mesh.h"
-#include "support/cameras.h"
+#include "tests/support/cameras.h"
 
 namespace intervale::testing {
 

@@ -12,9 +12,9 @@
 #include "common/ivm/extraction.h"
 #include "common/selection/stream_plan.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/cameras.h"
-#include "support/mesh_laws.h"
+#include "tests/support/cameras.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/mesh_laws.h"
 
 namespace intervale {
 namespace {
@@ -22,17 +22,13 @@ namespace {
 using testing::broken_law;
 using testing::canonical;
 
-IntervalVolume made(unsigned seed) {
-  constexpr std::array<std::array<std::int32_t, 3>, 4> shapes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
-  const Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 4]) : testing::digits(shapes[seed % 4], seed);
-  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
-  EXPECT_TRUE(sigma);
-  return std::move(*sigma);
-}
+constexpr std::array<testing::Dims, 4> kBoxes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
+
+IntervalVolume volume_of_seed(unsigned seed) { return testing::build(testing::trial_of_seed(seed, kBoxes)); }
 
 class Budgets : public ::testing::TestWithParam<unsigned> {
  protected:
-  IntervalVolume volume_ = made(GetParam());
+  IntervalVolume volume_ = volume_of_seed(GetParam());
   std::mt19937 random_{GetParam()};  // the seed is the test's number
 };
 

@@ -9,7 +9,7 @@
 
 #include "server/builder/field_hierarchy.h"
 #include "server/serve/http_routes.h"
-#include "support/analytic_fields.h"
+#include "tests/support/analytic_fields.h"
 
 namespace intervale {
 namespace {

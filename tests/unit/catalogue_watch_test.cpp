@@ -11,8 +11,8 @@
 
 #include "common/ivm/ivm_file.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/temp_dir.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/temp_dir.h"
 
 namespace intervale {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "support/bisection.h"
+#include "tests/support/bisection.h"
 
 namespace intervale {
 namespace {

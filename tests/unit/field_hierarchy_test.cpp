@@ -16,8 +16,8 @@
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/verify.h"
 #include "server/builder/error_levels.h"
-#include "support/analytic_fields.h"
-#include "support/bisection.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/bisection.h"
 
 namespace intervale {
 namespace {

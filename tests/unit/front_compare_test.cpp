@@ -7,19 +7,13 @@
 #include "common/front/front.h"
 #include "common/ivm/extraction.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/mesh_laws.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/mesh_laws.h"
 
 namespace intervale {
 namespace {
 
 using testing::canonical;
-
-IntervalVolume made(const Volume& volume, const Range& range) {
-  auto sigma = FieldHierarchy(volume, {.range = range}).compact();
-  EXPECT_TRUE(sigma);
-  return std::move(*sigma);
-}
 
 Front front_of(const IntervalVolume& sigma, const Lod& lod) { return extract(sigma, lod).value().front; }
 
@@ -43,7 +37,7 @@ class FrontParts : public ::testing::TestWithParam<unsigned> {
 };
 
 TEST_P(FrontParts, CoarserIsPartOfFiner) {
-  const IntervalVolume sigma = made(volume, range);
+  const IntervalVolume sigma = testing::build(volume, {.range = range});
   const Front full = front_of(sigma, {});
   EXPECT_TRUE(full.is_part_of(full));
   for (const double percent : {0.0, 10.0, 40.0, 100.0}) {
@@ -56,7 +50,7 @@ TEST_P(FrontParts, CoarserIsPartOfFiner) {
 }
 
 TEST_P(FrontParts, CoarsenedIsTheSameMesh) {
-  const IntervalVolume sigma = made(volume, range);
+  const IntervalVolume sigma = testing::build(volume, {.range = range});
   const Front full = front_of(sigma, {});
   const Grid& grid = volume.grid;
   std::mt19937 random(GetParam());
@@ -81,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(Random, FrontParts, ::testing::Range(1u, 13u));
 
 TEST(FrontCompare, OneOtherCutIsAnotherFront) {
   const Volume volume = testing::gyroid({9, 9, 9});
-  const IntervalVolume sigma = made(volume, {-0.3, 0.2});
+  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
   const Base base = decode_base(sigma.description().base, sigma.domain()).value();
   Front one(volume.grid, base), other(volume.grid, base);
   ASSERT_TRUE(one.is_part_of(other));
@@ -104,19 +98,19 @@ TEST(FrontCompare, OneOtherCutIsAnotherFront) {
 
 TEST(FrontCompare, OtherGridsAndBasesAreOtherFronts) {
   const Volume volume = testing::gyroid({9, 9, 9});
-  const IntervalVolume sigma = made(volume, {-0.3, 0.2});
+  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
   const Front front = front_of(sigma, {});
   Grid moved = volume.grid;
   moved.origin[0] += 1;
   const Base base = decode_base(sigma.description().base, sigma.domain()).value();
   EXPECT_FALSE(Front(moved, base).is_part_of(front));
-  const IntervalVolume wider = made(volume, {-10, 10});  // all of it is inside
+  const IntervalVolume wider = testing::build(volume, {.range = {-10, 10}});  // all of it is inside
   EXPECT_FALSE(Front(volume.grid, decode_base(wider.description().base, wider.domain()).value()).is_part_of(front));
 }
 
 TEST(FrontCompare, WhatTheCoarserNeedsIsNotMerged) {
   const Volume volume = testing::gyroid({9, 9, 9});
-  const IntervalVolume sigma = made(volume, {-0.3, 0.2});
+  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
   Front root(volume.grid, decode_base(sigma.description().base, sigma.domain()).value());
   const Front full = front_of(sigma, {});
   EXPECT_TRUE(root.coarsen_to(full));  // nothing to merge

@@ -11,8 +11,8 @@
 
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/surface_moves.h"
-#include "support/analytic_fields.h"
-#include "support/parts.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/parts.h"
 
 namespace intervale {
 namespace {

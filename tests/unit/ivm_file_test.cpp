@@ -10,9 +10,9 @@
 #include <random>
 
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/parts.h"
-#include "support/temp_dir.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/parts.h"
+#include "tests/support/temp_dir.h"
 
 namespace intervale {
 namespace {
@@ -22,13 +22,7 @@ using ::testing::StartsWith;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-IntervalVolume made(const Volume& volume, const Range& range, Refine refine = Refine::boundary) {
-  auto sigma = FieldHierarchy(volume, {.range = range, .refine = refine}).compact();
-  EXPECT_TRUE(sigma) << sigma.error().message;
-  return std::move(*sigma);
-}
-
-IntervalVolume small_volume() { return made(testing::gyroid({9, 7, 6}), {-0.3, 0.4}); }
+IntervalVolume small_volume() { return testing::build(testing::gyroid({9, 7, 6}), {.range = {-0.3, 0.4}}); }
 
 // A copy in a buffer of exactly its size, so that the address sanitizer sees every step beyond.
 Result<IntervalVolume> decode_exact(std::span<const std::byte> bytes) {
@@ -73,7 +67,7 @@ TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
     Volume volume = c.kind == 0 ? testing::gyroid(c.dims) : c.kind == 1 ? testing::digits(c.dims, 1) : testing::bump(c.dims, 2);
     volume.grid.spacing = {0.5, 1, 3};
     volume.grid.origin = {-4, 0, 7};
-    const IntervalVolume sigma = made(volume, c.range, c.refine);
+    const IntervalVolume sigma = testing::build(volume, {.range = c.range, .refine = c.refine});
     const auto path = folder / "first.second.ivm";
     ASSERT_TRUE(save_ivm(path, sigma));
     const auto loaded = load_ivm(path);
@@ -87,13 +81,13 @@ TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
 
 TEST(IvmFile, EqualVolumesGiveEqualBytesWhateverTheirNames) {
   Volume volume = testing::gyroid({9, 9, 9});
-  const auto bytes = encode_ivm(made(volume, {-0.3, 0.2}));
+  const auto bytes = encode_ivm(testing::build(volume, {.range = {-0.3, 0.2}}));
   volume.name = "another";
-  EXPECT_EQ(encode_ivm(made(volume, {-0.3, 0.2})), bytes);
+  EXPECT_EQ(encode_ivm(testing::build(volume, {.range = {-0.3, 0.2}})), bytes);
   const auto decoded = decode_ivm(bytes, "third");
   ASSERT_TRUE(decoded);
   EXPECT_EQ(encode_ivm(*decoded), bytes);
-  EXPECT_NE(encode_ivm(made(volume, {-0.3, 0.25})), bytes);
+  EXPECT_NE(encode_ivm(testing::build(volume, {.range = {-0.3, 0.25}})), bytes);
 }
 
 TEST(IvmFile, EveryFlippedByteIsRefused) {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
+#include "tests/support/analytic_fields.h"
 
 namespace intervale {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/cameras.h"
+#include "tests/support/cameras.h"
+#include "tests/support/interval_volumes.h"
 
 namespace intervale {
 namespace {
@@ -22,16 +22,11 @@ namespace {
 using testing::NaiveCamera;
 using testing::Vector;
 
-IntervalVolume made(unsigned seed) {
-  constexpr std::array<std::array<std::int32_t, 3>, 5> shapes{{{17, 17, 17}, {24, 17, 20}, {12, 5, 7}, {40, 9, 20}, {30, 2, 11}}};
-  Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 5]) : testing::digits(shapes[seed % 5], seed);
-  if (seed % 3 != 0) {
-    volume.grid.spacing = {0.5, 1, 3};
-    volume.grid.origin = {-4, 0, 7};
-  }
-  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
-  EXPECT_TRUE(sigma);
-  return std::move(*sigma);
+constexpr std::array<testing::Dims, 5> kBoxes{{{17, 17, 17}, {24, 17, 20}, {12, 5, 7}, {40, 9, 20}, {30, 2, 11}}};
+
+IntervalVolume volume_of_seed(unsigned seed) {
+  const auto trial = testing::trial_of_seed(seed, kBoxes);
+  return testing::build(seed % 3 != 0 ? testing::stretched(trial.volume) : trial.volume, trial.options);
 }
 
 Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
@@ -109,7 +104,7 @@ bool meets(const IntervalVolume& v, const Diamond& d, const Box& roi) {
 
 class Ranks : public ::testing::TestWithParam<unsigned> {
  protected:
-  IntervalVolume volume_ = made(GetParam());
+  IntervalVolume volume_ = volume_of_seed(GetParam());
   std::mt19937 random_{GetParam()};  // the seed is the test's number
 };
 

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
+#include "tests/support/interval_volumes.h"
 
 namespace intervale {
 namespace {
@@ -32,15 +32,12 @@ Lod of_region(const Box& box) {
   return lod;
 }
 
+constexpr std::array<testing::Dims, 5> kBoxes{{{9, 9, 9}, {17, 17, 17}, {12, 5, 7}, {2, 9, 20}, {10, 16, 3}}};
+
 // Boxes of several shapes, in world coordinates that are not the samples'.
-IntervalVolume made(unsigned seed) {
-  constexpr std::array<std::array<std::int32_t, 3>, 5> shapes{{{9, 9, 9}, {17, 17, 17}, {12, 5, 7}, {2, 9, 20}, {10, 16, 3}}};
-  Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 5]) : testing::digits(shapes[seed % 5], seed);
-  volume.grid.spacing = {0.5, 1, 3};
-  volume.grid.origin = {-4, 0, 7};
-  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
-  EXPECT_TRUE(sigma);
-  return std::move(*sigma);
+IntervalVolume volume_of_seed(unsigned seed) {
+  const auto trial = testing::trial_of_seed(seed, kBoxes);
+  return testing::build(testing::stretched(trial.volume), trial.options);
 }
 
 // The updates' numbers of a diamond's parents.
@@ -76,7 +73,7 @@ Box random_box(const Grid& g, std::mt19937& random) {
 class Select : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Select, IsClosedUnderParentsAndWantsNothingElse) {
-  const IntervalVolume v = made(GetParam());
+  const IntervalVolume v = volume_of_seed(GetParam());
   const Grid& g = v.description().grid;
   std::mt19937 random(GetParam());
   for (int trial = 0; trial < 20; ++trial) {
@@ -107,7 +104,7 @@ TEST_P(Select, IsClosedUnderParentsAndWantsNothingElse) {
 }
 
 TEST_P(Select, ErrorZeroMeansAllAndTheLargestErrorNone) {
-  const IntervalVolume v = made(GetParam());
+  const IntervalVolume v = volume_of_seed(GetParam());
   EXPECT_EQ(select(v, Lod{}).count(), v.size());
   EXPECT_EQ(select(v, of_percent(0)).count(), v.size());
   EXPECT_EQ(select(v, of_percent(100)).count(), 0u);
@@ -116,7 +113,7 @@ TEST_P(Select, ErrorZeroMeansAllAndTheLargestErrorNone) {
 }
 
 TEST_P(Select, AFinerErrorChoosesNoLess) {
-  const IntervalVolume v = made(GetParam());
+  const IntervalVolume v = volume_of_seed(GetParam());
   SplitSet coarser(v.size());
   for (double percent : {90.0, 60.0, 30.0, 10.0, 3.0, 0.3, 0.0}) {
     const SplitSet chosen = select(v, of_percent(percent));
@@ -130,7 +127,7 @@ TEST_P(Select, AFinerErrorChoosesNoLess) {
 }
 
 TEST_P(Select, ARegionOutsideTheBoxChoosesNothing) {
-  const IntervalVolume v = made(GetParam());
+  const IntervalVolume v = volume_of_seed(GetParam());
   const Grid& g = v.description().grid;
   for (int axis = 0; axis < 3; ++axis) {
     for (const double steps : {0.01, 0.5, 1.0, 3.0, 1e6}) {
@@ -148,7 +145,7 @@ TEST_P(Select, ARegionOutsideTheBoxChoosesNothing) {
 }
 
 TEST_P(Select, InOrderParentsComeFirstAndErrorsDoNotAscend) {
-  const IntervalVolume v = made(GetParam());
+  const IntervalVolume v = volume_of_seed(GetParam());
   std::mt19937 random(GetParam());
   for (int trial = 0; trial < 4; ++trial) {
     Lod lod;

@@ -15,7 +15,7 @@
 #include "common/mesh/io/mesh_writer.h"
 #include "common/selection/stream_plan.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
+#include "tests/support/interval_volumes.h"
 
 namespace intervale {
 namespace {
@@ -24,19 +24,15 @@ using Point = std::array<double, 3>;
 using Triangle = std::array<Point, 3>;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-std::shared_ptr<const IntervalVolume> made(Volume volume, Range range) {
-  volume.grid.spacing = {0.5, 1, 3};
-  volume.grid.origin = {-4, 0, 7};
-  auto sigma = FieldHierarchy(volume, {.range = range}).compact();
-  EXPECT_TRUE(sigma);
-  return std::make_shared<const IntervalVolume>(std::move(*sigma));
+std::shared_ptr<const IntervalVolume> stretched_volume(const Volume& volume, const Range& range) {
+  return testing::build_shared(testing::stretched(volume), {.range = range});
 }
 
-std::shared_ptr<const IntervalVolume> made(unsigned seed) {
+std::shared_ptr<const IntervalVolume> volume_of_seed(unsigned seed) {
   constexpr std::array<std::array<std::int32_t, 3>, 4> shapes{{{17, 17, 17}, {12, 7, 10}, {33, 2, 11}, {13, 40, 6}}};
   const auto& shape = shapes[seed / 2 % 4];
-  if (seed % 2 == 0) return made(testing::gyroid(shape), seed % 3 == 0 ? Range{-0.3, kInf} : Range{-0.3, 0.2});
-  return made(testing::digits(shape, seed), {3, 5.5});
+  if (seed % 2 == 0) return stretched_volume(testing::gyroid(shape), seed % 3 == 0 ? Range{-0.3, kInf} : Range{-0.3, 0.2});
+  return stretched_volume(testing::digits(shape, seed), {3, 5.5});
 }
 
 Triangle turned(Triangle t) {  // the least corner first
@@ -107,7 +103,7 @@ class Page {
 
 class SkinOf : public ::testing::TestWithParam<unsigned> {
  protected:
-  std::shared_ptr<const IntervalVolume> volume = made(GetParam());
+  std::shared_ptr<const IntervalVolume> volume = volume_of_seed(GetParam());
   const Grid& grid = volume->description().grid;
   std::mt19937 random{GetParam()};
 };
@@ -241,7 +237,7 @@ INSTANTIATE_TEST_SUITE_P(Random, SkinOf, ::testing::Range(0u, 8u));
 
 // Where nothing hides in diamonds that look empty, the bound holds at every level of detail.
 TEST(Skin, TheFullVolumeIsWithinTheBound) {
-  const auto volume = made(testing::gyroid({33, 33, 33}), {-0.3, 0.2});
+  const auto volume = stretched_volume(testing::gyroid({33, 33, 33}), {-0.3, 0.2});
   const double full = volume_of(extract(*volume, {})->front.mesh());
   StreamPlan plan(volume);
   auto client = StreamClient::start(volume->description());
@@ -259,7 +255,7 @@ TEST(Skin, TheFullVolumeIsWithinTheBound) {
 }
 
 TEST(Skin, WhatForgetsIsMadeAfresh) {
-  const auto volume = made(testing::gyroid({17, 17, 17}), {-0.3, 0.2});
+  const auto volume = stretched_volume(testing::gyroid({17, 17, 17}), {-0.3, 0.2});
   StreamPlan plan(volume);
   auto client = StreamClient::start(volume->description(), {.max_updates = 400});
   ASSERT_TRUE(client);

@@ -9,18 +9,14 @@
 #include "common/ivm/extraction.h"
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
+#include "tests/support/interval_volumes.h"
 
 namespace intervale {
 namespace {
 
-IntervalVolume made(unsigned seed) {
-  constexpr std::array<std::array<std::int32_t, 3>, 5> shapes{{{17, 17, 17}, {24, 17, 20}, {33, 12, 7}, {40, 9, 20}, {30, 2, 11}}};
-  const Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 5]) : testing::digits(shapes[seed % 5], seed);
-  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
-  EXPECT_TRUE(sigma);
-  return std::move(*sigma);
-}
+constexpr std::array<testing::Dims, 5> kBoxes{{{17, 17, 17}, {24, 17, 20}, {33, 12, 7}, {40, 9, 20}, {30, 2, 11}}};
+
+IntervalVolume volume_of_seed(unsigned seed) { return testing::build(testing::trial_of_seed(seed, kBoxes)); }
 
 // Closed under parents: some of the updates, and their ancestors.
 SplitSet some_of(const IntervalVolume& volume, double share, std::mt19937& random) {
@@ -30,7 +26,7 @@ SplitSet some_of(const IntervalVolume& volume, double share, std::mt19937& rando
 
 class SplitSets : public ::testing::TestWithParam<unsigned> {
  protected:
-  IntervalVolume volume_ = made(GetParam());
+  IntervalVolume volume_ = volume_of_seed(GetParam());
   std::mt19937 random_{GetParam()};  // the seed is the test's number
 };
 

@@ -9,8 +9,8 @@
 #include "common/ivm/extraction.h"
 #include "common/selection/stream_plan.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/mesh_laws.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/mesh_laws.h"
 
 namespace intervale {
 namespace {
@@ -22,17 +22,13 @@ constexpr std::size_t kBatchBytes = 4096;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-std::shared_ptr<const IntervalVolume> made(unsigned seed) {
-  constexpr std::array<std::array<std::int32_t, 3>, 4> shapes{{{9, 9, 9}, {12, 7, 10}, {22, 2, 11}, {13, 13, 6}}};
-  Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed / 2 % 4]) : testing::digits(shapes[seed / 2 % 4], seed);
-  volume.grid.spacing = {0.5, 1, 3};
-  volume.grid.origin = {-4, 0, 7};
-  Range range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5};
-  if (seed % 5 == 0) range.beta = kInf;
-  if (seed % 5 == 1) range.beta = range.alpha;
-  auto sigma = FieldHierarchy(volume, {.range = range}).compact();
-  EXPECT_TRUE(sigma);
-  return std::make_shared<const IntervalVolume>(std::move(*sigma));
+constexpr std::array<testing::Dims, 4> kBoxes{{{9, 9, 9}, {12, 7, 10}, {22, 2, 11}, {13, 13, 6}}};
+
+std::shared_ptr<const IntervalVolume> volume_of_seed(unsigned seed) {
+  auto trial = testing::trial_of_seed(seed, kBoxes);
+  if (seed % 5 == 0) trial.options.range.beta = kInf;
+  if (seed % 5 == 1) trial.options.range.beta = trial.options.range.alpha;
+  return testing::build_shared(testing::stretched(trial.volume), trial.options);
 }
 
 std::string broken(const StreamClient& client) {
@@ -72,7 +68,7 @@ void stream(StreamPlan& plan, StreamClient& client, const Lod& lod, int batches 
 
 class Stream : public ::testing::TestWithParam<unsigned> {
  protected:
-  std::shared_ptr<const IntervalVolume> volume = made(GetParam());
+  std::shared_ptr<const IntervalVolume> volume = volume_of_seed(GetParam());
   StreamPlan plan{volume};
 };
 
@@ -168,7 +164,7 @@ TEST_P(Stream, DamagedAndRepeatedBatchesAreRefused) {
 INSTANTIATE_TEST_SUITE_P(Random, Stream, ::testing::Range(0u, 10u));
 
 TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
-  const Description good = made(0)->description();
+  const Description good = volume_of_seed(0)->description();
   ASSERT_TRUE(StreamClient::start(good));
   const struct {
     const char* what;

@@ -9,19 +9,18 @@
 #include "common/front/batch_decoder.h"
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
+#include "tests/support/interval_volumes.h"
 
 namespace intervale {
 namespace {
 
 constexpr std::size_t kBatchBytes = 4096;
 
-std::shared_ptr<const IntervalVolume> made(unsigned seed) {
-  constexpr std::array<std::array<std::int32_t, 3>, 3> shapes{{{17, 17, 17}, {24, 17, 20}, {30, 2, 11}}};
-  const Volume volume = seed % 2 == 0 ? testing::gyroid(shapes[seed % 3]) : testing::digits(shapes[seed % 3], seed);
-  auto sigma = FieldHierarchy(volume, {.range = seed % 2 == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact();
-  EXPECT_TRUE(sigma);
-  return std::make_shared<const IntervalVolume>(std::move(*sigma));
+constexpr std::array<testing::Dims, 3> kBoxes{{{17, 17, 17}, {24, 17, 20}, {30, 2, 11}}};
+
+std::shared_ptr<const IntervalVolume> volume_of_seed(unsigned seed) {
+  const auto trial = testing::trial_of_seed(seed, kBoxes);
+  return testing::build_shared(trial.volume, trial.options);
 }
 
 Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
@@ -110,7 +109,7 @@ class Receiver {
 class Plan : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
-  const auto volume = made(GetParam());
+  const auto volume = volume_of_seed(GetParam());
   std::mt19937 random(GetParam());
   StreamPlan plan(volume);
   Receiver receiver(volume);
@@ -151,7 +150,7 @@ TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
 
 // Bands of falling error: half of the updates already leave no more than the error that the plain order leaves after a quarter.
 TEST_P(Plan, GreatErrorsComeEarly) {
-  const auto volume = made(GetParam());
+  const auto volume = volume_of_seed(GetParam());
   const auto order = in_order(*volume, select(*volume, {}), {});
   StreamPlan plan(volume);
   plan.set_lod({});
@@ -163,7 +162,7 @@ TEST_P(Plan, GreatErrorsComeEarly) {
 }
 
 TEST_P(Plan, RemainingErrorNeverGrowsWithinAView) {
-  const auto volume = made(GetParam());
+  const auto volume = volume_of_seed(GetParam());
   StreamPlan plan(volume);
   plan.set_lod({});
   double before = volume->description().max_error, last = before;
@@ -175,7 +174,7 @@ TEST_P(Plan, RemainingErrorNeverGrowsWithinAView) {
 }
 
 TEST_P(Plan, TheSameViewAgainSendsNothing) {
-  const auto volume = made(GetParam());
+  const auto volume = volume_of_seed(GetParam());
   StreamPlan plan(volume);
   Lod lod;
   lod.error_percent = 10;

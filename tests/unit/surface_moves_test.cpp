@@ -13,8 +13,8 @@
 #include "common/ivm/interval_volume.h"
 #include "common/patch/range.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/bisection.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/bisection.h"
 
 namespace intervale {
 namespace {
@@ -186,7 +186,7 @@ double tip_of(const Case& c, const Domain& domain, const Diamond& d) {
   return furthest;
 }
 
-Case made(unsigned seed) {
+Case case_of_seed(unsigned seed) {
   Case c;
   switch (seed % 8) {
     case 0:
@@ -221,7 +221,7 @@ Case made(unsigned seed) {
 class Moves : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Moves, AreThoseOfTheFurthestCrossing) {
-  const Case c = made(GetParam());
+  const Case c = case_of_seed(GetParam());
   SCOPED_TRACE(c.name);
   const FieldHierarchy delta(c.volume, {.range = c.range});
   const SupercubeSet& set = delta.set();

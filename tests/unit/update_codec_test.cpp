@@ -8,9 +8,9 @@
 
 #include "common/ivm/extraction.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
-#include "support/batches.h"
-#include "support/mesh_laws.h"
+#include "tests/support/batches.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/mesh_laws.h"
 
 namespace intervale {
 namespace {
@@ -21,18 +21,12 @@ using testing::canonical;
 
 using Bytes = std::vector<std::uint8_t>;
 
-IntervalVolume made(const Volume& volume, const Range& range) {
-  auto sigma = FieldHierarchy(volume, {.range = range}).compact();
-  EXPECT_TRUE(sigma);
-  return std::move(*sigma);
-}
-
 std::vector<IntervalVolume> volumes() {
   const std::vector<std::array<std::int32_t, 3>> dims{{9, 9, 9}, {7, 4, 11}, {6, 10, 5}};
   std::vector<IntervalVolume> all;
-  all.push_back(made(testing::gyroid(dims[0]), {-0.3, 0.2}));
-  all.push_back(made(testing::digits(dims[1], 3), {3, 5.5}));
-  all.push_back(made(testing::bump(dims[2], 4), {80, 80}));
+  all.push_back(testing::build(testing::gyroid(dims[0]), {.range = {-0.3, 0.2}}));
+  all.push_back(testing::build(testing::digits(dims[1], 3), {.range = {3, 5.5}}));
+  all.push_back(testing::build(testing::bump(dims[2], 4), {.range = {80, 80}}));
   return all;
 }
 
@@ -79,7 +73,7 @@ TEST(UpdateCodec, AnySplitIntoBatchesGivesTheExtractedMesh) {
 }
 
 TEST(UpdateCodec, ABatchOfNothingChangesNothing) {
-  const IntervalVolume v = made(testing::gyroid({9, 9, 9}), {-0.3, 0.2});
+  const IntervalVolume v = testing::build(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}});
   Front front = root_of(v);
   const auto before = canonical(front.mesh());
   const auto applied = apply_exact(front, batch_of(v, {}));
@@ -128,7 +122,7 @@ TEST(UpdateCodec, EveryFlippedByteFailsOrLeavesAFrontThatHolds) {
 }
 
 TEST(UpdateCodec, GarbageIsRefused) {
-  const IntervalVolume v = made(testing::gyroid({9, 9, 9}), {-0.3, 0.2});
+  const IntervalVolume v = testing::build(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}});
   for (unsigned seed = 0; seed < 3000; ++seed) {
     std::mt19937 random(seed);
     Bytes bytes(random() % 300);

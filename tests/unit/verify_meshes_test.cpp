@@ -9,15 +9,13 @@
 
 #include "common/selection/stream_plan.h"
 #include "server/builder/field_hierarchy.h"
-#include "support/analytic_fields.h"
+#include "tests/support/interval_volumes.h"
 
 namespace intervale {
 namespace {
 
-std::shared_ptr<const IntervalVolume> made(const Range& range) {
-  auto sigma = FieldHierarchy(testing::gyroid({13, 9, 11}), {.range = range}).compact();
-  EXPECT_TRUE(sigma);
-  return std::make_shared<const IntervalVolume>(std::move(*sigma));
+std::shared_ptr<const IntervalVolume> volume_of_range(const Range& range) {
+  return testing::build_shared(testing::gyroid({13, 9, 11}), {.range = range});
 }
 
 // A client that has so many batches of the stream.
@@ -35,7 +33,7 @@ StreamClient streamed(const std::shared_ptr<const IntervalVolume>& volume, int b
 }
 
 TEST(VerifyMeshes, PartsOfTheStreamPass) {
-  const auto volume = made({-0.3, 0.2});
+  const auto volume = volume_of_range({-0.3, 0.2});
   std::vector<std::optional<StreamClient>> clients;
   for (int batches : {0, 1, 2, 3, 5, 1000}) {
     clients.emplace_back(streamed(volume, batches));
@@ -49,17 +47,17 @@ TEST(VerifyMeshes, PartsOfTheStreamPass) {
 }
 
 TEST(VerifyMeshes, AnotherMeshIsFound) {
-  const auto volume = made({-0.3, 0.2});
+  const auto volume = volume_of_range({-0.3, 0.2});
   std::vector<std::optional<StreamClient>> clients;
   for (int i = 0; i < 6; ++i) clients.emplace_back(streamed(volume, i));
-  clients.emplace_back(streamed(made({-0.3, 0.21}), 1000));
+  clients.emplace_back(streamed(volume_of_range({-0.3, 0.21}), 1000));
   const auto verified = verify_meshes(streamed(volume, 1000).front(), clients, 1);
   EXPECT_EQ(verified.compared, 7u);
   EXPECT_EQ(verified.differing, 1u);
 }
 
 TEST(VerifyMeshes, NumbersOfPointsAndTetrahedraDoNotMatter) {
-  const Mesh mesh = streamed(made({-0.3, 0.2}), 1000).mesh();
+  const Mesh mesh = streamed(volume_of_range({-0.3, 0.2}), 1000).mesh();
   std::mt19937 random(1);
   std::vector<std::uint32_t> place(mesh.points.size());
   for (std::uint32_t i = 0; i < place.size(); ++i) place[i] = i;

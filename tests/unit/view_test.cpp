@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "support/cameras.h"
+#include "tests/support/cameras.h"
 
 namespace intervale {
 namespace {

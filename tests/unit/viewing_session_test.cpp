@@ -11,8 +11,8 @@
 #include "server/serve/access.h"
 #include "server/serve/replaceable.h"
 #include "server/serve/session_state.h"
-#include "support/analytic_fields.h"
-#include "support/mesh_laws.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/mesh_laws.h"
 
 namespace intervale {
 namespace {

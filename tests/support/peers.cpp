@@ -1,4 +1,4 @@
-#include "tests/e2e/support/peers.h"
+#include "tests/support/peers.h"
 
 #include <array>
 #include <boost/asio/buffer.hpp>

@@ -1,4 +1,4 @@
-#include "tests/e2e/support/serving.h"
+#include "tests/support/serving.h"
 
 #include <spdlog/spdlog.h>
 

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "server/serve/server.h"
-#include "tests/e2e/support/programs.h"
-#include "tests/e2e/support/raw_client.h"
+#include "tests/support/programs.h"
+#include "tests/support/raw_client.h"
 
 namespace intervale {
 

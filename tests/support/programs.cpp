@@ -1,4 +1,4 @@
-#include "tests/e2e/support/programs.h"
+#include "tests/support/programs.h"
 
 #include <cstdlib>
 #include <stdexcept>

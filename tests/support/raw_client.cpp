@@ -1,4 +1,4 @@
-#include "tests/e2e/support/raw_client.h"
+#include "tests/support/raw_client.h"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
