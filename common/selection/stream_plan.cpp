@@ -13,16 +13,16 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kBrickBytes = 18;       // naming one takes at most: a step and a mask
-constexpr std::size_t kSupercubeBytes = 7;    // a word of slots
-constexpr std::size_t kPlaneBytes = 64;       // lengths of all planes
-constexpr std::size_t kSmallBatch = 8 << 10;  // a band's end closes a batch no smaller than this
-constexpr std::uint32_t kTurn = 1 << 16;      // updates looked at before others get their turn
+constexpr std::size_t kBrickBytes = 18;         // naming one takes at most: a step and a mask
+constexpr std::size_t kSupercubeBytes = 7;      // a word of slots
+constexpr std::size_t kPlaneBytes = 64;         // lengths of all planes
+constexpr std::size_t kSmallBatch = 8 << 10;    // a band's end closes a builder no smaller than this
+constexpr std::uint32_t kMaxVisited = 1 << 16;  // updates looked at before others get their turn
 
 }  // namespace
 
-// The batch being put together.
-struct StreamPlan::Chunk {
+// The builder being put together.
+struct StreamPlan::BatchBuilder {
   Surroundings around;              // of the supercube looked into
   std::vector<Surroundings> above;  // of ancestors, by scale
   std::vector<SlotGroup> groups;
@@ -30,9 +30,10 @@ struct StreamPlan::Chunk {
   boost::unordered_flat_set<std::uint32_t> bricks;
   std::size_t max_bytes = 0, bytes = kPlaneBytes;
   std::uint32_t updates = 0;
-  std::uint32_t seen = 0;  // updates looked at
+  std::uint32_t visited = 0;  // updates looked at
 
-  Chunk(const IntervalVolume& volume, std::size_t most) : around(volume.set()), above(kMaxLevels, Surroundings(volume.set())), max_bytes(most) {}
+  BatchBuilder(const IntervalVolume& volume, std::size_t most)
+      : around(volume.set()), above(kMaxLevels, Surroundings(volume.set())), max_bytes(most) {}
   SlotGroup* find(std::uint32_t supercube) {
     if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
     const auto found = group_of.find(supercube);
@@ -46,12 +47,12 @@ struct StreamPlan::Chunk {
 
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()) {
   const auto bricks = volume_->set().bricks();
-  waiting_.resize(bricks.size());
+  pending_.resize(bricks.size());
   for (std::uint32_t b = 0; b < bricks.size(); ++b) {
     const UpdateIndex end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
-    waiting_[b].unsent = std::uint16_t(end - bricks[b].first);
-    waiting_[b].level = std::uint16_t(volume_->brick_error_level(b));
-    waiting_[b].object_error = Up16(volume_->brick_object_error(b));
+    pending_[b].unsent = std::uint16_t(end - bricks[b].first);
+    pending_[b].level = std::uint16_t(volume_->brick_error_level(b));
+    pending_[b].object_error = Up16(volume_->brick_object_error(b));
   }
   const auto half_levels = volume_->supercube_half_levels();
   half_levels_.assign(half_levels.begin(), half_levels.end());
@@ -66,7 +67,7 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
     if (sent_.contains(i)) continue;
     sent_.insert(i);
     ++sent_count_;
-    --waiting_[found->brick].unsent;
+    --pending_[found->brick].unsent;
   }
   return true;
 }
@@ -89,16 +90,16 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   };
   for_each_finest_first(groups, [&](const SlotGroup& g, std::uint64_t slots) {
     const auto found = *find(g.key);
-    Waiting& waiting = waiting_[found.brick];
+    Pending& pending = pending_[found.brick];
     for (std::uint64_t left = slots; left != 0; left &= left - 1) {
       const Place place = set.place_in(found.brick, found.supercube, g.key, std::countr_zero(left));
       if (!sent_.contains(place.index) || has_sent_child(Diamond(set.centre(place)))) continue;
       sent_.erase(place.index);
       --sent_count_;
-      ++waiting.unsent;
+      ++pending.unsent;
       const unsigned level = volume_->error_level(place.index);
-      waiting.level = std::max(waiting.level, std::uint16_t(level));
-      waiting.object_error = Up16(std::max(float(waiting.object_error), volume_->object_error(found.supercube, scale_of_key(g.key), level)));
+      pending.level = std::max(pending.level, std::uint16_t(level));
+      pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(found.supercube, scale_of_key(g.key), level)));
       half_levels_[found.supercube] = std::max(half_levels_[found.supercube], volume_->half_of_level(level));
     }
   });
@@ -106,62 +107,62 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
 }
 
 void StreamPlan::set_lod(const Lod& lod) {
-  only_.reset();
+  budget_.reset();
   if (lod.max_updates) {
     SplitSet wanted = select(*volume_, lod);
     if (wanted.count() > *lod.max_updates) {
       const auto order = in_order(*volume_, wanted, lod);
       for (std::size_t i = *lod.max_updates; i < order.size(); ++i) wanted.erase(order[i]);
     }
-    only_ = std::move(wanted);
+    budget_ = std::move(wanted);
   }
   ranking_.emplace(*volume_, lod);
-  for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
-    const Waiting& w = waiting_[b];
+  for (std::uint32_t b = 0; b < pending_.size(); ++b) {
+    const Pending& w = pending_[b];
     if (w.unsent == 0) continue;
-    set_waiting(b, std::max(ranking_->of_brick(b, w.level, float(w.object_error)).bound(), only_ ? Rank(1) : Rank(0)), w.unsent);
+    set_pending(b, std::max(ranking_->of_brick(b, w.level, float(w.object_error)).bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
   }
   begin_band();
 }
 
-void StreamPlan::set_waiting(std::uint32_t brick, Rank rank, unsigned wanted) {
-  Waiting& w = waiting_[brick];
+void StreamPlan::set_pending(std::uint32_t brick, Rank rank, unsigned wanted) {
+  Pending& w = pending_[brick];
   if (w.unsent == 0) rank = 0;
   wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, w.unsent);
   wanted_count_ += wanted - std::uint64_t(w.wanted);
-  waiting_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(w.rank != 0);
+  pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(w.rank != 0);
   w.rank = rank;
   w.wanted = std::uint16_t(wanted);
 }
 
 void StreamPlan::begin_band() {
-  next_brick_ = std::uint32_t(waiting_.size());
+  next_brick_ = std::uint32_t(pending_.size());
   Rank top = 0;
-  for (const Waiting& w : waiting_) top = std::max(top, w.rank);
+  for (const Pending& w : pending_) top = std::max(top, w.rank);
   band_ = top == 0 ? Rank(0) : ranking_->band_below(top);
 }
 
-StreamPlan::ToGo StreamPlan::to_go() const {
+StreamPlan::Remaining StreamPlan::remaining() const {
   Rank top = 0;
-  for (const Waiting& w : waiting_) top = std::max(top, w.rank);
-  ToGo to_go{wanted_count_, 0, 0};
-  if (top == 0) return to_go;
+  for (const Pending& w : pending_) top = std::max(top, w.rank);
+  Remaining remaining{wanted_count_, 0, 0};
+  if (top == 0) return remaining;
   if (!ranking_->has_camera()) {
-    to_go.error = ranking_->bound(top);
-    return to_go;
+    remaining.error = ranking_->bound(top);
+    return remaining;
   }
-  to_go.pixels = ranking_->bound(top);
+  remaining.pixels = ranking_->bound(top);
   unsigned level = 0;
-  for (std::uint32_t b = 0; b < waiting_.size(); ++b) {
-    if (waiting_[b].rank != 0) level = std::max(level, unsigned(waiting_[b].level));
+  for (std::uint32_t b = 0; b < pending_.size(); ++b) {
+    if (pending_[b].rank != 0) level = std::max(level, unsigned(pending_[b].level));
   }
-  to_go.error = volume_->error_levels()[level];
-  return to_go;
+  remaining.error = volume_->error_levels()[level];
+  return remaining;
 }
 
-// Puts an update into the batch, after the ancestors it lacks. around: of its supercube; those of ancestors are kept too, for the next ones are near
-// by. False if the batch is full first; what went in is closed under parents all the same.
-bool StreamPlan::take(const Place& place, Surroundings& around, Chunk& chunk) {
+// Puts an update into the builder, after the ancestors it lacks. around: of its supercube; those of ancestors are kept too, for the next ones are
+// near by. False if the builder is full first; what went in is closed under parents all the same.
+bool StreamPlan::add_with_ancestors(const Place& place, Surroundings& around, BatchBuilder& builder) {
   const Links& links = around.links(int(place.slot));
   const int parents = diamond_type(kTypeOfSlot[place.slot]).parents;
   for (int k = 0; k < parents; ++k) {
@@ -170,34 +171,34 @@ bool StreamPlan::take(const Place& place, Surroundings& around, Chunk& chunk) {
     const Surroundings::Seen& seen = around.at(link.where);
     if (!seen.has(link.slot) || sent_.contains(seen.number(link.slot))) continue;
     const Place parent = seen.place(link.slot);
-    Surroundings& above = chunk.above[std::size_t(scale_of_key(parent.key))];
+    Surroundings& above = builder.above[std::size_t(scale_of_key(parent.key))];
     above.move_to(parent.key);
-    if (!take(parent, above, chunk)) return false;
+    if (!add_with_ancestors(parent, above, builder)) return false;
   }
-  return sent_.contains(place.index) || put(place, chunk);
+  return sent_.contains(place.index) || add(place, builder);
 }
 
-bool StreamPlan::put(const Place& place, Chunk& chunk) {
+bool StreamPlan::add(const Place& place, BatchBuilder& builder) {
   std::size_t bytes = 1 + volume_->codes()[place.index].coefficients();
-  SlotGroup* group = chunk.find(place.supercube);
-  const bool new_brick = group == nullptr && !chunk.bricks.contains(place.brick);
+  SlotGroup* group = builder.find(place.supercube);
+  const bool new_brick = group == nullptr && !builder.bricks.contains(place.brick);
   if (group == nullptr) bytes += kSupercubeBytes + (new_brick ? kBrickBytes : 0);
-  if (chunk.bytes + bytes > chunk.max_bytes || chunk.updates == kBatchUpdatesMost || sent_count_ >= room_) return false;
-  chunk.bytes += bytes;
-  ++chunk.updates;
-  if (new_brick) chunk.bricks.insert(place.brick);
-  if (group == nullptr) group = &chunk.add({place.brick, place.supercube, place.key, 0});
+  if (builder.bytes + bytes > builder.max_bytes || builder.updates == kBatchUpdatesMost || sent_count_ >= room_) return false;
+  builder.bytes += bytes;
+  ++builder.updates;
+  if (new_brick) builder.bricks.insert(place.brick);
+  if (group == nullptr) group = &builder.add({place.brick, place.supercube, place.key, 0});
   group->slots |= std::uint64_t(1) << place.slot;
   sent_.insert(place.index);
   ++sent_count_;
-  Waiting& w = waiting_[place.brick];
+  Pending& w = pending_[place.brick];
   --w.unsent;
-  if (w.wanted > w.unsent) set_waiting(place.brick, w.rank, w.unsent);
+  if (w.wanted > w.unsent) set_pending(place.brick, w.rank, w.unsent);
   return true;
 }
 
-// Takes what the band wants of a brick. False if the batch is full first.
-bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
+// Takes what the band wants of a brick. False if the builder is full first.
+bool StreamPlan::visit_brick(std::uint32_t brick, BatchBuilder& builder) {
   const SupercubeSet& set = volume_->set();
   const Ranking::Brick ranking = ranking_->of_brick(brick);
   // Of what is left: no lower than any of it.
@@ -210,21 +211,21 @@ bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
     const UpdateIndex first = set.first(brick, s);
     const std::uint64_t occupancy = set.occupancy()[s];
     const auto count = unsigned(std::popcount(occupancy));
-    ++chunk.seen;
+    ++builder.visited;
     const std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
-    const std::uint64_t may_be_sent = only_ ? unsent & only_->some(first, count) : unsent;
+    const std::uint64_t may_be_sent = budget_ ? unsent & budget_->some(first, count) : unsent;
     unsigned level_here = 0;
     if (may_be_sent != 0) {
       const Ranking::Supercube here = ranking.supercube(s, key);
       level_here = volume_->level_of_half(half_levels_[s]);
-      const Rank bound = std::max(here.bound(level_here), only_ ? Rank(1) : Rank(0));  // only_ has ancestors too: they come last
+      const Rank bound = std::max(here.bound(level_here), budget_ ? Rank(1) : Rank(0));  // budget_ has ancestors too: they come last
       if (bound < band_) {
         most = std::max(most, bound);
         left_wanted += bound == 0 ? 0 : unsigned(std::popcount(may_be_sent));
       } else {
-        chunk.seen += count;
-        chunk.around.move_to(key);
-        const Left left = look_into(here, {key, brick, s, 0, first}, occupancy, may_be_sent, chunk);
+        builder.visited += count;
+        builder.around.move_to(key);
+        const Left left = visit_supercube(here, {key, brick, s, 0, first}, occupancy, may_be_sent, builder);
         full = left.full;
         if (full) return;
         most = std::max(most, left.most);
@@ -243,16 +244,16 @@ bool StreamPlan::look_into(std::uint32_t brick, Chunk& chunk) {
     object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), level_here));
   });
   if (full) return false;
-  set_waiting(brick, most, left_wanted);
-  waiting_[brick].level = std::uint16_t(level);
-  waiting_[brick].object_error = Up16(object_error);
+  set_pending(brick, most, left_wanted);
+  pending_[brick].level = std::uint16_t(level);
+  pending_[brick].object_error = Up16(object_error);
   return true;
 }
 
 // Takes what the band wants of a supercube. place: its first update. may_be_sent: a bit for each of its updates, in their order.
-StreamPlan::Left StreamPlan::look_into(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent,
-                                       Chunk& chunk) {
-  const float in_band = ranking.least(band_), least = only_ ? ranking.least(1) : 0;
+StreamPlan::Left StreamPlan::visit_supercube(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent,
+                                             BatchBuilder& builder) {
+  const float in_band = ranking.least(band_), least = budget_ ? ranking.least(1) : 0;
   const UpdateIndex first = place.index;
   Left left;
   float most = 0;
@@ -266,7 +267,7 @@ StreamPlan::Left StreamPlan::look_into(const Ranking::Supercube& ranking, Place 
     importance = std::max(importance, least);
     if (importance > 0 && importance >= in_band) {
       place.index = first + k;
-      if (!take(place, chunk.around, chunk)) {
+      if (!add_with_ancestors(place, builder.around, builder)) {
         left.full = true;
         return left;
       }
@@ -281,27 +282,24 @@ StreamPlan::Left StreamPlan::look_into(const Ranking::Supercube& ranking, Place 
 }
 
 std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
-  Chunk chunk(*volume_, max_bytes);
+  BatchBuilder builder(*volume_, max_bytes);
   while (!done()) {
     if (next_brick_ == 0) {
-      if (chunk.bytes >= kSmallBatch) break;
+      if (builder.bytes >= kSmallBatch) break;
       begin_band();
     }
-    if (waiting_[next_brick_ - 1].rank < band_) {
+    if (pending_[next_brick_ - 1].rank < band_) {
       --next_brick_;
       continue;
     }
-    if (!look_into(next_brick_ - 1, chunk)) break;
+    if (!visit_brick(next_brick_ - 1, builder)) break;
     --next_brick_;
-    if (chunk.seen >= kTurn) break;
+    if (builder.visited >= kMaxVisited) break;
   }
-  if (chunk.updates == 0) return {};
-  std::vector<SlotGroup>& groups = chunk.groups;
+  if (builder.updates == 0) return {};
+  std::vector<SlotGroup>& groups = builder.groups;
   std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
-  Batch batch;
-  batch.payload = encode_batch(*volume_, sent_, groups);
-  batch.updates = chunk.updates;
-  return batch;
+  return Batch{encode_batch(*volume_, sent_, groups), builder.updates};
 }
 
 }  // namespace intervale

@@ -55,21 +55,21 @@ class StreamPlan {
   // The next batch. Nothing when all that is wanted has been sent, and when the search for more has taken long enough for one turn: done() tells.
   // max_bytes, at least 256, bounds the payload as it would be if nothing could be compressed; it is about half of that.
   std::optional<Batch> next(std::size_t max_bytes);
-  [[nodiscard]] bool done() const { return waiting_bricks_ == 0 || full(); }
-  [[nodiscard]] bool full() const { return waiting_bricks_ != 0 && sent_count_ >= room_; }  // there is no room for what is wanted
+  [[nodiscard]] bool done() const { return pending_bricks_ == 0 || is_full(); }
+  [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }  // there is no room for what is wanted
 
   [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates that the client has, in all
   // Of what is wanted for its own sake and not yet sent. All are bounds from above, and 0 when all has been sent.
-  struct ToGo {
+  struct Remaining {
     std::uint64_t updates = 0;
     double error = 0;   // field units
     double pixels = 0;  // on the camera's screen; 0 without one
   };
-  [[nodiscard]] ToGo to_go() const;
+  [[nodiscard]] Remaining remaining() const;
 
  private:
   using Rank = Ranking::Rank;
-  struct Chunk;
+  struct BatchBuilder;
   // A number that is not negative, rounded up by at most a hundredth.
   struct Up16 {
     std::uint16_t bits = 0;
@@ -78,34 +78,34 @@ class StreamPlan {
     explicit operator float() const { return std::bit_cast<float>(std::uint32_t(bits) << 16); }
   };
   // Of a brick. No brick has more updates than 64 * kSlots.
-  struct Waiting {
+  struct Pending {
     Rank rank = 0;             // no lower than that of any update wanted and not sent; 0: there is none
     std::uint16_t unsent = 0;  // updates
     std::uint16_t wanted = 0;  // of those, at most
     std::uint16_t level = 0;   // of error: no lower than that of any not sent
     Up16 object_error;         // no less than that of any not sent
   };
-  void set_waiting(std::uint32_t brick, Rank rank, unsigned wanted);
+  void set_pending(std::uint32_t brick, Rank rank, unsigned wanted);
   void begin_band();
-  bool look_into(std::uint32_t brick, Chunk& chunk);
+  bool visit_brick(std::uint32_t brick, BatchBuilder& builder);
   // Of a supercube, after a look.
   struct Left {
     bool full = false;  // the batch is: the rest is not known
     Rank most = 0;
     unsigned wanted = 0, level = 0;
   };
-  Left look_into(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent, Chunk& chunk);
-  bool take(const Place& place, Surroundings& around, Chunk& chunk);
-  bool put(const Place& place, Chunk& chunk);
+  Left visit_supercube(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent, BatchBuilder& builder);
+  bool add_with_ancestors(const Place& place, Surroundings& around, BatchBuilder& builder);
+  bool add(const Place& place, BatchBuilder& builder);
 
   std::shared_ptr<const IntervalVolume> volume_;
   SplitSet sent_;
-  std::vector<Waiting> waiting_;           // by brick
+  std::vector<Pending> pending_;           // by brick
   std::vector<std::uint8_t> half_levels_;  // by supercube: of what is not sent, IntervalVolume::half_of_level() or more
   std::optional<Ranking> ranking_;
-  std::optional<SplitSet> only_;  // with a budget of updates: those within it
+  std::optional<SplitSet> budget_;  // with a budget of updates: those within it
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);
-  std::uint32_t waiting_bricks_ = 0;  // whose rank is not 0
+  std::uint32_t pending_bricks_ = 0;  // whose rank is not 0
   Rank band_ = 0;                     // the lowest rank of the current band
   std::uint32_t next_brick_ = 0;      // the band goes from the last brick to the first; those below this one are still to come
 };

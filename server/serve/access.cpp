@@ -140,13 +140,13 @@ std::shared_ptr<const Scope> Tokens::find(std::string_view token) const {
 
 std::optional<std::string> token_of(std::string_view authorization, std::string_view subprotocols) {
   constexpr std::string_view kBearer = "bearer ", kPrefix = protocol::kTokenSubprotocol;
-  if (equal_but_for_case(authorization.substr(0, kBearer.size()), kBearer)) {
+  if (iequals(authorization.substr(0, kBearer.size()), kBearer)) {
     const std::string_view token = trimmed(authorization.substr(kBearer.size()));
     if (!is_token(token)) return {};
     return std::string(token);
   }
   while (!subprotocols.empty()) {
-    const std::string_view name = take(subprotocols, ',');
+    const std::string_view name = split_off(subprotocols, ',');
     if (!name.starts_with(kPrefix)) continue;
     auto token = from_base64url(name.substr(kPrefix.size()));
     if (!token || !is_token(*token)) return {};
@@ -158,10 +158,10 @@ std::optional<std::string> token_of(std::string_view authorization, std::string_
 bool is_allowed_origin(std::string_view origin, std::string_view host, std::span<const std::string> allowed) {
   if (origin.empty()) return true;
   if (!allowed.empty()) {
-    return std::any_of(allowed.begin(), allowed.end(), [&](const std::string& one) { return one == "*" || equal_but_for_case(one, origin); });
+    return std::any_of(allowed.begin(), allowed.end(), [&](const std::string& one) { return one == "*" || iequals(one, origin); });
   }
   for (const std::string_view scheme : {"http://", "https://"}) {
-    if (equal_but_for_case(origin.substr(0, scheme.size()), scheme)) return !host.empty() && equal_but_for_case(origin.substr(scheme.size()), host);
+    if (iequals(origin.substr(0, scheme.size()), scheme)) return !host.empty() && iequals(origin.substr(scheme.size()), host);
   }
   return false;
 }

@@ -5,32 +5,32 @@
 
 namespace intervale {
 
-Connections::Membership& Connections::Membership::operator=(Membership&& other) noexcept {
+Connections::Registration& Connections::Registration::operator=(Registration&& other) noexcept {
   std::swap(set_, other.set_);
   std::swap(id_, other.id_);
   return *this;
 }
 
-Connections::Membership::~Membership() {
-  if (set_ != nullptr) set_->leave(id_);
+Connections::Registration::~Registration() {
+  if (set_ != nullptr) set_->remove(id_);
 }
 
-Connections::Membership Connections::join(const std::shared_ptr<Connection>& connection) {
+Connections::Registration Connections::add(const std::shared_ptr<Connection>& connection) {
   const std::unique_lock lock(mutex_);
   const std::uint64_t id = next_id_++;
   connections_.emplace(id, connection);
-  if (draining_) connection->go_away();  // only posts, so the lock does no harm
+  if (draining_) connection->begin_shutdown();  // does not block
   return {*this, id};
 }
 
-void Connections::go_away() {
-  std::vector<std::shared_ptr<Connection>> told;  // outlives the lock: the last owner's destructor leaves the set
+void Connections::begin_shutdown() {
+  std::vector<std::shared_ptr<Connection>> keep_alive;  // until the lock is released: a connection's destructor calls remove()
   const std::unique_lock lock(mutex_);
   draining_ = true;
   for (const auto& [id, weak] : connections_) {
     if (auto connection = weak.lock()) {
-      connection->go_away();
-      told.push_back(std::move(connection));
+      connection->begin_shutdown();
+      keep_alive.push_back(std::move(connection));
     }
   }
 }
@@ -50,7 +50,7 @@ std::size_t Connections::size() const {
   return connections_.size();
 }
 
-void Connections::leave(std::uint64_t id) {
+void Connections::remove(std::uint64_t id) {
   const std::lock_guard lock(mutex_);
   connections_.erase(id);
   if (connections_.empty()) empty_.notify_all();

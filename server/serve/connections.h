@@ -1,4 +1,4 @@
-// The connections a server has, so that it can ask them all to go and know when they are gone.
+// The open connections of a server: to shut them all down, and to wait until they are gone.
 #pragma once
 
 #include <chrono>
@@ -15,38 +15,38 @@ namespace intervale {
 class Connection {
  public:
   virtual ~Connection() = default;
-  // Any thread; these do not block.
-  virtual void go_away() = 0;  // the server drains: take leave soon
-  virtual void drop() = 0;     // end at once, without leave
+  // Any thread; neither blocks.
+  virtual void begin_shutdown() = 0;  // the server drains: close in order, soon
+  virtual void abort() = 0;           // close the socket at once
 };
 
 // Any thread.
 class Connections {
  public:
-  // Leaves the set when it goes.
-  class Membership {
+  // Removes the connection when destroyed.
+  class Registration {
    public:
-    Membership() = default;
-    Membership(Connections& set, std::uint64_t id) : set_(&set), id_(id) {}
-    Membership(Membership&& other) noexcept : set_(std::exchange(other.set_, nullptr)), id_(other.id_) {}
-    Membership& operator=(Membership&& other) noexcept;
-    ~Membership();
+    Registration() = default;
+    Registration(Connections& set, std::uint64_t id) : set_(&set), id_(id) {}
+    Registration(Registration&& other) noexcept : set_(std::exchange(other.set_, nullptr)), id_(other.id_) {}
+    Registration& operator=(Registration&& other) noexcept;
+    ~Registration();
 
    private:
     Connections* set_ = nullptr;
     std::uint64_t id_ = 0;
   };
 
-  // A connection that joins while the server drains is told to go at once.
-  [[nodiscard]] Membership join(const std::shared_ptr<Connection>& connection);
+  // A connection that is added while the server drains is shut down at once.
+  [[nodiscard]] Registration add(const std::shared_ptr<Connection>& connection);
 
-  void go_away();                                         // tells them all, and those to come
-  bool wait_until_empty(std::chrono::milliseconds time);  // whether it became empty in time
-  [[nodiscard]] bool draining() const;
+  void begin_shutdown();                                  // of all connections, and of those added later
+  bool wait_until_empty(std::chrono::milliseconds time);  // false if there still are connections after that time
+  [[nodiscard]] bool draining() const;                    // begin_shutdown() was called
   [[nodiscard]] std::size_t size() const;
 
  private:
-  void leave(std::uint64_t id);
+  void remove(std::uint64_t id);
   mutable std::mutex mutex_;
   std::condition_variable empty_;
   std::map<std::uint64_t, std::weak_ptr<Connection>> connections_;

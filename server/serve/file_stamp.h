@@ -31,7 +31,7 @@ struct FileStamp {
 class FileChanges {
  public:
   // Whether any of them is another than when this was last asked, or this is the first time.
-  bool look(std::initializer_list<std::filesystem::path> paths) {
+  bool check(std::initializer_list<std::filesystem::path> paths) {
     std::vector<std::optional<FileStamp>> stamps;
     for (const std::filesystem::path& path : paths) stamps.push_back(stamp_of(path));
     if (stamps == stamps_) return false;
@@ -39,7 +39,7 @@ class FileChanges {
     return true;
   }
   // They could not be read: the next look is the first again.
-  void forget() { stamps_.clear(); }
+  void reset() { stamps_.clear(); }
 
  private:
   std::vector<std::optional<FileStamp>> stamps_;

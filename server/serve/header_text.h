@@ -14,14 +14,14 @@ namespace intervale {
 }
 
 // What stands before the separator, trimmed; that and the separator are taken away.
-[[nodiscard]] inline std::string_view take(std::string_view& rest, char separator) {
+[[nodiscard]] inline std::string_view split_off(std::string_view& rest, char separator) {
   const auto end = rest.find(separator);
   const std::string_view item = rest.substr(0, end);
   rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
   return trimmed(item);
 }
 
-[[nodiscard]] inline bool equal_but_for_case(std::string_view a, std::string_view b) {
+[[nodiscard]] inline bool iequals(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 

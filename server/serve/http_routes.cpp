@@ -59,7 +59,7 @@ std::string front_page(const Catalogue& catalogue, const Scope* scope) {
   return page + "</ul>\n<p><a href=\"/api/datasets\">As JSON</a>. There is no viewer here: see <code>--viewer</code>.</p>\n</html>\n";
 }
 
-HttpAnswer with_body(const char* content_type, std::string body) {
+HttpResponse with_body(const char* content_type, std::string body) {
   return {.content_type = content_type, .body = std::make_shared<const std::string>(std::move(body))};
 }
 
@@ -78,38 +78,38 @@ std::string viewer_policy(std::string_view host) {
          "; worker-src 'self'; manifest-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 }
 
-HttpAnswer file_answer(const HttpRequest& request, const StaticFile& file) {
+HttpResponse file_response(const HttpRequest& request, const StaticFile& file) {
   const bool packed = file.gzip && accepts_gzip(request.accept_encoding);
   const StaticContent& content = packed ? *file.gzip : file.plain;
-  HttpAnswer answer{.content_type = file.content_type, .body = content.bytes, .content_security_policy = viewer_policy(request.host)};
-  answer.cache_control = file.immutable ? "public, max-age=31536000, immutable" : "no-cache";
-  answer.headers = {{"ETag", content.etag}};
-  if (file.gzip) answer.headers.emplace_back("Vary", "Accept-Encoding");
-  if (names_etag(request.if_none_match, content.etag)) {
-    answer.status = 304;
-    answer.body = nullptr;
+  HttpResponse response{.content_type = file.content_type, .body = content.bytes, .content_security_policy = viewer_policy(request.host)};
+  response.cache_control = file.immutable ? "public, max-age=31536000, immutable" : "no-cache";
+  response.headers = {{"ETag", content.etag}};
+  if (file.gzip) response.headers.emplace_back("Vary", "Accept-Encoding");
+  if (matches_etag(request.if_none_match, content.etag)) {
+    response.status = 304;
+    response.body = nullptr;
   } else if (packed) {
-    answer.headers.emplace_back("Content-Encoding", "gzip");
+    response.headers.emplace_back("Content-Encoding", "gzip");
   }
-  return answer;
+  return response;
 }
 
-// Lets pages of allowed origins read an answer.
-HttpAnswer shared(const HttpRequest& request, HttpAnswer answer) {
-  answer.headers.emplace_back("Vary", "Origin");
-  if (!request.allowed_origin.empty()) answer.headers.emplace_back("Access-Control-Allow-Origin", request.allowed_origin);
-  return answer;
+// Lets pages of allowed origins read an response.
+HttpResponse shared(const HttpRequest& request, HttpResponse response) {
+  response.headers.emplace_back("Vary", "Origin");
+  if (!request.allowed_origin.empty()) response.headers.emplace_back("Access-Control-Allow-Origin", request.allowed_origin);
+  return response;
 }
 
 // Not an empty list: whoever asks is to ask again.
-HttpAnswer loading() {
-  HttpAnswer answer = short_answer(503, "loading: the data sets are still being read");
-  answer.headers.emplace_back("Retry-After", "1");
-  return answer;
+HttpResponse loading() {
+  HttpResponse response = text_response(503, "loading: the data sets are still being read");
+  response.headers.emplace_back("Retry-After", "1");
+  return response;
 }
 
 // What a browser asks before it sends a token along.
-HttpAnswer preflight() {
+HttpResponse preflight() {
   return {.status = 204,
           .headers = {
               {"Access-Control-Allow-Methods", "GET, HEAD"}, {"Access-Control-Allow-Headers", "Authorization"}, {"Access-Control-Max-Age", "600"}}};
@@ -117,56 +117,56 @@ HttpAnswer preflight() {
 
 bool is_known(std::string_view path, const HttpState& state) {
   if (path == "/healthz" || path == "/readyz") return true;
-  if (path == "/metrics") return state.door == Door::metrics || !state.has_metrics_door;
-  return state.door == Door::all && (path == "/" || path == "/api/datasets");
+  if (path == "/metrics") return state.role == PortRole::metrics || !state.has_metrics_port;
+  return state.role == PortRole::all && (path == "/" || path == "/api/datasets");
 }
 
 }  // namespace
 
-HttpAnswer short_answer(unsigned status, std::string line) {
+HttpResponse text_response(unsigned status, std::string line) {
   return {.status = status, .body = std::make_shared<const std::string>(std::move(line) + "\n")};
 }
 
-const char* text_of(Readiness readiness) {
-  switch (readiness) {
-    case Readiness::loading:
+const char* text_of(ServerStatus server_status) {
+  switch (server_status) {
+    case ServerStatus::loading:
       return "loading";
-    case Readiness::draining:
+    case ServerStatus::draining:
       return "draining";
-    case Readiness::ready:
+    case ServerStatus::ready:
       break;
   }
   return "ok";
 }
 
-HttpAnswer unauthorized() {
-  HttpAnswer answer = short_answer(401, "a token is wanted: Authorization: Bearer TOKEN");
-  answer.headers.emplace_back("WWW-Authenticate", "Bearer");
-  return answer;
+HttpResponse unauthorized() {
+  HttpResponse response = text_response(401, "a token is wanted: Authorization: Bearer TOKEN");
+  response.headers.emplace_back("WWW-Authenticate", "Bearer");
+  return response;
 }
 
-HttpAnswer answer(const HttpRequest& request, const HttpState& state) {
+HttpResponse respond(const HttpRequest& request, const HttpState& state) {
   const auto path = decode_path(request.target);
-  if (!path) return short_answer(400, "not a target this server can read");
-  const StaticFile* const file = state.door == Door::all ? state.viewer.find(*path) : nullptr;
-  if (!is_known(*path, state) && file == nullptr) return short_answer(404, "nothing here");
+  if (!path) return text_response(400, "not a target this server can read");
+  const StaticFile* const file = state.role == PortRole::all ? state.viewer.find(*path) : nullptr;
+  if (!is_known(*path, state) && file == nullptr) return text_response(404, "nothing here");
   if (*path == "/api/datasets" && request.method == "OPTIONS" && !request.allowed_origin.empty()) return shared(request, preflight());
-  if (request.method != "GET" && request.method != "HEAD") return short_answer(405, "only GET and HEAD");
+  if (request.method != "GET" && request.method != "HEAD") return text_response(405, "only GET and HEAD");
   if (*path == "/api/datasets") {
-    if (request.scope != nullptr && state.readiness == Readiness::loading) return shared(request, loading());
+    if (request.scope != nullptr && state.server_status == ServerStatus::loading) return shared(request, loading());
     return shared(request, request.scope != nullptr ? with_body(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized());
   }
-  if (*path == "/metrics" && state.door == Door::all) {
+  if (*path == "/metrics" && state.role == PortRole::all) {
     if (request.scope == nullptr) return unauthorized();
-    if (!request.scope->is_everything()) return short_answer(403, "metrics tell of every data set, and this token does not open them all");
+    if (!request.scope->is_everything()) return text_response(403, "metrics tell of every data set, and this token does not open them all");
   }
   if (*path == "/metrics")
     return with_body(
         kPrometheus,
         state.metrics.text({.catalogue = state.catalogue, .queued_bytes = state.queued_bytes, .certificate_expires = state.certificate_expires}));
-  if (*path == "/healthz") return short_answer(200, "ok");
-  if (*path == "/readyz") return short_answer(state.readiness == Readiness::ready ? 200 : 503, text_of(state.readiness));
-  if (file != nullptr) return file_answer(request, *file);
+  if (*path == "/healthz") return text_response(200, "ok");
+  if (*path == "/readyz") return text_response(state.server_status == ServerStatus::ready ? 200 : 503, text_of(state.server_status));
+  if (file != nullptr) return file_response(request, *file);
   return with_body(kHtml, front_page(state.catalogue, request.scope));
 }
 

@@ -28,7 +28,7 @@ struct HttpRequest {
   const Scope* scope = nullptr;     // what whoever asks may see; nullptr: only what everybody may
 };
 
-struct HttpAnswer {
+struct HttpResponse {
   unsigned status = 200;
   std::string content_type = "text/plain; charset=utf-8";
   std::shared_ptr<const std::string> body = {};  // nullptr: none, in a 304
@@ -38,33 +38,33 @@ struct HttpAnswer {
 };
 
 // An answer of one line.
-[[nodiscard]] HttpAnswer short_answer(unsigned status, std::string line);
+[[nodiscard]] HttpResponse text_response(unsigned status, std::string line);
 // 401: what whoever has no token gets.
-[[nodiscard]] HttpAnswer unauthorized();
+[[nodiscard]] HttpResponse unauthorized();
 
 // What a port is for: everything, or nothing but /metrics, /healthz and /readyz.
-enum class Door { all, metrics };
+enum class PortRole { all, metrics };
 
 // loading: before there is a catalogue. draining: nobody new is taken.
-enum class Readiness { loading, ready, draining };
-[[nodiscard]] const char* text_of(Readiness readiness);
+enum class ServerStatus { loading, ready, draining };
+[[nodiscard]] const char* text_of(ServerStatus server_status);
 
 struct HttpState {
   const Catalogue& catalogue;
   const Metrics& metrics;
   const StaticFiles& viewer;
   std::uint64_t queued_bytes = 0;
-  Door door = Door::all;
-  bool has_metrics_door = false;  // then /metrics is answered there only
+  PortRole role = PortRole::all;
+  bool has_metrics_port = false;  // then /metrics is answered there only
   std::optional<std::chrono::system_clock::time_point> certificate_expires = {};
-  Readiness readiness = Readiness::ready;
+  ServerStatus server_status = ServerStatus::ready;
 };
 
 // GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists
 // the data sets. A query is ignored. Pages of allowed origins may read /api/datasets, with a token (CORS, Fetch standard, 3.2); until it is known
 // what there is, it is 503. With no scope 401 for what tells of data sets; with one that is not everything 403 for /metrics, which tells of all,
-// unless it has a door of its own. 405 for other methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET;
+// unless it has a role of its own. 405 for other methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET;
 // whoever sends it leaves the body out.
-[[nodiscard]] HttpAnswer answer(const HttpRequest& request, const HttpState& state);
+[[nodiscard]] HttpResponse respond(const HttpRequest& request, const HttpState& state);
 
 }  // namespace intervale

@@ -29,14 +29,14 @@ namespace http = beast::http;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr std::chrono::seconds kKeepAliveTime{30};  // between requests
-constexpr std::chrono::seconds kAnswerTime{30};
-constexpr std::chrono::milliseconds kGoodbyeTime{1000};
+constexpr std::chrono::seconds kWriteTime{30};
+constexpr std::chrono::milliseconds kShutdownTime{1000};
 constexpr std::uint32_t kMaxHeader = 4096;
 
 using Request = http::request<http::empty_body>;
 using Response = http::response<http::span_body<const char>>;
 
-bool offers_our_subprotocol(const Request& request) {
+bool offers_subprotocol(const Request& request) {
   for (const auto& name : http::token_list(request[http::field::sec_websocket_protocol])) {
     if (name == protocol::kSubprotocol) return true;
   }
@@ -44,7 +44,7 @@ bool offers_our_subprotocol(const Request& request) {
 }
 
 // Refers to the answer's body, which must live until the response is sent.
-Response response_to(const Request& request, const HttpAnswer& answer, bool keep_alive) {
+Response response_to(const Request& request, const HttpResponse& answer, bool keep_alive) {
   Response response(http::status(answer.status), request.version());
   response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
   response.set("X-Content-Type-Options", "nosniff");
@@ -65,35 +65,35 @@ Response response_to(const Request& request, const HttpAnswer& answer, bool keep
 
 class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(asio::ip::tcp::socket socket, ServerContext& context, Door door, AddressCounts::Seat seat)
+  HttpSession(asio::ip::tcp::socket socket, ServerContext& context, PortRole role, AddressCounts::Lease address_lease)
       : stream_(std::move(socket)),
         deadline_(stream_.get_executor()),
         strand_(stream_.get_executor()),
         context_(context),
-        door_(door),
-        seat_(std::move(seat)) {}
+        role_(role),
+        address_lease_(std::move(address_lease)) {}
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
   ~HttpSession() override { context_.metrics.connections.Decrement(); }
 
   void start() {
     context_.metrics.connections.Increment();
-    membership_ = context_.connections.join(shared_from_this());
+    registration_ = context_.connections.add(shared_from_this());
     asio::co_spawn(strand_, run(shared_from_this()), [](const std::exception_ptr& failure) { report(failure); });
   }
 
-  void drop() override {
+  void abort() override {
     asio::post(strand_, [self = shared_from_this()] { self->stream_.close(); });
   }
 
-  void go_away() override {
+  void begin_shutdown() override {
     asio::post(strand_, [self = shared_from_this()] {
-      self->leaving_ = true;
-      if (!self->waiting_) return;  // an answer under way is finished
-      if (self->answered_) {
+      self->draining_ = true;
+      if (!self->idle_) return;  // an answer under way is finished
+      if (self->served_) {
         self->stream_.socket().cancel();
       } else {
-        self->expire_after(kGoodbyeTime);  // its request may be on its way
+        self->expire_after(kShutdownTime);  // its request may be on its way
       }
     });
   }
@@ -111,49 +111,49 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   // Whatever ends this coroutine ends the connection, but for an upgrade, which takes the socket along. `self` keeps the object.
   asio::awaitable<void> run([[maybe_unused]] std::shared_ptr<HttpSession> self) {
     if (!co_await begin_tls()) co_return;
-    std::chrono::milliseconds patience = context_.options.handshake_time;
-    for (; !leaving_ || !answered_; patience = kKeepAliveTime) {
+    std::chrono::milliseconds header_time = context_.options.handshake_time;
+    for (; !draining_ || !served_; header_time = kKeepAliveTime) {
       http::request_parser<http::empty_body> parser;
       parser.header_limit(kMaxHeader);
-      expire_after(leaving_ ? kGoodbyeTime : patience);
-      waiting_ = true;
+      expire_after(draining_ ? kShutdownTime : header_time);
+      idle_ = true;
       const auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
-      waiting_ = false;
+      idle_ = false;
       if (error) {
-        co_await refuse(error);
+        co_await reject_malformed(error);
         break;
       }
       const Request request = parser.get();
-      if (beast::websocket::is_upgrade(request) && door_ == Door::all && request.target() == protocol::kPath) {
-        if (auto complaint = unfit_for_session(request)) {
+      if (beast::websocket::is_upgrade(request) && role_ == PortRole::all && request.target() == protocol::kPath) {
+        if (auto complaint = check_upgrade(request)) {
           Response response = response_to(request, *complaint, false);
           co_await send(response);
           break;
         }
         deadline_.cancel();  // from here on the WebSocket's own deadlines hold
-        start_websocket_session(std::move(stream_), request, context_, {scope_for(request), std::move(seat_)});
+        start_websocket_session(std::move(stream_), request, context_, {scope_for(request), std::move(address_lease_)});
         co_return;
       }
       // A body is not read, so what follows it cannot be told from it: the connection ends with this answer.
       const bool has_body = parser.content_length().value_or(0) > 0 || request.count(http::field::transfer_encoding) > 0;
-      const bool keep_alive = request.keep_alive() && !has_body && !leaving_;
-      const HttpAnswer answer = answer_to(request);
+      const bool keep_alive = request.keep_alive() && !has_body && !draining_;
+      const HttpResponse answer = route(request);
       Response response = response_to(request, answer, keep_alive);
-      answered_ = true;
-      if (answer.status == 401) context_.metrics.refused(Refusal::token);
+      served_ = true;
+      if (answer.status == 401) context_.metrics.count_refusal(Refusal::token);
       if (!co_await send(response) || !keep_alive) break;
     }
-    expire_after(kGoodbyeTime);
+    expire_after(kShutdownTime);
     beast::error_code ignored;
     if (stream_.tls() != nullptr) co_await stream_.async_shutdown(kAwait);
     deadline_.cancel();
     if (stream_.socket().is_open()) stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
   }
 
-  // Whether there is none, or its handshake is done. A door for metrics has none.
+  // Whether there is none, or its handshake is done. A role for metrics has none.
   asio::awaitable<bool> begin_tls() {
-    auto tls = context_.tls.get();
-    if (!tls || door_ != Door::all) co_return true;
+    auto tls = context_.tls.load();
+    if (!tls || role_ != PortRole::all) co_return true;
     stream_.use_tls(std::move(tls));
     expire_after(context_.options.handshake_time);
     const auto [error] = co_await stream_.async_handshake(kAwait);
@@ -169,11 +169,11 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     });
   }
 
-  HttpAnswer answer_to(const Request& request) const {
-    if (door_ == Door::all && request.target() == protocol::kPath) return short_answer(426, "this is where WebSocket sessions are opened");
+  HttpResponse route(const Request& request) const {
+    if (role_ == PortRole::all && request.target() == protocol::kPath) return text_response(426, "this is where WebSocket sessions are opened");
     const auto scope = scope_for(request);
-    const auto catalogue = context_.catalogue.get();
-    const auto tls = context_.tls.get();
+    const auto catalogue = context_.catalogue.load();
+    const auto tls = context_.tls.load();
     static const Catalogue kNothingYet;
     const auto& allowed = context_.options.allowed_origins;
     const std::string_view origin = request[http::field::origin], host = request[http::field::host];
@@ -184,22 +184,22 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
                             .if_none_match = request[http::field::if_none_match],
                             .allowed_origin = !allowed.empty() && is_allowed_origin(origin, host, allowed) ? origin : std::string_view(),
                             .scope = scope.get()};
-    return intervale::answer(asked, {.catalogue = catalogue ? *catalogue : kNothingYet,
-                                     .metrics = context_.metrics,
-                                     .viewer = context_.viewer,
-                                     .queued_bytes = context_.outbox.bytes(),
-                                     .door = door_,
-                                     .has_metrics_door = context_.options.metrics_listen.has_value(),
-                                     .certificate_expires = tls ? std::optional(tls->expires()) : std::nullopt,
-                                     .readiness = readiness()});
+    return respond(asked, {.catalogue = catalogue ? *catalogue : kNothingYet,
+                           .metrics = context_.metrics,
+                           .viewer = context_.viewer,
+                           .queued_bytes = context_.write_budget.bytes(),
+                           .role = role_,
+                           .has_metrics_port = context_.options.metrics_listen.has_value(),
+                           .certificate_expires = tls ? std::optional(tls->expires()) : std::nullopt,
+                           .server_status = server_status()});
   }
 
-  std::optional<HttpAnswer> unfit_for_session(const Request& request) const {
-    if (const auto state = readiness(); state != Readiness::ready) return short_answer(503, text_of(state));
-    if (!offers_our_subprotocol(request)) return short_answer(400, "the subprotocol intervale.v1 is not offered");
+  std::optional<HttpResponse> check_upgrade(const Request& request) const {
+    if (const auto state = server_status(); state != ServerStatus::ready) return text_response(503, text_of(state));
+    if (!offers_subprotocol(request)) return text_response(400, "the subprotocol intervale.v1 is not offered");
     const std::string_view origin = request[http::field::origin], host = request[http::field::host];
     if (!is_allowed_origin(origin, host, context_.options.allowed_origins)) {
-      return refused(Refusal::origin, short_answer(403, "pages of this origin may not open sessions here"));
+      return refused(Refusal::origin, text_response(403, "pages of this origin may not open sessions here"));
     }
     // A page is not shown the answer to its upgrade: it is let in, to be told with a close code.
     if (origin.empty() && scope_for(request) == nullptr) return refused(Refusal::token, unauthorized());
@@ -210,64 +210,64 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     return {};
   }
 
-  [[nodiscard]] Readiness readiness() const {
-    if (context_.connections.draining()) return Readiness::draining;
-    return context_.catalogue.get() ? Readiness::ready : Readiness::loading;
+  [[nodiscard]] ServerStatus server_status() const {
+    if (context_.connections.draining()) return ServerStatus::draining;
+    return context_.catalogue.load() ? ServerStatus::ready : ServerStatus::loading;
   }
 
-  [[nodiscard]] HttpAnswer refused(Refusal reason, HttpAnswer answer) const {
-    context_.metrics.refused(reason);
+  [[nodiscard]] HttpResponse refused(Refusal reason, HttpResponse answer) const {
+    context_.metrics.count_refusal(reason);
     return answer;
   }
 
-  static HttpAnswer full() {
-    HttpAnswer answer = short_answer(503, "no room for another session now");
+  static HttpResponse full() {
+    HttpResponse answer = text_response(503, "no room for another session now");
     answer.headers.emplace_back("Retry-After", "5");
     return answer;
   }
 
   // What whoever sends this may see; nullptr: nothing.
   [[nodiscard]] std::shared_ptr<const Scope> scope_for(const Request& request) const {
-    const auto tokens = context_.tokens.get();
+    const auto tokens = context_.tokens.load();
     if (!tokens) return Scope::everything();
     const auto token = token_of(request[http::field::authorization], request[http::field::sec_websocket_protocol]);
     return token ? tokens->find(*token) : nullptr;
   }
 
   // What did not read as a request is told so, if it was bytes at all that came.
-  asio::awaitable<void> refuse(beast::error_code error) {
+  asio::awaitable<void> reject_malformed(beast::error_code error) {
     if (error.category() != http::make_error_code(http::error::bad_target).category()) co_return;
     if (error == http::error::end_of_stream || error == http::error::partial_message) co_return;
     const bool too_long = error == http::error::header_limit || error == http::error::buffer_overflow;
-    const HttpAnswer answer = short_answer(too_long ? 431 : 400, "not a request this server can read");
+    const HttpResponse answer = text_response(too_long ? 431 : 400, "not a request this server can read");
     Response response = response_to(Request(http::verb::get, "/", 11), answer, false);
     co_await send(response);
   }
 
   // By reference, and never from a temporary: g++ 12 destroys some temporaries of a co_await expression twice.
   asio::awaitable<bool> send(Response& response) {
-    expire_after(kAnswerTime);
+    expire_after(kWriteTime);
     const auto [error, size] = co_await http::async_write(stream_, response, kAwait);
     co_return !error;
   }
 
   Stream stream_;
   asio::steady_timer deadline_;
-  asio::any_io_executor strand_;  // apart, for go_away comes from other threads and an upgrade moves the stream away
+  asio::any_io_executor strand_;  // apart, for begin_shutdown comes from other threads and an upgrade moves the stream away
   ServerContext& context_;
-  Door door_;
-  AddressCounts::Seat seat_;
+  PortRole role_;
+  AddressCounts::Lease address_lease_;
   beast::flat_buffer buffer_{2 * kMaxHeader};
-  bool waiting_ = false;  // for a request
-  bool leaving_ = false;
-  bool answered_ = false;  // a request; whoever asks while the server drains is told so, once
-  Connections::Membership membership_;
+  bool idle_ = false;  // for a request
+  bool draining_ = false;
+  bool served_ = false;  // a request; whoever asks while the server drains is told so, once
+  Connections::Registration registration_;
 };
 
 }  // namespace
 
-void start_http_session(asio::ip::tcp::socket socket, ServerContext& context, Door door, AddressCounts::Seat seat) {
-  std::make_shared<HttpSession>(std::move(socket), context, door, std::move(seat))->start();
+void start_http_session(asio::ip::tcp::socket socket, ServerContext& context, PortRole role, AddressCounts::Lease address_lease) {
+  std::make_shared<HttpSession>(std::move(socket), context, role, std::move(address_lease))->start();
 }
 
 }  // namespace intervale

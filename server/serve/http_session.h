@@ -9,6 +9,6 @@
 namespace intervale {
 
 // Serves requests on a socket whose executor is a strand of its own. Returns at once; the connection keeps itself alive.
-void start_http_session(boost::asio::ip::tcp::socket socket, ServerContext& context, Door door, AddressCounts::Seat seat);
+void start_http_session(boost::asio::ip::tcp::socket socket, ServerContext& context, PortRole role, AddressCounts::Lease address_lease);
 
 }  // namespace intervale

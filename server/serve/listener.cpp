@@ -5,7 +5,6 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
-#include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/strand.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -43,13 +42,13 @@ Result<tcp::endpoint> parse_endpoint(const std::string& text) {
   return tcp::endpoint(address, port);
 }
 
-Listener::Listener(asio::io_context& io, ServerContext& context, Door door)
-    : io_(io), acceptor_(asio::make_strand(io)), context_(context), door_(door) {}
+Listener::Listener(asio::io_context& io, ServerContext& context, PortRole role)
+    : io_(io), acceptor_(asio::make_strand(io)), context_(context), role_(role) {}
 
-Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std::string& address, ServerContext& context, Door door) {
+Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std::string& address, ServerContext& context, PortRole role) {
   const auto endpoint = parse_endpoint(address);
   if (!endpoint) return tl::unexpected(endpoint.error());
-  std::unique_ptr<Listener> listener(new Listener(io, context, door));
+  std::unique_ptr<Listener> listener(new Listener(io, context, role));
   tcp::acceptor& acceptor = listener->acceptor_;
   boost::system::error_code error;
   const auto step = [&](auto&& action) {
@@ -66,44 +65,36 @@ Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std
 
 void Listener::start() { asio::co_spawn(acceptor_.get_executor(), accept_all(), asio::detached); }
 
-void Listener::close() {
-  asio::post(acceptor_.get_executor(), [this] {
-    boost::system::error_code ignored;
-    acceptor_.close(ignored);
-  });
-}
-
-std::optional<AddressCounts::Seat> Listener::seat_for(const tcp::socket& socket) {
-  if (door_ != Door::all || !context_.options.max_connections_per_address) return AddressCounts::Seat();
+std::optional<AddressCounts::Lease> Listener::lease_for(const tcp::socket& socket) {
+  if (role_ != PortRole::all || !context_.options.max_connections_per_address) return AddressCounts::Lease();
   boost::system::error_code error;
   const auto peer = socket.remote_endpoint(error);
-  if (error) return {};  // gone already
-  return context_.addresses.enter(peer.address(), *context_.options.max_connections_per_address);
+  if (error) return {};  // the client has closed it already
+  return context_.addresses.try_acquire(peer.address(), *context_.options.max_connections_per_address);
 }
 
 asio::awaitable<void> Listener::accept_all() {
-  while (acceptor_.is_open()) {
+  for (;;) {
     auto [error, accepted] = co_await acceptor_.async_accept(asio::make_strand(io_), kAwait);
-    if (error == asio::error::operation_aborted) co_return;
     if (error) {
-      // Out of descriptors, most likely: what is open goes on, and in a while there may be room again.
+      // Most likely there is no file descriptor left: existing connections continue, and there may be one later.
       spdlog::warn("cannot accept a connection: {}", error.message());
       asio::steady_timer pause(acceptor_.get_executor(), std::chrono::milliseconds(100));
       co_await pause.async_wait(kAwait);
       continue;
     }
     tcp::socket socket(std::move(accepted));
-    // Whoever watches is let in, when it matters most.
-    if (door_ == Door::all && context_.connections.size() >= context_.options.max_connections) {
-      context_.metrics.refused(Refusal::connections);  // and the socket closes
+    // The metrics port has no limit: monitoring matters most under load.
+    if (role_ == PortRole::all && context_.connections.size() >= context_.options.max_connections) {
+      context_.metrics.count_refusal(Refusal::connections);  // and the socket closes
       continue;
     }
-    auto seat = seat_for(socket);
-    if (!seat) {
-      context_.metrics.refused(Refusal::address);
+    auto address_lease = lease_for(socket);
+    if (!address_lease) {
+      context_.metrics.count_refusal(Refusal::address);
       continue;
     }
-    start_http_session(std::move(socket), context_, door_, std::move(*seat));
+    start_http_session(std::move(socket), context_, role_, std::move(*address_lease));
   }
 }
 

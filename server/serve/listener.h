@@ -1,4 +1,4 @@
-// Takes connections in. Internal to server/serve: brings in Asio.
+// Accepts connections. Internal to server/serve: brings in Asio.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -14,28 +14,27 @@
 
 namespace intervale {
 
-// "127.0.0.1:8080", "[::1]:8080". No host names: what a name stands for is not for us to choose.
+// "127.0.0.1:8080", "[::1]:8080". No host names, which may stand for several addresses.
 Result<boost::asio::ip::tcp::endpoint> parse_endpoint(const std::string& text);
 
-// One port. Created and destroyed on any thread; close() may be called from any.
+// One port. Accepts until the io_context stops. Created and destroyed on any thread, while the io_context does not run.
 class Listener {
  public:
-  static Result<std::unique_ptr<Listener>> open(boost::asio::io_context& io, const std::string& address, ServerContext& context, Door door);
+  static Result<std::unique_ptr<Listener>> open(boost::asio::io_context& io, const std::string& address, ServerContext& context, PortRole role);
 
-  void start();  // accepts from now on, until close()
-  void close();  // nobody new; takes effect soon
+  void start();  // accepts from now on
   [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
  private:
-  Listener(boost::asio::io_context& io, ServerContext& context, Door door);
+  Listener(boost::asio::io_context& io, ServerContext& context, PortRole role);
   boost::asio::awaitable<void> accept_all();
-  std::optional<AddressCounts::Seat> seat_for(const boost::asio::ip::tcp::socket& socket);  // nothing: too many from there
+  std::optional<AddressCounts::Lease> lease_for(const boost::asio::ip::tcp::socket& socket);  // nullopt: too many from that address
 
   boost::asio::io_context& io_;
   boost::asio::ip::tcp::acceptor acceptor_;  // on a strand of its own
   boost::asio::ip::tcp::endpoint endpoint_;
   ServerContext& context_;
-  Door door_;
+  PortRole role_;
 };
 
 }  // namespace intervale

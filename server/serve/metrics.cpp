@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/serve/guard.h"
+#include "server/serve/admission.h"
 
 namespace intervale {
 namespace {
@@ -85,9 +85,9 @@ Metrics::Metrics()
   for (const char* reason : kReasons) refusals_.Add({{"reason", reason}});
 }
 
-void Metrics::refused(Refusal reason) { refusals_.Add({{"reason", kReasons[std::size_t(reason)]}}).Increment(); }
+void Metrics::count_refusal(Refusal reason) { refusals_.Add({{"reason", kReasons[std::size_t(reason)]}}).Increment(); }
 
-void Metrics::closed(unsigned code) {
+void Metrics::count_close(unsigned code) {
   const bool known = std::find(kCodes.begin(), kCodes.end(), code) != kCodes.end();
   closes_.Add({{"code", code == 0 ? "none" : known ? std::to_string(code) : "other"}}).Increment();
 }

@@ -40,11 +40,11 @@ class Metrics {
   prometheus::Counter& bytes_sent_total;  // of WebSocket messages
   prometheus::Counter& faults_total;      // sessions ended for what the client did
 
-  void chose(Duration time) { observe(selection_, time); }            // choosing and packing one message
-  void first_answer(Duration time) { observe(first_mesh_, time); }    // from a session's first View to its first message, sent
-  void answered_view(Duration time) { observe(view_change_, time); }  // the same of a later View
-  void refused(Refusal reason);
-  void closed(unsigned code);  // a session has ended so; 0: its connection broke
+  void observe_selection(Duration time) { observe(selection_, time); }      // choosing and packing one message
+  void observe_first_mesh(Duration time) { observe(first_mesh_, time); }    // from a session's first View to its first message, sent
+  void observe_view_change(Duration time) { observe(view_change_, time); }  // the same of a later View
+  void count_refusal(Refusal reason);
+  void count_close(unsigned code);  // a session has ended so; 0: its connection broke
 
   // What others know, as of now.
   struct Now {

@@ -30,7 +30,7 @@ struct ServeOptions {
   std::optional<std::size_t> max_connections_per_address;               // at least 1; the same
   std::optional<std::size_t> max_sessions;                              // more than these are answered 503
   std::optional<std::uint64_t> max_memory;                              // no new sessions while the process has more bytes resident: 503
-  std::size_t max_queued_bytes = 512 << 20;                             // of messages that are leaving, see Outbox
+  std::size_t max_queued_bytes = 512 << 20;                             // of messages that are leaving, see WriteBudget
   double messages_per_second = 2000;                                    // of each session; faster ones are read as slowly
   double views_per_second = 200;                                        // of those
   std::chrono::milliseconds handshake_time = protocol::kHandshakeTime;  // for a request, and from a WebSocket's start to its Open: each

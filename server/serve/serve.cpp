@@ -16,7 +16,7 @@
 #include <system_error>
 #include <utility>
 
-#include "server/serve/catalogue_watch.h"
+#include "server/serve/catalogue_watcher.h"
 #include "server/serve/server.h"
 
 namespace intervale {
@@ -111,8 +111,8 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
   if (!options.viewer) options.viewer = viewer_beside_the_program();
   auto server = Server::start(options);
   if (!server) return tl::unexpected(server.error());
-  CatalogueWatch watch(inputs, options.max_memory);
-  auto catalogue = watch.load([&] {
+  CatalogueWatcher watcher(inputs, options.max_memory);
+  auto catalogue = watcher.load([&] {
     signals.poll();
     return signal == 0;
   });
@@ -123,7 +123,7 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
 
   repeat(timer, [&] {
     (*server)->refresh();
-    if (auto changed = watch.look()) (*server)->offer(std::move(*changed));
+    if (auto changed = watcher.poll()) (*server)->offer(std::move(*changed));
   });
   signals.run();
   ending.clear();  // a second signal ends it at once

@@ -28,8 +28,8 @@ struct Server::Running {
   asio::io_context io;
   std::unique_ptr<Listener> listener, metrics_listener;
   std::vector<std::thread> threads;
-  FileChanges tokens_changed, certificate_changed;
-  std::string tokens_complaint, certificate_complaint;  // as last said, not to be said again
+  FileChanges tokens_changes, certificate_changes;
+  std::string tokens_warning, certificate_warning;  // as last said, not to be said again
   bool stopped = false;
 };
 
@@ -37,25 +37,25 @@ struct Server::Running {
 // fault: a token that was taken out must not stay for want of a descriptor.
 Result<bool> Server::Running::load_tokens() {
   const auto& path = context.options.tokens;
-  if (!path || !tokens_changed.look({*path})) return false;
+  if (!path || !tokens_changes.check({*path})) return false;
   auto tokens = Tokens::load(*path);
   if (!tokens) {
-    tokens_changed.forget();
+    tokens_changes.reset();
     return tl::unexpected(tokens.error());
   }
-  context.tokens.set(std::make_shared<const Tokens>(std::move(*tokens)));
+  context.tokens.store(std::make_shared<const Tokens>(std::move(*tokens)));
   return true;
 }
 
 Result<bool> Server::Running::load_certificate() {
   const auto& files = context.options.tls;
-  if (!files || !certificate_changed.look({files->certificate, files->key})) return false;
+  if (!files || !certificate_changes.check({files->certificate, files->key})) return false;
   auto tls = TlsContext::server(files->certificate, files->key);
   if (!tls) {
-    certificate_changed.forget();
+    certificate_changes.reset();
     return tl::unexpected(tls.error());
   }
-  context.tls.set(std::move(*tls));
+  context.tls.store(std::move(*tls));
   return true;
 }
 
@@ -74,11 +74,11 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& wanted) {
   }
   if (auto loaded = running->load_tokens(); !loaded) return tl::unexpected(loaded.error());
   if (auto loaded = running->load_certificate(); !loaded) return tl::unexpected(loaded.error());
-  auto listener = Listener::open(running->io, options.listen, running->context, Door::all);
+  auto listener = Listener::open(running->io, options.listen, running->context, PortRole::all);
   if (!listener) return tl::unexpected(listener.error());
   running->listener = std::move(*listener);
   if (options.metrics_listen) {
-    auto metrics_listener = Listener::open(running->io, *options.metrics_listen, running->context, Door::metrics);
+    auto metrics_listener = Listener::open(running->io, *options.metrics_listen, running->context, PortRole::metrics);
     if (!metrics_listener) return tl::unexpected(metrics_listener.error());
     running->metrics_listener = std::move(*metrics_listener);
     running->metrics_listener->start();
@@ -96,7 +96,7 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catal
   return server;
 }
 
-void Server::offer(Catalogue catalogue) { running_->context.catalogue.set(std::make_shared<const Catalogue>(std::move(catalogue))); }
+void Server::offer(Catalogue catalogue) { running_->context.catalogue.store(std::make_shared<const Catalogue>(std::move(catalogue))); }
 
 void Server::refresh() {
   const auto tell = [](const Result<bool>& loaded, const char* what, std::string& complaint) {
@@ -105,8 +105,8 @@ void Server::refresh() {
     if (loaded && *loaded) spdlog::info("read the {} again", what);
     complaint = now;
   };
-  tell(running_->load_tokens(), "tokens", running_->tokens_complaint);
-  tell(running_->load_certificate(), "certificate", running_->certificate_complaint);
+  tell(running_->load_tokens(), "tokens", running_->tokens_warning);
+  tell(running_->load_certificate(), "certificate", running_->certificate_warning);
 }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
@@ -123,13 +123,13 @@ std::string Server::url() const {
 
 void Server::stop() {
   if (std::exchange(running_->stopped, true)) return;
-  running_->context.connections.go_away();
+  running_->context.connections.begin_shutdown();
   if (!running_->context.connections.wait_until_empty(running_->context.options.drain_time)) {
     spdlog::warn("{} connections did not take their leave in time and are cut off", running_->context.connections.size());
   }
   running_->io.stop();
   for (std::thread& thread : running_->threads) thread.join();
-  running_->context.turnstile.clear();
+  running_->context.scheduler.clear();
 }
 
 }  // namespace intervale

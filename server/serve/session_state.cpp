@@ -21,7 +21,7 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   if (opened()) return fault(CloseCode::out_of_order, "Open came twice");
   // Before it is looked for: what is there is no one's business who may not see it.
   if (!scope_ || !scope_->allows(open.dataset)) return fault(CloseCode::forbidden, "this token does not open that data set");
-  const auto catalogue = catalogue_.get();
+  const auto catalogue = catalogue_.load();
   if (catalogue) volume_ = catalogue->find(open.dataset);
   if (!volume_) return fault(CloseCode::no_such_dataset, "no such data set; see /api/datasets");
   dataset_ = open.dataset;
@@ -67,7 +67,7 @@ std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
 std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
   if (!std::exchange(announced_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
-  if (!working()) return {};
+  if (!has_work()) return {};
   if (asked_) plan_->set_lod(*std::exchange(asked_, std::nullopt));
   auto message = next_batch_or_done(max_payload);
   if (message) fresh_ = false;
@@ -84,11 +84,11 @@ std::optional<protocol::ServerMessage> SessionState::next_batch_or_done(std::siz
   if (!batch) {
     if (!plan_->done()) return {};
     done_ = true;
-    return protocol::Done{epoch_, plan_->sent(), plan_->full()};
+    return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }
   target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
-  const StreamPlan::ToGo to_go = plan_->to_go();
-  protocol::Batch message{epoch_, sequence_++, batch->updates, to_go.error, to_go.pixels, to_go.updates, std::move(batch->payload)};
+  const StreamPlan::Remaining remaining = plan_->remaining();
+  protocol::Batch message{epoch_, sequence_++, batch->updates, remaining.error, remaining.pixels, remaining.updates, std::move(batch->payload)};
   credit_ -= protocol::cost_of(message);  // at most what there was: next() keeps to size
   return message;
 }

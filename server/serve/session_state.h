@@ -11,8 +11,8 @@
 #include "protocol/limits.h"
 #include "protocol/messages.h"
 #include "server/serve/access.h"
+#include "server/serve/atomic_shared_ptr.h"
 #include "server/serve/catalogue.h"
-#include "server/serve/replaceable.h"
 
 namespace intervale {
 
@@ -20,21 +20,21 @@ namespace intervale {
 class SessionState {
  public:
   // scope: what may be opened; nullptr: nothing.
-  SessionState(const Replaceable<Catalogue>& catalogue, std::shared_ptr<const Scope> scope) : catalogue_(catalogue), scope_(std::move(scope)) {}
+  SessionState(const AtomicSharedPtr<Catalogue>& catalogue, std::shared_ptr<const Scope> scope) : catalogue_(catalogue), scope_(std::move(scope)) {}
 
   // Takes a client's message. A fault ends the session: nothing else may be called after.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
-  // The next message to send, or nothing for now; working() tells whether to ask again. While it does, this takes a few milliseconds: about one for
+  // The next message to send, or nothing for now; has_work() tells whether to ask again. While it does, this takes a few milliseconds: about one for
   // each 16 KiB of max_payload, which bounds the size of a batch. A view with a budget of updates takes time linear in the data set's updates first.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
   // There is a batch to choose and pack, or to be looked for further.
-  [[nodiscard]] bool working() const { return announced_ && viewing_ && !done_ && !starved(); }
+  [[nodiscard]] bool has_work() const { return announced_ && viewing_ && !done_ && !needs_credit(); }
   // Nothing was sent yet in answer to the last view.
-  [[nodiscard]] bool fresh() const { return fresh_; }
+  [[nodiscard]] bool view_is_unanswered() const { return fresh_; }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
-  [[nodiscard]] bool starved() const { return viewing_ && !done_ && credit_ < protocol::kMinCredit; }  // sends only once there is more credit
+  [[nodiscard]] bool needs_credit() const { return viewing_ && !done_ && credit_ < protocol::kMinCredit; }  // sends only once there is more credit
   [[nodiscard]] const std::string& dataset() const { return dataset_; }
   [[nodiscard]] std::uint64_t updates_sent() const { return plan_ ? plan_->sent() : 0; }
 
@@ -46,7 +46,7 @@ class SessionState {
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
   std::optional<protocol::ServerMessage> next_batch_or_done(std::size_t max_payload);
 
-  const Replaceable<Catalogue>& catalogue_;
+  const AtomicSharedPtr<Catalogue>& catalogue_;
   std::shared_ptr<const Scope> scope_;
   Catalogue::Volume volume_;
   std::string dataset_;

@@ -106,8 +106,8 @@ StaticContent content_of(std::string bytes) {
 // "gzip;q=0.5" without the name. What cannot be read is a no.
 bool has_weight(std::string_view parameters) {
   while (!parameters.empty()) {
-    const std::string_view parameter = take(parameters, ';');
-    if (!equal_but_for_case(parameter.substr(0, 2), "q=")) continue;
+    const std::string_view parameter = split_off(parameters, ';');
+    if (!iequals(parameter.substr(0, 2), "q=")) continue;
     double weight = 0;
     const auto [stop, failure] = std::from_chars(parameter.data() + 2, parameter.data() + parameter.size(), weight, std::chars_format::fixed);
     return failure == std::errc() && stop == parameter.data() + parameter.size() && weight > 0 && weight <= 1;
@@ -175,18 +175,18 @@ std::optional<std::string> decode_path(std::string_view target) {
 bool accepts_gzip(std::string_view accept_encoding) {
   bool any = false;
   while (!accept_encoding.empty()) {
-    std::string_view item = take(accept_encoding, ',');
-    const std::string_view coding = take(item, ';');
-    if (equal_but_for_case(coding, "gzip") || equal_but_for_case(coding, "x-gzip")) return has_weight(item);
+    std::string_view item = split_off(accept_encoding, ',');
+    const std::string_view coding = split_off(item, ';');
+    if (iequals(coding, "gzip") || iequals(coding, "x-gzip")) return has_weight(item);
     if (coding == "*") any = has_weight(item);
   }
   return any;
 }
 
-bool names_etag(std::string_view if_none_match, std::string_view etag) {
+bool matches_etag(std::string_view if_none_match, std::string_view etag) {
   if (trimmed(if_none_match) == "*") return true;
   while (!if_none_match.empty()) {
-    std::string_view tag = take(if_none_match, ',');  // our tags hold no comma
+    std::string_view tag = split_off(if_none_match, ',');  // our tags hold no comma
     if (tag.starts_with("W/")) tag.remove_prefix(2);
     if (tag == etag) return true;
   }

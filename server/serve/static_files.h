@@ -55,6 +55,6 @@ class StaticFiles {
 [[nodiscard]] bool accepts_gzip(std::string_view accept_encoding);
 
 // Whether an If-None-Match header names the tag, weakly compared (RFC 9110, 13.1.2).
-[[nodiscard]] bool names_etag(std::string_view if_none_match, std::string_view etag);
+[[nodiscard]] bool matches_etag(std::string_view if_none_match, std::string_view etag);
 
 }  // namespace intervale

@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "protocol/codec.h"
-#include "server/serve/guard.h"
+#include "server/serve/admission.h"
 #include "server/serve/log.h"
 #include "server/serve/session_state.h"
 
@@ -31,21 +31,21 @@ using protocol::Fault;
 using Clock = std::chrono::steady_clock;
 using Request = http::request<http::empty_body>;
 
-constexpr std::chrono::seconds kMostPings{1};  // ahead of the pace that messages may have
-constexpr std::size_t kCrowdedAnswer = 4 << 10, kCrowdedPayload = 16 << 10;
+constexpr std::chrono::seconds kMaxPingBacklog{1};  // ahead of the pace that messages may have
+constexpr std::size_t kContendedFirstPayload = 4 << 10, kContendedPayload = 16 << 10;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
  public:
-  WebSocketSession(Stream stream, ServerContext& context, Guest guest)
+  WebSocketSession(Stream stream, ServerContext& context, Peer guest)
       : ws_(std::move(stream)),
-        wake_(ws_.get_executor()),
+        writer_wakeup_(ws_.get_executor()),
         write_deadline_(ws_.get_executor()),
-        pace_(ws_.get_executor()),
+        read_delay_(ws_.get_executor()),
         context_(context),
-        guest_(std::move(guest)),
-        state_(context.catalogue, guest_.scope),
+        peer_(std::move(guest)),
+        state_(context.catalogue, peer_.scope),
         messages_(context.options.messages_per_second),
         views_(context.options.views_per_second),
         id_(context.next_session_id++) {}
@@ -53,32 +53,32 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   WebSocketSession& operator=(const WebSocketSession&) = delete;
 
   ~WebSocketSession() override {
-    if (guest_.scope) context_.metrics.sessions.Decrement();
+    if (peer_.scope) context_.metrics.sessions.Decrement();
     context_.metrics.connections.Decrement();
-    context_.metrics.closed(close_code_);
+    context_.metrics.count_close(close_code_);
     log_session(id_, spdlog::level::info, "closed: dataset '{}', {} updates, {} bytes, code {}{}", state_.dataset(), state_.updates_sent(),
-                bytes_sent_, close_code_, note_.empty() ? "" : " (" + note_ + ")");
+                bytes_sent_, close_code_, close_note_.empty() ? "" : " (" + close_note_ + ")");
   }
 
   void start(const Request& request) {
     context_.metrics.connections.Increment();
-    if (guest_.scope) context_.metrics.sessions.Increment();  // who is only to be told takes no one's place
+    if (peer_.scope) context_.metrics.sessions.Increment();  // who is only to be told takes no one's place
     context_.metrics.sessions_total.Increment();
     beast::error_code ignored;
     const auto peer = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
     log_session(id_, spdlog::level::info, "from {}:{}", peer.address().to_string(), peer.port());
-    membership_ = context_.connections.join(shared_from_this());
+    registration_ = context_.connections.add(shared_from_this());
     spawn(run(shared_from_this(), request));
   }
 
-  void go_away() override {
-    asio::post(ws_.get_executor(), [self = shared_from_this()] { self->end({CloseCode::going_away, "the server shuts down"}); });
+  void begin_shutdown() override {
+    asio::post(ws_.get_executor(), [self = shared_from_this()] { self->close({CloseCode::going_away, "the server shuts down"}); });
   }
 
-  void drop() override {
+  void abort() override {
     asio::post(ws_.get_executor(), [self = shared_from_this()] {
-      if (self->note_.empty()) self->note_ = "the client does not take what it asked for, and memory is short";
-      self->cut_off();
+      if (self->close_note_.empty()) self->close_note_ = "the client does not take what it asked for, and memory is short";
+      self->abort_connection();
     });
   }
 
@@ -93,36 +93,36 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     try {
       std::rethrow_exception(failure);
     } catch (const std::exception& exception) {
-      note_ = exception.what();
+      close_note_ = exception.what();
     }
     close_code_ = static_cast<unsigned>(CloseCode::internal);
-    cut_off();
+    abort_connection();
   }
 
   // Ends the session in order: the writer says why, and closes. The first reason holds.
-  void end(Fault why) {
-    if (!why_ && !gone_) why_ = std::move(why);
-    wake_.cancel();
-    pace_.cancel();
+  void close(Fault why) {
+    if (!fault_ && !closed_) fault_ = std::move(why);
+    writer_wakeup_.cancel();
+    read_delay_.cancel();
   }
 
   // Ends it at once.
-  void cut_off() {
-    gone_ = true;
+  void abort_connection() {
+    closed_ = true;
     beast::get_lowest_layer(ws_).close();
-    wake_.cancel();
-    pace_.cancel();
+    writer_wakeup_.cancel();
+    read_delay_.cancel();
   }
 
   asio::awaitable<void> run(std::shared_ptr<WebSocketSession> self, Request request) {
     prepare();
     if (const auto [error] = co_await ws_.async_accept(request, kAwait); error) {
-      note_ = error.message();
+      close_note_ = error.message();
       co_return;
     }
-    if (guest_.scope == nullptr) {
-      context_.metrics.refused(Refusal::token);
-      end({CloseCode::unauthorized, "a token is wanted, and none that opens anything came"});
+    if (peer_.scope == nullptr) {
+      context_.metrics.count_refusal(Refusal::token);
+      close({CloseCode::unauthorized, "a token is wanted, and none that opens anything came"});
     }
     open_deadline_ = Clock::now() + context_.options.handshake_time;
     spawn(write_messages(self));
@@ -139,8 +139,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }));
     // Pings are answered beneath async_read_some, where no one can be kept waiting. The socket goes with its session, and this with the socket.
     ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
-      if (kind == websocket::frame_type::ping && messages_.take(Clock::now()) > kMostPings) {
-        end({CloseCode::too_large, "more pings than messages may come"});
+      if (kind == websocket::frame_type::ping && messages_.take(Clock::now()) > kMaxPingBacklog) {
+        close({CloseCode::too_large, "more pings than messages may come"});
       }
     });
     ws_.read_message_max(0);  // read_messages counts, so that it can close with a code of ours
@@ -150,29 +150,29 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   asio::awaitable<void> read_messages() {
     beast::flat_buffer buffer;
-    while (!why_) {
+    while (!fault_) {
       buffer.clear();
       do {
         const std::size_t room = protocol::kMaxClientMessage + 1 - buffer.size();
         const auto [error, size] = co_await ws_.async_read_some(buffer, room, kAwait);
         if (error) {
-          lost(error);
+          on_read_error(error);
           co_return;
         }
-        if (ws_.got_text()) co_return end({CloseCode::text_frame, "text frames are not spoken here"});
-        if (buffer.size() > protocol::kMaxClientMessage) co_return end({CloseCode::too_large, "the message is too large"});
+        if (ws_.got_text()) co_return close({CloseCode::text_frame, "text frames are not spoken here"});
+        if (buffer.size() > protocol::kMaxClientMessage) co_return close({CloseCode::too_large, "the message is too large"});
       } while (!ws_.is_message_done());
-      if (why_) co_return;
-      co_await keep_pace(messages_);
+      if (fault_) co_return;
+      co_await throttle(messages_);
       const std::span bytes(static_cast<const std::uint8_t*>(buffer.data().data()), buffer.size());
       const auto message = protocol::decode_client_message(bytes);
-      if (!message) co_return end({CloseCode::malformed, message.error().message});
+      if (!message) co_return close({CloseCode::malformed, message.error().message});
       const auto* const view = std::get_if<protocol::View>(&*message);
-      if (view != nullptr) co_await keep_pace(views_);
+      if (view != nullptr) co_await throttle(views_);
       if (view != nullptr && !view->forget.empty()) {
         // That takes time, like a batch.
-        co_await context_.turnstile.enter(turns_, Turnstile::Turn::answer, asio::use_awaitable);
-        const Inside inside{context_.turnstile, turns_, Turnstile::Turn::answer};
+        co_await context_.scheduler.async_acquire(flow_, FairScheduler::Priority::interactive, asio::use_awaitable);
+        const ScheduledWork work{context_.scheduler, flow_, FairScheduler::Priority::interactive};
         receive(*message);
       } else {
         receive(*message);
@@ -181,34 +181,34 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   }
 
   // A client that sends faster than it may is read more slowly, and its line fills up.
-  asio::awaitable<void> keep_pace(RateLimit& limit) {
+  asio::awaitable<void> throttle(RateLimit& limit) {
     const auto time = limit.take(Clock::now());
-    if (time == Clock::duration(0) || why_ || gone_) co_return;
-    pace_.expires_after(time);
-    co_await pace_.async_wait(kAwait);
+    if (time == Clock::duration(0) || fault_ || closed_) co_return;
+    read_delay_.expires_after(time);
+    co_await read_delay_.async_wait(kAwait);
   }
 
   // Between enter() and leave().
-  struct Inside {
-    Turnstile& turnstile;
-    Turnstile::Account& account;
-    Turnstile::Turn turn;
+  struct ScheduledWork {
+    FairScheduler& scheduler;
+    FairScheduler::Flow& flow;
+    FairScheduler::Priority priority;
     Clock::time_point since = Clock::now();
-    ~Inside() { turnstile.leave(account, turn, Clock::now() - since); }
+    ~ScheduledWork() { scheduler.release(flow, priority, Clock::now() - since); }
   };
 
   void receive(const protocol::ClientMessage& message) {
-    if (why_ || gone_) return;
-    if (!state_.starved()) stalled_since_ = Clock::now();  // in case this message makes it so
-    tell(message);
+    if (fault_ || closed_) return;
+    if (!state_.needs_credit()) stalled_since_ = Clock::now();  // in case this message makes it so
+    log_message(message);
     if (std::holds_alternative<protocol::Open>(message) && lacks_memory()) {
-      context_.metrics.refused(Refusal::memory);
-      return end({CloseCode::going_away, "no room for another session now"});
+      context_.metrics.count_refusal(Refusal::memory);
+      return close({CloseCode::going_away, "no room for another session now"});
     }
-    if (auto fault = state_.receive(message)) return end(std::move(*fault));
-    if (const auto* view = std::get_if<protocol::View>(&message)) viewed(view->epoch);
-    if (state_.fresh()) context_.turnstile.hurry(turns_);
-    wake_.cancel();
+    if (auto fault = state_.receive(message)) return close(std::move(*fault));
+    if (const auto* view = std::get_if<protocol::View>(&message)) on_view(view->epoch);
+    if (state_.view_is_unanswered()) context_.scheduler.promote(flow_);
+    writer_wakeup_.cancel();
   }
 
   // A data set takes memory once it is opened: many upgrades may have passed when there still was some.
@@ -217,7 +217,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return most && resident_bytes() > *most;
   }
 
-  void tell(const protocol::ClientMessage& message) const {
+  void log_message(const protocol::ClientMessage& message) const {
     if (const auto* open = std::get_if<protocol::Open>(&message)) {
       log_session(id_, spdlog::level::debug, "opens '{}'{}, for '{}'", open->dataset, open->resume ? " again" : "", open->client);
     } else if (const auto* view = std::get_if<protocol::View>(&message)) {
@@ -225,65 +225,67 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }
   }
 
-  void viewed(std::uint64_t epoch) {
+  void on_view(std::uint64_t epoch) {
     newest_view_ = {epoch, Clock::now()};
     if (!oldest_view_) oldest_view_ = newest_view_;
   }
 
   // A message that serves the view of that epoch has left.
-  void answered(std::uint64_t epoch) {
+  void on_sent(std::uint64_t epoch) {
     if (!oldest_view_ || epoch < oldest_view_->epoch) return;
     const auto time = Clock::now() - oldest_view_->since;
-    std::exchange(has_answered_, true) ? context_.metrics.answered_view(time) : context_.metrics.first_answer(time);
+    std::exchange(first_view_answered_, true) ? context_.metrics.observe_view_change(time) : context_.metrics.observe_first_mesh(time);
     oldest_view_.reset();
     if (newest_view_.epoch > epoch) oldest_view_ = newest_view_;
   }
 
   // The connection is over, by the client's close or by what happened to it.
-  void lost(beast::error_code error) {
+  void on_read_error(beast::error_code error) {
     if (error == websocket::error::closed) {
       if (close_code_ == 0) close_code_ = ws_.reason().code;
-    } else if (note_.empty()) {
-      note_ = error.message();
+    } else if (close_note_.empty()) {
+      close_note_ = error.message();
     }
-    gone_ = true;
-    wake_.cancel();
+    closed_ = true;
+    writer_wakeup_.cancel();
   }
 
   asio::awaitable<void> write_messages([[maybe_unused]] std::shared_ptr<WebSocketSession> self) {
-    while (!gone_) {
-      if (why_) co_return co_await take_leave();
+    while (!closed_) {
+      if (fault_) co_return co_await close_with_fault();
       std::optional<protocol::ServerMessage> message;
-      if (state_.working()) {
-        co_await context_.turnstile.enter(turns_, turn(), asio::use_awaitable);
+      if (state_.has_work()) {
+        co_await context_.scheduler.async_acquire(flow_, priority(), asio::use_awaitable);
         message = compute();
       } else {
         message = state_.next();
       }
       if (message) {
-        if (!co_await send(*message)) co_return cut_off();
+        if (!co_await send(*message)) co_return abort_connection();
         stalled_since_ = Clock::now();
         if (const auto* batch = std::get_if<protocol::Batch>(&*message)) {
           context_.metrics.updates_sent_total.Increment(batch->updates);
-          answered(batch->epoch);
+          on_sent(batch->epoch);
         } else if (const auto* done = std::get_if<protocol::Done>(&*message)) {
-          answered(done->epoch);
+          on_sent(done->epoch);
         }
         continue;
       }
-      if (!why_ && !state_.working()) co_await wait();
+      if (!fault_ && !state_.has_work()) co_await wait();
     }
   }
 
-  [[nodiscard]] Turnstile::Turn turn() const { return state_.fresh() ? Turnstile::Turn::answer : Turnstile::Turn::more; }
+  [[nodiscard]] FairScheduler::Priority priority() const {
+    return state_.view_is_unanswered() ? FairScheduler::Priority::interactive : FairScheduler::Priority::bulk;
+  }
 
-  // What the session has next. Leaves the turnstile.
+  // What the session has next. Leaves the scheduler.
   std::optional<protocol::ServerMessage> compute() {
-    const Inside inside{context_.turnstile, turns_, turn()};
-    if (gone_ || why_) return {};
-    const bool crowded = context_.turnstile.crowded();
-    auto message = state_.next(!crowded ? protocol::kMaxBatchPayload : state_.fresh() ? kCrowdedAnswer : kCrowdedPayload);
-    context_.metrics.chose(Clock::now() - inside.since);
+    const ScheduledWork work{context_.scheduler, flow_, priority()};
+    if (closed_ || fault_) return {};
+    const bool has_waiters = context_.scheduler.has_waiters();
+    auto message = state_.next(!has_waiters ? protocol::kMaxBatchPayload : state_.view_is_unanswered() ? kContendedFirstPayload : kContendedPayload);
+    context_.metrics.observe_selection(Clock::now() - work.since);
     return message;
   }
 
@@ -291,23 +293,23 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   asio::awaitable<void> wait() {
     auto deadline = Clock::time_point::max();
     if (!state_.opened()) deadline = open_deadline_;
-    if (state_.starved()) deadline = stalled_since_ + context_.options.stall_time;
-    wake_.expires_at(deadline);
-    const auto [error] = co_await wake_.async_wait(kAwait);
-    if (!error && Clock::now() >= deadline) end({CloseCode::timed_out, state_.opened() ? "no credit came in time" : "no Open came in time"});
+    if (state_.needs_credit()) deadline = stalled_since_ + context_.options.stall_time;
+    writer_wakeup_.expires_at(deadline);
+    const auto [error] = co_await writer_wakeup_.async_wait(kAwait);
+    if (!error && Clock::now() >= deadline) close({CloseCode::timed_out, state_.opened() ? "no credit came in time" : "no Open came in time"});
   }
 
   asio::awaitable<bool> send(const protocol::ServerMessage& message) {
     const auto bytes = protocol::encode(message);
     write_deadline_.expires_after(context_.options.write_time);
     write_deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
-      if (const auto self = weak.lock(); self && !error) self->cut_off();
+      if (const auto self = weak.lock(); self && !error) self->abort_connection();
     });
-    const auto leaving = context_.outbox.add(weak_from_this(), bytes.size());
+    const auto reservation = context_.write_budget.reserve(weak_from_this(), bytes.size());
     const auto [error, size] = co_await ws_.async_write(asio::buffer(bytes), kAwait);
     write_deadline_.cancel();
     if (error) {
-      if (note_.empty()) note_ = error.message();
+      if (close_note_.empty()) close_note_ = error.message();
       co_return false;
     }
     bytes_sent_ += bytes.size();
@@ -315,49 +317,49 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     co_return true;
   }
 
-  asio::awaitable<void> take_leave() {
-    close_code_ = static_cast<unsigned>(why_->code);
-    note_ = why_->text;
-    if (why_->code != CloseCode::going_away) context_.metrics.faults_total.Increment();
-    const protocol::ServerMessage fault = *why_;
-    if (!co_await send(fault)) co_return cut_off();
-    const auto code = static_cast<websocket::close_code>(why_->code);
-    const websocket::close_reason reason(code, why_->text);
+  asio::awaitable<void> close_with_fault() {
+    close_code_ = static_cast<unsigned>(fault_->code);
+    close_note_ = fault_->text;
+    if (fault_->code != CloseCode::going_away) context_.metrics.faults_total.Increment();
+    const protocol::ServerMessage fault = *fault_;
+    if (!co_await send(fault)) co_return abort_connection();
+    const auto code = static_cast<websocket::close_code>(fault_->code);
+    const websocket::close_reason reason(code, fault_->text);
     co_await ws_.async_close(reason, kAwait);  // within kHandshakeTime; an error is a client that left first
-    cut_off();
+    abort_connection();
   }
 
   websocket::stream<Stream> ws_;
-  asio::steady_timer wake_;  // the writer sleeps on it
+  asio::steady_timer writer_wakeup_;  // the writer sleeps on it
   asio::steady_timer write_deadline_;
-  asio::steady_timer pace_;  // the reader sleeps on it
+  asio::steady_timer read_delay_;  // the reader sleeps on it
   ServerContext& context_;
-  Guest guest_;
+  Peer peer_;
   SessionState state_;
-  Turnstile::Account turns_;
+  FairScheduler::Flow flow_;
   RateLimit messages_, views_;
   std::uint64_t id_;
-  std::optional<Fault> why_;  // set once the session is to end
-  bool gone_ = false;         // nothing can be sent any more
+  std::optional<Fault> fault_;  // set once the session is to end
+  bool closed_ = false;         // nothing can be sent any more
   Clock::time_point open_deadline_{};
   Clock::time_point stalled_since_{};  // when credit was last enough
   // Views that nothing was sent for yet: the first of them, and the last.
-  struct Viewed {
+  struct PendingView {
     std::uint64_t epoch = 0;
     Clock::time_point since;
   };
-  std::optional<Viewed> oldest_view_;
-  Viewed newest_view_;
-  bool has_answered_ = false;
+  std::optional<PendingView> oldest_view_;
+  PendingView newest_view_;
+  bool first_view_answered_ = false;
   std::uint64_t bytes_sent_ = 0;
   unsigned close_code_ = 0;
-  std::string note_;
-  Connections::Membership membership_;
+  std::string close_note_;
+  Connections::Registration registration_;
 };
 
 }  // namespace
 
-void start_websocket_session(Stream stream, const Request& request, ServerContext& context, Guest guest) {
+void start_websocket_session(Stream stream, const Request& request, ServerContext& context, Peer guest) {
   std::make_shared<WebSocketSession>(std::move(stream), context, std::move(guest))->start(request);
 }
 

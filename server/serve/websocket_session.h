@@ -12,13 +12,13 @@
 namespace intervale {
 
 // Who the session is for.
-struct Guest {
+struct Peer {
   std::shared_ptr<const Scope> scope;  // nullptr: it has no right to be here, and is told so with close code 4401
-  AddressCounts::Seat seat;
+  AddressCounts::Lease address_lease;
 };
 
 // Answers an upgrade request that offers our subprotocol and streams from then on. Returns at once; the session keeps itself alive.
 void start_websocket_session(Stream stream, const boost::beast::http::request<boost::beast::http::empty_body>& request, ServerContext& context,
-                             Guest guest);
+                             Peer guest);
 
 }  // namespace intervale

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "protocol/codec.h"
-#include "server/serve/guard.h"
+#include "server/serve/admission.h"
 #include "tests/support/programs.h"
 #include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "server/serve/catalogue_watch.h"
+#include "server/serve/catalogue_watcher.h"
 #include "tests/support/programs.h"
 #include "tests/support/raw_client.h"
 #include "tests/support/serving.h"
@@ -56,7 +56,7 @@ TEST(Server, IsNotReadyBeforeThereIsSomethingToOffer) {
   EXPECT_THAT(get(server->port(), "/readyz"), testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading")));
   EXPECT_THAT(get(server->port(), "/api/datasets"), testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading"))) << "not that there is nothing";
   EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
-  server->offer(CatalogueWatch({buckyball()}).load().value());
+  server->offer(CatalogueWatcher({buckyball()}).load().value());
   EXPECT_THAT(get(server->port(), "/readyz"), StartsWith("HTTP/1.1 200"));
   RawClient client(server->port());
   client.send(kOpen);

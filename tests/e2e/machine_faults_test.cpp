@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "server/serve/catalogue_watch.h"
+#include "server/serve/catalogue_watcher.h"
 #include "tests/support/programs.h"
 #include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
@@ -134,13 +134,13 @@ TEST(Faults, AFileOlderThanTheOneItReplacesIsTakenUp) {
   const auto build = [&](const char* low) { return run({program("intervale"), "build", volume, "-o", path, "--range", low, "188"}).status; };
   ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "17", "-o", volume}).status, 0);
   ASSERT_EQ(build("128"), 0);
-  CatalogueWatch watch({folder.path()});
-  const auto before = watch.load().value().find("served");
+  CatalogueWatcher watcher({folder.path()});
+  const auto before = watcher.load().value().find("served");
   const auto time = std::filesystem::last_write_time(path);
   ASSERT_EQ(build("100"), 0);
   std::filesystem::last_write_time(path, time - std::chrono::hours(24));
-  EXPECT_FALSE(watch.look()) << "it may be under way";
-  const auto changed = watch.look();
+  EXPECT_FALSE(watcher.poll()) << "it may be under way";
+  const auto changed = watcher.poll();
   ASSERT_TRUE(changed);
   EXPECT_EQ(changed->find("served")->description().range.alpha, 100);
   EXPECT_EQ(before->description().range.alpha, 128);

@@ -10,7 +10,7 @@
 
 #include "client/net/fetch.h"
 #include "client/net/http_get.h"
-#include "server/serve/catalogue_watch.h"
+#include "server/serve/catalogue_watcher.h"
 #include "server/serve/server.h"
 #include "tests/support/certificates.h"
 #include "tests/support/peers.h"
@@ -32,7 +32,7 @@ struct Secured {
     options.listen = "127.0.0.1:0";
     options.threads = 2;
     options.tls = TlsFiles{files.certificate, files.key};
-    server = Server::start(options, CatalogueWatch({buckyball()}).load().value()).value();
+    server = Server::start(options, CatalogueWatcher({buckyball()}).load().value()).value();
   }
   [[nodiscard]] ServerUrl url(const std::string& host = "127.0.0.1") const {
     ServerUrl url = parse_url("wss://" + host + ":" + std::to_string(server->port()) + "/buckyball").value();
@@ -53,7 +53,7 @@ TEST(Tls, CarriesTheSameStream) {
   EXPECT_THAT(secured.server->url(), testing::StartsWith("https://"));
   ServeOptions plain;
   plain.listen = "127.0.0.1:0";
-  const auto server = Server::start(plain, CatalogueWatch({buckyball()}).load().value()).value();
+  const auto server = Server::start(plain, CatalogueWatcher({buckyball()}).load().value()).value();
   const auto over_tcp = fetch(parse_url("ws://127.0.0.1:" + std::to_string(server->port()) + "/buckyball").value(), {}, {});
   for (const char* host : {"127.0.0.1", "localhost"}) {
     const auto over_tls = fetch(secured.url(host), {}, {});

@@ -89,7 +89,7 @@ bool takes_gzip(std::string header) {
   return gzip.value_or(any.value_or(false));
 }
 
-std::string header_of(const HttpAnswer& answer, std::string_view name) {
+std::string header_of(const HttpResponse& answer, std::string_view name) {
   for (const auto& [key, value] : answer.headers) {
     if (key == name) return value;
   }
@@ -101,7 +101,7 @@ bool is_one_line(std::string_view text) {
 }
 
 // What holds for every answer.
-void check(const HttpRequest& request, const HttpState& state, const HttpAnswer& answer) {
+void check(const HttpRequest& request, const HttpState& state, const HttpResponse& answer) {
   constexpr std::array<unsigned, 9> kStatuses{200, 204, 304, 400, 401, 403, 404, 405, 503};
   testing::require(std::find(kStatuses.begin(), kStatuses.end(), answer.status) != kStatuses.end(), "the status is a known one");
   testing::require((answer.body == nullptr) == (answer.status == 204 || answer.status == 304), "only 204 and 304 have no body");
@@ -119,7 +119,7 @@ void check(const HttpRequest& request, const HttpState& state, const HttpAnswer&
   testing::require(body != "secret", "what lies outside is never sent");
   const std::string name = path == "/" ? "/index.html" : path.value_or("");
   const auto file = viewer_files().find(name);
-  const bool is_file = file != viewer_files().end() && state.door == Door::all && !state.viewer.empty();
+  const bool is_file = file != viewer_files().end() && state.role == PortRole::all && !state.viewer.empty();
   const bool packed = header_of(answer, "Content-Encoding") == "gzip";
   for (const auto& [at, bytes] : viewer_files()) {
     if (body == bytes) testing::require(is_file && at == name && !packed, "a file is sent to who asks for it");
@@ -158,7 +158,7 @@ void check(const HttpRequest& request, const HttpState& state, const HttpAnswer&
   }
 }
 
-bool equal(const HttpAnswer& a, const HttpAnswer& b) {
+bool equal(const HttpResponse& a, const HttpResponse& b) {
   const bool bodies = a.body == b.body || (a.body && b.body && *a.body == *b.body);
   return a.status == b.status && bodies && a.content_type == b.content_type && a.headers == b.headers;
 }
@@ -179,9 +179,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const HttpState state{.catalogue = catalogue,
                         .metrics = metrics,
                         .viewer = data[0] & 1 ? no_viewer : viewer,
-                        .door = data[0] & 2 ? Door::metrics : Door::all,
-                        .has_metrics_door = (data[0] & 4) != 0,
-                        .readiness = std::array{Readiness::ready, Readiness::loading, Readiness::draining}[data[0] / 8u % 3]};
+                        .role = data[0] & 2 ? PortRole::metrics : PortRole::all,
+                        .has_metrics_port = (data[0] & 4) != 0,
+                        .server_status = std::array{ServerStatus::ready, ServerStatus::loading, ServerStatus::draining}[data[0] / 8u % 3]};
   HttpRequest request{.method = kMethods[data[1] % kMethods.size()],
                       .target = lines[0],
                       .host = lines[1],
@@ -189,13 +189,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                       .if_none_match = lines[3],
                       .allowed_origin = data[0] & 64 ? "https://elsewhere.example" : "",
                       .scope = scopes[data[1] / 4u % scopes.size()]};
-  const HttpAnswer first = answer(request, state);
+  const HttpResponse first = respond(request, state);
   check(request, state, first);
   const auto path = plain_path(lines[0]);
   if (!path || path == "/metrics") return 0;  // metrics are of the moment
   for (const std::string& target : {escaped_path(*path), escaped_path(*path) + "?" + lines[0]}) {
     request.target = target;
-    testing::require(equal(answer(request, state), first), "neither escapes nor a query make a difference");
+    testing::require(equal(respond(request, state), first), "neither escapes nor a query make a difference");
   }
   return 0;
 }

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "server/serve/catalogue_watch.h"
+#include "server/serve/catalogue_watcher.h"
 
 namespace intervale {
 
@@ -15,7 +15,7 @@ std::unique_ptr<Server> start(const ServeOptions& wanted, const std::filesystem:
   ServeOptions options = wanted;
   options.listen = "127.0.0.1:0";
   options.threads = 2;
-  auto server = Server::start(options, CatalogueWatch({input}).load().value());
+  auto server = Server::start(options, CatalogueWatcher({input}).load().value());
   if (!server) throw std::runtime_error(server.error().message);
   return std::move(*server);
 }

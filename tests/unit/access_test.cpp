@@ -109,7 +109,7 @@ TEST(Routes, ShowWhatOnesTokenOpens) {
   const HttpState state{.catalogue = catalogue, .metrics = metrics, .viewer = viewer};
   const Scope some({"engine"});
   const auto status = [&](const char* target, const Scope* scope) {
-    return answer({.method = "GET", .target = target, .scope = scope}, state).status;
+    return respond({.method = "GET", .target = target, .scope = scope}, state).status;
   };
   for (const Scope* scope : {static_cast<const Scope*>(nullptr), &some, Scope::everything().get()}) {
     for (const char* target : {"/", "/healthz", "/readyz"}) EXPECT_EQ(status(target, scope), 200u) << target;

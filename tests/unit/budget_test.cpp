@@ -126,7 +126,7 @@ TEST_P(Budgets, WhatIsForgottenIsForgottenAtBothEnds) {
         if (line.empty() || round % 3 == 0) continue;
         ASSERT_NO_FATAL_FAILURE(receive());
       }
-      full += plan.full();
+      full += plan.is_full();
       ASSERT_LE(plan.sent(), budget.max_updates);
       if (epoch % 5 != 0) continue;
       while (!line.empty()) ASSERT_NO_FATAL_FAILURE(receive());

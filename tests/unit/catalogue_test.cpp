@@ -36,8 +36,8 @@ TEST(Catalogue, NamesAreUtf8) {
   }
   const Metrics metrics;
   const StaticFiles viewer;
-  const auto listed = answer({.method = "GET", .target = "/api/datasets", .scope = Scope::everything().get()},
-                             {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
+  const auto listed = respond({.method = "GET", .target = "/api/datasets", .scope = Scope::everything().get()},
+                              {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
   EXPECT_EQ(listed.status, 200u) << "JSON can hold every name there is";
 }
 

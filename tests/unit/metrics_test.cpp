@@ -19,10 +19,10 @@ TEST(Metrics, SayWhatWasCounted) {
   metrics.sessions.Increment();
   metrics.sessions.Decrement();
   metrics.updates_sent_total.Increment(1e9);
-  metrics.chose(2ms);
-  metrics.chose(20s);
-  metrics.first_answer(30ms);
-  metrics.answered_view(30ms);
+  metrics.observe_selection(2ms);
+  metrics.observe_selection(20s);
+  metrics.observe_first_mesh(30ms);
+  metrics.observe_view_change(30ms);
   const std::string text = metrics.text({.catalogue = {}, .queued_bytes = 100});
   for (const char* line :
        {"# TYPE intervale_sessions gauge", "intervale_sessions 1", "intervale_updates_sent_total 1000000000", "intervale_queued_bytes 100",
@@ -44,10 +44,10 @@ TEST(Metrics, CountClosesByCodesThatAreKnown) {
     const std::string text = metrics.text({.catalogue = {}});
     return std::count(text.begin(), text.end(), '\n');
   };
-  metrics.closed(3000);
-  metrics.closed(0);
+  metrics.count_close(3000);
+  metrics.count_close(0);
   const auto before = lines();
-  for (unsigned code = 0; code <= 5000; ++code) metrics.closed(code);
+  for (unsigned code = 0; code <= 5000; ++code) metrics.count_close(code);
   EXPECT_EQ(lines(), before);
   EXPECT_THAT(metrics.text({.catalogue = {}}), HasSubstr("{code=\"1000\"} 1\n"));
   EXPECT_THAT(metrics.text({.catalogue = {}}), HasSubstr("{code=\"none\"} 2\n"));

@@ -31,15 +31,15 @@ struct Viewer {
   [[nodiscard]] StaticFiles load() const { return StaticFiles::load(folder.path()).value(); }
 };
 
-HttpAnswer get(const StaticFiles& viewer, HttpRequest request) {
+HttpResponse get(const StaticFiles& viewer, HttpRequest request) {
   const Catalogue catalogue;
   const Metrics metrics;
   if (request.method.empty()) request.method = "GET";
   request.scope = Scope::everything().get();
-  return answer(request, {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
+  return respond(request, {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
 }
 
-std::string body_of(const HttpAnswer& answer) { return answer.body ? *answer.body : "none"; }
+std::string body_of(const HttpResponse& answer) { return answer.body ? *answer.body : "none"; }
 
 TEST(StaticFiles, AreAnsweredByTheirNameAndType) {
   const StaticFiles files = Viewer().load();
@@ -81,14 +81,14 @@ TEST(StaticFiles, StayInTheirFolder) {
 TEST(StaticFiles, GoPackedToWhoTakesThem) {
   const StaticFiles files = Viewer().load();
   const std::string target = "/assets/index-BVx3_a9Z.js";
-  const HttpAnswer plain = get(files, {.target = target});
-  const HttpAnswer packed = get(files, {.target = target, .accept_encoding = "br, gzip"});
+  const HttpResponse plain = get(files, {.target = target});
+  const HttpResponse packed = get(files, {.target = target, .accept_encoding = "br, gzip"});
   EXPECT_EQ(body_of(plain), "let a = 1;");
   EXPECT_EQ(body_of(packed), "packed");
   EXPECT_EQ(packed.content_type, plain.content_type);
   EXPECT_THAT(packed.headers, Contains(Pair("Content-Encoding", "gzip")));
   EXPECT_THAT(plain.headers, Not(Contains(Pair("Content-Encoding", "gzip"))));
-  for (const HttpAnswer& each : {plain, packed}) EXPECT_THAT(each.headers, Contains(Pair("Vary", "Accept-Encoding")));
+  for (const HttpResponse& each : {plain, packed}) EXPECT_THAT(each.headers, Contains(Pair("Vary", "Accept-Encoding")));
   EXPECT_EQ(body_of(get(files, {.target = "/favicon.svg", .accept_encoding = "gzip"})), "<svg/>");
 }
 
@@ -105,11 +105,11 @@ TEST(StaticFiles, ReadAcceptEncoding) {
 TEST(StaticFiles, AreSentOnceToWhoRemembersThem) {
   const StaticFiles files = Viewer().load();
   const std::string target = "/assets/index-BVx3_a9Z.js";
-  const auto tag_of = [](const HttpAnswer& answer) { return answer.headers.front().second; };
+  const auto tag_of = [](const HttpResponse& answer) { return answer.headers.front().second; };
   const std::string plain = tag_of(get(files, {.target = target}));
   const std::string packed = tag_of(get(files, {.target = target, .accept_encoding = "gzip"}));
   EXPECT_NE(plain, packed);
-  const HttpAnswer again = get(files, {.target = target, .accept_encoding = "gzip", .if_none_match = packed});
+  const HttpResponse again = get(files, {.target = target, .accept_encoding = "gzip", .if_none_match = packed});
   EXPECT_EQ(again.status, 304u);
   EXPECT_EQ(again.body, nullptr);
   EXPECT_EQ(tag_of(again), packed);
@@ -140,7 +140,7 @@ TEST(StaticFiles, PagesMayReachTheirOwnHostOnly) {
 }
 
 TEST(StaticFiles, WithoutAViewerThePlainPageRemains) {
-  const HttpAnswer page = get({}, {.target = "/"});
+  const HttpResponse page = get({}, {.target = "/"});
   EXPECT_THAT(body_of(page), HasSubstr("no viewer"));
   EXPECT_EQ(page.content_security_policy, "default-src 'none'");
   EXPECT_EQ(get({}, {.target = "/index.html"}).status, 404u);

@@ -56,8 +56,8 @@ void stream(StreamPlan& plan, StreamClient& client, const Lod& lod, int batches 
   while (batches-- > 0) {
     const auto batch = plan.next(kBatchBytes);
     if (!batch) break;
-    ASSERT_LE(plan.to_go().error, remaining);
-    remaining = plan.to_go().error;
+    ASSERT_LE(plan.remaining().error, remaining);
+    remaining = plan.remaining().error;
     const auto applied = apply_exact(client, batch->payload);
     ASSERT_TRUE(applied) << applied.error().message;
     ASSERT_EQ(broken(client), "") << "after " << client.updates() << " updates";

@@ -118,7 +118,7 @@ TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
     const Lod lod = view == 7 ? Lod{} : random_lod(*volume, random);
     plan.set_lod(lod);
     receiver.set_lod(lod);
-    ASSERT_GE(plan.to_go().updates, receiver.own_left(lod).updates);
+    ASSERT_GE(plan.remaining().updates, receiver.own_left(lod).updates);
     for (int batches = view == 7 ? 100000 : int(random() % 4); batches > 0; --batches) {
       const std::size_t most = std::size_t(256) << random() % 8;
       const auto left = receiver.left();
@@ -126,8 +126,8 @@ TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
       ASSERT_EQ(batch.has_value(), !left.empty());
       if (!batch) {
         ASSERT_TRUE(plan.done());
-        ASSERT_EQ(plan.to_go().updates, 0u);
-        ASSERT_EQ(plan.to_go().error, 0.0);
+        ASSERT_EQ(plan.remaining().updates, 0u);
+        ASSERT_EQ(plan.remaining().error, 0.0);
         break;
       }
       ASSERT_GT(batch->updates, 0u);
@@ -138,9 +138,9 @@ TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
       ASSERT_EQ(*applied, batch->updates);
       ASSERT_EQ(receiver.sent(), before + batch->updates);
       ASSERT_EQ(receiver.left().size() + batch->updates, left.size()) << "all of it is wanted";
-      ASSERT_GE(plan.to_go().updates, receiver.own_left(lod).updates);
-      ASSERT_GE(plan.to_go().error, receiver.own_left(lod).error);
-      ASSERT_EQ(plan.to_go().pixels > 0, lod.camera && !plan.done());
+      ASSERT_GE(plan.remaining().updates, receiver.own_left(lod).updates);
+      ASSERT_GE(plan.remaining().error, receiver.own_left(lod).error);
+      ASSERT_EQ(plan.remaining().pixels > 0, lod.camera && !plan.done());
       ASSERT_EQ(plan.sent(), receiver.sent());
     }
   }
@@ -156,7 +156,7 @@ TEST_P(Plan, GreatErrorsComeEarly) {
   plan.set_lod({});
   while (const auto batch = plan.next(kBatchBytes)) {
     if (plan.sent() > 8192 && plan.sent() < order.size()) {
-      EXPECT_LE(plan.to_go().error, volume->error(order[plan.sent() / 4])) << plan.sent() << " sent";
+      EXPECT_LE(plan.remaining().error, volume->error(order[plan.sent() / 4])) << plan.sent() << " sent";
     }
   }
 }
@@ -167,8 +167,8 @@ TEST_P(Plan, RemainingErrorNeverGrowsWithinAView) {
   plan.set_lod({});
   double before = volume->description().max_error, last = before;
   while (const auto batch = plan.next(kBatchBytes)) {
-    EXPECT_LE(plan.to_go().error, before);
-    before = last = plan.to_go().error;
+    EXPECT_LE(plan.remaining().error, before);
+    before = last = plan.remaining().error;
   }
   EXPECT_EQ(last, 0);
 }

@@ -9,7 +9,7 @@
 #include "protocol/codec.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/serve/access.h"
-#include "server/serve/replaceable.h"
+#include "server/serve/atomic_shared_ptr.h"
 #include "server/serve/session_state.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/mesh_laws.h"
@@ -32,7 +32,7 @@ Catalogue catalogue_of(Volume volume) {
 class Line {
  public:
   Line(const Catalogue& catalogue, ViewingSession& client) : client_(client) {
-    catalogue_.set(std::make_shared<const Catalogue>(catalogue));
+    catalogue_.store(std::make_shared<const Catalogue>(catalogue));
     client_.opened_line(now_);
   }
   // Until neither has anything to say, or so many messages came from the server.
@@ -45,7 +45,7 @@ class Line {
         ASSERT_FALSE(fault) << fault->text;
       }
       auto message = server_.next(2048);
-      if (!message && server_.working()) continue;
+      if (!message && server_.has_work()) continue;
       if (!message) return;
       now_ += std::chrono::milliseconds(1);
       const auto taken = client_.receive(protocol::encode(*message), now_);
@@ -56,7 +56,7 @@ class Line {
   SessionState& server() { return server_; }
 
  private:
-  Replaceable<Catalogue> catalogue_;
+  AtomicSharedPtr<Catalogue> catalogue_;
   SessionState server_{catalogue_, Scope::everything()};
   ViewingSession& client_;
   Clock::time_point now_{};

@@ -1,4 +1,4 @@
-#include "server/serve/catalogue_watch.h"
+#include "server/serve/catalogue_watcher.h"
 
 #include <spdlog/spdlog.h>
 
@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "common/ivm/ivm_file.h"
-#include "server/serve/guard.h"
+#include "server/serve/admission.h"
 
 namespace intervale {
 namespace {
@@ -29,7 +29,7 @@ Result<std::vector<fs::path>> files_in(const fs::path& folder) {
 
 // For what there is not enough memory for fails, and does not end the server.
 template <class Function>
-auto guarded(const fs::path& path, const Function& function) -> decltype(function()) {
+auto catching(const fs::path& path, const Function& function) -> decltype(function()) {
   try {
     return function();
   } catch (const std::exception& exception) {
@@ -39,17 +39,17 @@ auto guarded(const fs::path& path, const Function& function) -> decltype(functio
 
 }  // namespace
 
-Result<Catalogue> CatalogueWatch::load(const std::function<bool()>& go_on) {
+Result<Catalogue> CatalogueWatcher::load(const std::function<bool()>& keep_going) {
   for (const fs::path& input : inputs_) {
-    if (!go_on()) break;
+    if (!keep_going()) break;
     std::error_code ignored;
     if (fs::is_directory(input, ignored)) {
-      if (auto loaded = load_folder(input, go_on); !loaded) return tl::unexpected(loaded.error());
+      if (auto loaded = load_folder(input, keep_going); !loaded) return tl::unexpected(loaded.error());
       continue;
     }
-    auto volume = guarded(input, [&] { return load_ivm(input); });
+    auto volume = catching(input, [&] { return load_ivm(input); });
     if (!volume) return tl::unexpected(volume.error());
-    named_.emplace_back(input, std::move(*volume));
+    files_.emplace_back(input, std::move(*volume));
   }
   Catalogue catalogue;
   const auto add = [&catalogue](const fs::path& path, const Catalogue::Volume& volume) -> Result<void> {
@@ -57,58 +57,58 @@ Result<Catalogue> CatalogueWatch::load(const std::function<bool()>& go_on) {
     if (auto added = catalogue.add(volume); !added) return fail(added.error().message + " (" + path.string() + ")");
     return {};
   };
-  for (const auto& [path, volume] : named_) {
+  for (const auto& [path, volume] : files_) {
     if (auto added = add(path, volume); !added) return tl::unexpected(added.error());
   }
-  for (const auto& [path, file] : found_) {
+  for (const auto& [path, file] : folder_files_) {
     if (auto added = add(path, file.volume); !added) return tl::unexpected(added.error());
   }
   return catalogue;
 }
 
-Result<void> CatalogueWatch::load_folder(const fs::path& folder, const std::function<bool()>& go_on) {
+Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const std::function<bool()>& keep_going) {
   const auto paths = files_in(folder);
   if (!paths) return tl::unexpected(paths.error());
   for (const fs::path& path : *paths) {
-    if (!go_on()) break;
+    if (!keep_going()) break;
     File file;
-    file.seen = stamp_of(path);  // at the start nothing is waited for
-    look_at(path, file);
-    found_[path] = std::move(file);
+    file.last_seen = stamp_of(path);  // at the start nothing is waited for
+    poll_file(path, file);
+    folder_files_[path] = std::move(file);
   }
   return {};
 }
 
 // Reads it if it is to be read. Whether it holds something else than before.
-bool CatalogueWatch::look_at(const fs::path& path, File& file) {
+bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
   // Before it is read: what is written meanwhile is then seen as a change.
   const auto stamp = stamp_of(path);
-  const bool settled = stamp == std::exchange(file.seen, stamp);
+  const bool settled = stamp == std::exchange(file.last_seen, stamp);
   if (!stamp || stamp == file.stamp || !settled) return false;
   if (max_memory_ && resident_bytes() > *max_memory_) {
-    if (!std::exchange(short_of_memory_, true)) spdlog::warn("{} is not read: the process has more memory than it may", path.string());
+    if (!std::exchange(memory_warned_, true)) spdlog::warn("{} is not read: the process has more memory than it may", path.string());
     return false;
   }
-  short_of_memory_ = false;
-  const auto complain = [&](const Error& error) {
-    if (std::exchange(file.complaint, error.message) == error.message) return;
+  memory_warned_ = false;
+  const auto warn_once = [&](const Error& error) {
+    if (std::exchange(file.last_warning, error.message) == error.message) return;
     spdlog::warn("{}: {}", file.volume ? "what was read before stays" : "left out", error.message);
   };
   const std::string name = path.stem().string();
   if (auto fit = Catalogue::check_name(name); !fit) {
-    complain({path.string() + ": " + fit.error().message});
+    warn_once({path.string() + ": " + fit.error().message});
     return false;
   }
-  const auto bytes = guarded(path, [&] { return read_ivm(path); });
+  const auto bytes = catching(path, [&] { return read_ivm(path); });
   if (!bytes) {  // no descriptor left, perhaps, or no right to read it: that may change while the file does not
-    complain(bytes.error());
+    warn_once(bytes.error());
     return false;
   }
   file.stamp = stamp;
-  file.complaint.clear();
-  auto volume = guarded(path, [&] { return decode_ivm(*bytes, name); });
+  file.last_warning.clear();
+  auto volume = catching(path, [&] { return decode_ivm(*bytes, name); });
   if (!volume) {
-    complain({path.string() + ": " + volume.error().message});
+    warn_once({path.string() + ": " + volume.error().message});
     return false;
   }
   if (file.volume && file.volume->description() == volume->description()) return false;  // which has a hash of the contents
@@ -116,52 +116,52 @@ bool CatalogueWatch::look_at(const fs::path& path, File& file) {
   return true;
 }
 
-std::optional<Catalogue> CatalogueWatch::look() {
+std::optional<Catalogue> CatalogueWatcher::poll() {
   bool changed = false;
   std::map<fs::path, File> found;
   for (const fs::path& input : inputs_) {
-    const bool is_file = std::any_of(named_.begin(), named_.end(), [&input](const auto& named) { return named.first == input; });
+    const bool is_file = std::any_of(files_.begin(), files_.end(), [&input](const auto& named) { return named.first == input; });
     if (is_file) continue;
     const auto paths = files_in(input);
     if (!paths) {
       // Gone for a while, perhaps: what came from there stays.
-      if (!std::exchange(unreadable_[input], true)) spdlog::warn("{}; what was read before stays", paths.error().message);
+      if (!std::exchange(unreadable_folders_[input], true)) spdlog::warn("{}; what was read before stays", paths.error().message);
       const fs::path folder = (input / "file").parent_path();  // as those in it name it: x/ is x
-      for (const auto& [path, file] : found_) {
+      for (const auto& [path, file] : folder_files_) {
         if (path.parent_path() == folder) found[path] = file;
       }
       continue;
     }
-    unreadable_[input] = false;
+    unreadable_folders_[input] = false;
     for (const fs::path& path : *paths) {
-      const auto known = found_.find(path);
-      File file = known == found_.end() ? File() : known->second;
+      const auto known = folder_files_.find(path);
+      File file = known == folder_files_.end() ? File() : known->second;
       const bool had = file.volume != nullptr;
-      if (look_at(path, file)) {
+      if (poll_file(path, file)) {
         changed = true;
         spdlog::info("{} {}", path.string(), had ? "has changed and was read again" : "was read");
       }
       found[path] = std::move(file);
     }
   }
-  for (const auto& [path, file] : found_) {
+  for (const auto& [path, file] : folder_files_) {
     if (found.contains(path) || !file.volume) continue;
     changed = true;
     spdlog::info("{} has gone", path.string());
   }
-  found_ = std::move(found);
+  folder_files_ = std::move(found);
   if (!changed) return {};
   return catalogue();
 }
 
-Catalogue CatalogueWatch::catalogue() const {
+Catalogue CatalogueWatcher::catalogue() const {
   Catalogue catalogue;
   const auto add = [&catalogue](const fs::path& path, const Catalogue::Volume& volume) {
     if (!volume) return;
     if (auto added = catalogue.add(volume); !added) spdlog::warn("left out: {} ({})", added.error().message, path.string());
   };
-  for (const auto& [path, volume] : named_) add(path, volume);
-  for (const auto& [path, file] : found_) add(path, file.volume);
+  for (const auto& [path, volume] : files_) add(path, volume);
+  for (const auto& [path, file] : folder_files_) add(path, file.volume);
   return catalogue;
 }
 

@@ -1,4 +1,4 @@
-#include "server/serve/catalogue_watch.h"
+#include "server/serve/catalogue_watcher.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,89 +38,89 @@ struct Watched : ::testing::Test {
   Watched() { spdlog::set_level(spdlog::level::off); }
   ~Watched() override { spdlog::set_level(spdlog::level::info); }
   TempDir folder;
-  CatalogueWatch watch{{folder.path()}};
+  CatalogueWatcher watcher{{folder.path()}};
 };
 
-using CatalogueWatchTest = Watched;
+using CatalogueWatcherTest = Watched;
 
-TEST_F(CatalogueWatchTest, TakesUpWhatAppearsOnceItStands) {
+TEST_F(CatalogueWatcherTest, TakesUpWhatAppearsOnceItStands) {
   save(folder / "a.ivm", -0.3);
-  EXPECT_THAT(names(watch.load().value()), ElementsAre("a"));
-  EXPECT_FALSE(watch.look());
+  EXPECT_THAT(names(watcher.load().value()), ElementsAre("a"));
+  EXPECT_FALSE(watcher.poll());
   save(folder / "b.ivm", -0.3);
   folder.file("c.txt", "no data set");
-  EXPECT_FALSE(watch.look()) << "it may be under way";
-  const auto both = watch.look();
+  EXPECT_FALSE(watcher.poll()) << "it may be under way";
+  const auto both = watcher.poll();
   ASSERT_TRUE(both);
   EXPECT_THAT(names(*both), ElementsAre("a", "b"));
-  EXPECT_FALSE(watch.look());
+  EXPECT_FALSE(watcher.poll());
 }
 
-TEST_F(CatalogueWatchTest, LeavesAFileAloneThatIsBeingWritten) {
+TEST_F(CatalogueWatcherTest, LeavesAFileAloneThatIsBeingWritten) {
   save(folder / "whole.tmp", -0.3);
   const std::string bytes = contents_of(folder / "whole.tmp");
-  EXPECT_THAT(names(watch.load().value()), IsEmpty());
+  EXPECT_THAT(names(watcher.load().value()), IsEmpty());
   for (std::size_t size = 1; size < 20; ++size) {
     folder.file("a.ivm", bytes.substr(0, size));
-    EXPECT_FALSE(watch.look());
+    EXPECT_FALSE(watcher.poll());
   }
   folder.file("a.ivm", bytes);
-  EXPECT_FALSE(watch.look());
-  EXPECT_TRUE(watch.look());
+  EXPECT_FALSE(watcher.poll());
+  EXPECT_TRUE(watcher.poll());
 }
 
-TEST_F(CatalogueWatchTest, WhatChangesIsReplacedAndWhoHasTheOldOneKeepsIt) {
+TEST_F(CatalogueWatcherTest, WhatChangesIsReplacedAndWhoHasTheOldOneKeepsIt) {
   save(folder / "a.ivm", -0.3);
-  const auto before = watch.load().value().find("a");
+  const auto before = watcher.load().value().find("a");
   save(folder / "a.ivm", -0.2);
-  (void)watch.look();
-  const auto changed = watch.look();
+  (void)watcher.poll();
+  const auto changed = watcher.poll();
   ASSERT_TRUE(changed);
   const auto after = changed->find("a");
   EXPECT_NE(after->description().content_hash, before->description().content_hash);
   EXPECT_EQ(before->description().range.alpha, -0.3);
   // The same again, with another time: nobody needs to know.
   save(folder / "a.ivm", -0.2);
-  EXPECT_FALSE(watch.look());
-  EXPECT_FALSE(watch.look());
+  EXPECT_FALSE(watcher.poll());
+  EXPECT_FALSE(watcher.poll());
 }
 
-TEST_F(CatalogueWatchTest, WhatGoesGoes) {
+TEST_F(CatalogueWatcherTest, WhatGoesGoes) {
   save(folder / "a.ivm", -0.3);
   save(folder / "b.ivm", -0.3);
-  const Catalogue before = watch.load().value();
+  const Catalogue before = watcher.load().value();
   std::filesystem::remove(folder / "a.ivm");
-  const auto after = watch.look();
+  const auto after = watcher.poll();
   ASSERT_TRUE(after);
   EXPECT_THAT(names(*after), ElementsAre("b"));
   EXPECT_NE(before.find("a"), nullptr);
 }
 
-TEST_F(CatalogueWatchTest, DamageTouchesNoOneWhoIsServed) {
+TEST_F(CatalogueWatcherTest, DamageTouchesNoOneWhoIsServed) {
   save(folder / "a.ivm", -0.3);
   const std::string bytes = contents_of(folder / "a.ivm");
-  const auto volume = watch.load().value().find("a");
+  const auto volume = watcher.load().value().find("a");
   std::string flipped = bytes;
   flipped[bytes.size() / 2] ^= 1;
   for (const std::string& damaged : {std::string(), bytes.substr(0, bytes.size() / 2), flipped, bytes + "x", std::string(1000, '\xff')}) {
     folder.file("a.ivm", damaged);
-    EXPECT_FALSE(watch.look());
-    EXPECT_FALSE(watch.look());
-    EXPECT_EQ(watch.look(), std::nullopt);
+    EXPECT_FALSE(watcher.poll());
+    EXPECT_FALSE(watcher.poll());
+    EXPECT_EQ(watcher.poll(), std::nullopt);
   }
   folder.file("b.ivm", "damaged");
-  (void)watch.look();
-  EXPECT_FALSE(watch.look()) << "and b is not there";
+  (void)watcher.poll();
+  EXPECT_FALSE(watcher.poll()) << "and b is not there";
   save(folder / "b.ivm", -0.2);
-  (void)watch.look();
-  const auto mended = watch.look();
+  (void)watcher.poll();
+  const auto mended = watcher.poll();
   ASSERT_TRUE(mended);
   EXPECT_THAT(names(*mended), ElementsAre("a", "b"));
   EXPECT_EQ(mended->find("a"), volume);
 }
 
 // As one is that may be read only later, or that a copy puts in its place which keeps its time.
-TEST_F(CatalogueWatchTest, AFileThatHasChangedIsReadWhateverItsTimeOfWriting) {
+TEST_F(CatalogueWatcherTest, AFileThatHasChangedIsReadWhateverItsTimeOfWriting) {
   save(folder / "a.ivm", -0.3);
   const std::string good = contents_of(folder / "a.ivm");
   const auto time = std::filesystem::last_write_time(folder / "a.ivm");
@@ -132,67 +132,67 @@ TEST_F(CatalogueWatchTest, AFileThatHasChangedIsReadWhateverItsTimeOfWriting) {
     } while (stamp_of(folder / "a.ivm") == before);
   };
   write_in_place(std::string(good.size(), 'x'));
-  EXPECT_THAT(names(watch.load().value()), IsEmpty());
+  EXPECT_THAT(names(watcher.load().value()), IsEmpty());
   write_in_place(good);
-  EXPECT_FALSE(watch.look());
-  const auto mended = watch.look();
+  EXPECT_FALSE(watcher.poll());
+  const auto mended = watcher.poll();
   ASSERT_TRUE(mended);
   EXPECT_THAT(names(*mended), ElementsAre("a"));
 }
 
-TEST_F(CatalogueWatchTest, AFolderThatIsAwayKeepsWhatItHad) {
+TEST_F(CatalogueWatcherTest, AFolderThatIsAwayKeepsWhatItHad) {
   std::filesystem::create_directory(folder / "in");
   save(folder / "in/a.ivm", -0.3);
   for (const char* name : {"in", "in/", "./in//"}) {
-    CatalogueWatch watch_in({folder / name});
+    CatalogueWatcher watch_in({folder / name});
     ASSERT_TRUE(watch_in.load());
     std::filesystem::rename(folder / "in", folder / "out");
-    EXPECT_FALSE(watch_in.look()) << name;
+    EXPECT_FALSE(watch_in.poll()) << name;
     std::filesystem::rename(folder / "out", folder / "in");
-    EXPECT_FALSE(watch_in.look()) << name;
+    EXPECT_FALSE(watch_in.poll()) << name;
     std::filesystem::rename(folder / "in/a.ivm", folder / "a.ivm");
-    EXPECT_TRUE(watch_in.look()) << name;
+    EXPECT_TRUE(watch_in.poll()) << name;
     std::filesystem::rename(folder / "a.ivm", folder / "in/a.ivm");
   }
 }
 
-TEST_F(CatalogueWatchTest, AFileWhoseNameDoesNotDoIsLeftOut) {
+TEST_F(CatalogueWatcherTest, AFileWhoseNameDoesNotDoIsLeftOut) {
   save(folder / "a.ivm", -0.3);
   for (const char* name : {"a?.ivm", "b\n.ivm", "c\xff.ivm", "d\xc2\x9b.ivm"}) std::filesystem::copy_file(folder / "a.ivm", folder / name);
-  EXPECT_THAT(names(watch.load().value()), ElementsAre("a"));
-  EXPECT_FALSE(watch.look());
-  EXPECT_FALSE(CatalogueWatch({folder / "a?.ivm"}).load()) << "one that is named is an error";
+  EXPECT_THAT(names(watcher.load().value()), ElementsAre("a"));
+  EXPECT_FALSE(watcher.poll());
+  EXPECT_FALSE(CatalogueWatcher({folder / "a?.ivm"}).load()) << "one that is named is an error";
 }
 
-TEST_F(CatalogueWatchTest, OfTwoOfOneNameTheFirstStands) {
+TEST_F(CatalogueWatcherTest, OfTwoOfOneNameTheFirstStands) {
   std::filesystem::create_directory(folder / "x");
   std::filesystem::create_directory(folder / "y");
   save(folder / "y/a.ivm", -0.3);
-  CatalogueWatch both({folder / "x", folder / "y"});
+  CatalogueWatcher both({folder / "x", folder / "y"});
   const auto first = both.load().value().find("a");
   save(folder / "x/a.ivm", -0.2);
-  (void)both.look();
-  const auto changed = both.look();
+  (void)both.poll();
+  const auto changed = both.poll();
   ASSERT_TRUE(changed);
   EXPECT_NE(changed->find("a"), first);
   EXPECT_THAT(names(*changed), ElementsAre("a"));
-  const auto again = CatalogueWatch({folder / "x", folder / "y"}).load();
+  const auto again = CatalogueWatcher({folder / "x", folder / "y"}).load();
   ASSERT_FALSE(again) << "at the start it is an error";
   EXPECT_THAT(again.error().message, HasSubstr("two data sets are named 'a'"));
 }
 
-TEST_F(CatalogueWatchTest, WhereMemoryIsShortNothingMoreIsRead) {
-  CatalogueWatch poor({folder.path()}, 1);
+TEST_F(CatalogueWatcherTest, WhereMemoryIsShortNothingMoreIsRead) {
+  CatalogueWatcher poor({folder.path()}, 1);
   save(folder / "a.ivm", -0.3);
   EXPECT_THAT(names(poor.load().value()), IsEmpty());
-  for (int i = 0; i < 3; ++i) EXPECT_FALSE(poor.look());
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(poor.poll());
 }
 
-TEST_F(CatalogueWatchTest, LoadingStopsWhenToldTo) {
+TEST_F(CatalogueWatcherTest, LoadingStopsWhenToldTo) {
   save(folder / "a.ivm", -0.3);
   save(folder / "b.ivm", -0.3);
   int asked = 0;
-  EXPECT_THAT(names(watch.load([&] { return ++asked < 3; }).value()), ElementsAre("a"));
+  EXPECT_THAT(names(watcher.load([&] { return ++asked < 3; }).value()), ElementsAre("a"));
 }
 
 }  // namespace

@@ -1,0 +1,85 @@
+#include "server/serve/admission.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
+namespace intervale {
+namespace {
+
+constexpr std::chrono::seconds kMinWriteTime{1};  // before a write counts as slow
+
+AddressCounts::Key key_of(const boost::asio::ip::address& address) {
+  AddressCounts::Key key{};
+  if (address.is_v6() && !address.to_v6().is_v4_mapped()) {
+    const auto bytes = address.to_v6().to_bytes();
+    key[0] = 6;
+    std::copy_n(bytes.begin(), 8, key.begin() + 1);
+  } else {
+    const auto v4 = address.is_v4() ? address.to_v4() : boost::asio::ip::make_address_v4(boost::asio::ip::v4_mapped, address.to_v6());
+    const auto bytes = v4.to_bytes();
+    key[0] = 4;
+    std::copy_n(bytes.begin(), 4, key.begin() + 1);
+  }
+  return key;
+}
+
+}  // namespace
+
+std::optional<AddressCounts::Lease> AddressCounts::try_acquire(const boost::asio::ip::address& address, std::size_t limit) {
+  const Key key = key_of(address);
+  const std::lock_guard lock(mutex_);
+  std::size_t& count = counts_[key];
+  if (count >= limit) return {};  // limit is at least 1, so no count of 0 is left behind
+  ++count;
+  return Lease(*this, key);
+}
+
+void AddressCounts::release(const Key& key) {
+  const std::lock_guard lock(mutex_);
+  const auto found = counts_.find(key);
+  if (--found->second == 0) counts_.erase(found);
+}
+
+WriteBudget::Reservation WriteBudget::reserve(std::weak_ptr<Connection> connection, std::size_t bytes, Clock::time_point now) {
+  std::vector<std::shared_ptr<Connection>> keep_alive;  // until the lock is released: a connection's destructor calls release()
+  const std::lock_guard lock(mutex_);
+  bytes_ += bytes;
+  writes_.push_back({std::move(connection), bytes, now});
+  const auto added = std::prev(writes_.end());
+  while (bytes_ > max_bytes_ && writes_.front().since + kMinWriteTime < now) {
+    Write& oldest = writes_.front();
+    bytes_ -= std::exchange(oldest.bytes, 0);
+    if (auto slow = oldest.connection.lock()) {
+      slow->abort();
+      keep_alive.push_back(std::move(slow));
+    }
+    aborted_.splice(aborted_.end(), writes_, writes_.begin());
+  }
+  return {*this, added};
+}
+
+void WriteBudget::release(Writes::iterator write) {
+  const std::lock_guard lock(mutex_);
+  bytes_ -= write->bytes;
+  (write->bytes == 0 ? aborted_ : writes_).erase(write);
+}
+
+std::size_t WriteBudget::bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
+std::uint64_t resident_bytes() {
+  unsigned long pages = 0;
+  if (std::FILE* const file = std::fopen("/proc/self/statm", "re")) {
+    if (std::fscanf(file, "%*s %lu", &pages) != 1) pages = 0;
+    std::fclose(file);
+  }
+  return std::uint64_t(pages) * std::uint64_t(::sysconf(_SC_PAGESIZE));
+}
+
+}  // namespace intervale
