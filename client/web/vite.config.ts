@@ -1,5 +1,5 @@
-// INTERVALE_CORE_DIR: the folder with core.js and core.wasm, as CMake makes them; without it the page builds, and says that it has no core.
-// INTERVALE_VIEWER_OUT: where the page goes.
+// Environment: INTERVALE_CORE_DIR, the folder with core.js and core.wasm, which CMake builds; without it the page can
+// be built, but reports that it has no core. INTERVALE_VIEWER_OUT, the output folder.
 import { existsSync } from 'node:fs';
 import { resolve } from 'node:path';
 import { defineConfig, type Plugin } from 'vite';
@@ -15,27 +15,27 @@ function clientCore(folder: string | undefined): Plugin {
       return '\0' + id;
     },
     load(id) {
-      if (id === '\0@core/core.js') return 'export default () => Promise.reject(new Error("This build of the page has no client core."));';
+      if (id === '\0@core/core.js') return 'export default () => Promise.reject(new Error("this build of the page has no client core"));';
       if (id.startsWith('\0@core/')) return 'export default "";';
       return null;
     },
   };
 }
 
-// The page brings shaders of its own, so those of three.js stay at home: a quarter of what the page would be. They are all behind one object, by which
-// `#include` finds them.
+// Leaves out the shaders of three.js, since the page has its own: they would be a quarter of its size. All of them are
+// in one object, in which three.js looks up `#include`.
 function withoutShaders(): Plugin {
-  let met = false;
+  let isFound = false;
   return {
     name: 'without-shaders',
     enforce: 'pre',
     load(id) {
       if (!id.endsWith('/three/src/renderers/shaders/ShaderChunk.js')) return null;
-      met = true;
+      isFound = true;
       return 'export const ShaderChunk = {};';
     },
     buildEnd(error) {
-      if (!error && !met) this.error('three.js keeps its shaders elsewhere than it did: see withoutShaders in vite.config.ts');
+      if (!error && !isFound) this.error('ShaderChunk.js of three.js was not found: update withoutShaders in vite.config.ts');
     },
   };
 }
@@ -43,7 +43,7 @@ function withoutShaders(): Plugin {
 export default defineConfig(() => {
   const core = () => clientCore(process.env.INTERVALE_CORE_DIR);
   return {
-    base: './', // works below any path
+    base: './', // relative: the page may be served below any path
     plugins: [core(), withoutShaders()],
     resolve: { alias: [{ find: /^three$/, replacement: 'three/src/Three.js' }] },
     worker: { format: 'es' as const, plugins: () => [core()] },
@@ -52,9 +52,9 @@ export default defineConfig(() => {
       emptyOutDir: true,
       target: 'es2022',
       cssTarget: ['chrome123', 'firefox120', 'safari17.5'], // light-dark()
-      assetsInlineLimit: 0, // the server's Content-Security-Policy has no data: but for pictures
+      assetsInlineLimit: 0, // the server's Content-Security-Policy allows data: URLs for images only
       modulePreload: { polyfill: false },
-      chunkSizeWarningLimit: 700, // three.js, 130 kB on the wire
+      chunkSizeWarningLimit: 700, // kB; three.js takes 130 compressed
     },
   };
 });

@@ -1,4 +1,5 @@
-// Chromium's own WebSocket, without our client: the conversations of tests/e2e/peers, and the close codes that only pages are told.
+// The protocol with Chromium's WebSocket, without our client: the conversations of tests/e2e/peers, and the close
+// codes.
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -17,7 +18,7 @@ after(async () => {
   killServers();
 });
 
-// A page of that server's, with the conversations as a module of its own.
+// Opens a page of the server that can import conversations.mjs.
 async function visit(server) {
   const page = await browser.newPage();
   await page.route('**/conversations.mjs', (route) => route.fulfill({ path: kConversations, contentType: 'text/javascript' }));
@@ -35,28 +36,28 @@ test('Chromium holds every conversation', async () => {
   assert.deepEqual(failures, []);
 });
 
-test('Chromium is told of tokens by a close code', async () => {
+test('a close code tells Chromium whether a token is required or not sufficient', async () => {
   const tokens = join(data, 'tokens');
   writeFileSync(tokens, 'letmein\nelsewhere other*\n');
   const server = await serve(data, 0, '--tokens', tokens);
   const page = await visit(server);
-  const ends = await page.evaluate(async (dataset) => {
+  const codes = await page.evaluate(async (dataset) => {
     const { conversations } = await import('/conversations.mjs');
     const { open, connect } = conversations(WebSocket, `ws://${location.host}/v1/stream`, dataset);
-    const told = [];
+    const received = [];
     for (const token of ['', 'wrong', 'elsewhere', 'letmein']) {
       const peer = await connect(token === '' ? ['intervale.v1'] : ['intervale.v1', `intervale.token.${btoa(token).replace(/=+$/, '')}`]);
       peer.ws.send(open());
       const { kind, body } = await peer.receive();
-      told.push(kind === 4 ? [body.number(0, 2), await peer.closed] : kind);
+      received.push(kind === 4 ? [body.number(0, 2), await peer.closed] : kind);
       peer.ws.close();
     }
-    return told;
+    return received;
   }, kBuckyball.name);
-  assert.deepEqual(ends, [[4401, 4401], [4401, 4401], [4403, 4403], 1]);
+  assert.deepEqual(codes, [[4401, 4401], [4401, 4401], [4403, 4403], 1]);
 });
 
-test('Chromium is told that it took too long', async () => {
+test('a close code tells Chromium that the handshake timed out', async () => {
   const server = await serve(data, 0, '--handshake-time', '0.5');
   const page = await visit(server);
   const code = await page.evaluate(async () => {
@@ -67,7 +68,7 @@ test('Chromium is told that it took too long', async () => {
   assert.equal(code, 4408);
 });
 
-test('Chromium is told that the server leaves', async () => {
+test('a close code tells Chromium that the server shuts down', async () => {
   const server = await serve(data);
   const page = await visit(server);
   const code = page.evaluate(async (dataset) => {
@@ -84,13 +85,13 @@ test('Chromium is told that the server leaves', async () => {
   assert.equal(await code, 1001);
 });
 
-test('Chromium lets pages from elsewhere open sessions and read the list only where they are allowed to', async () => {
-  const elsewhere = await serve(data);
+test('Chromium lets pages of another origin open sessions and read the list only if --allow-origin names it', async () => {
+  const other = await serve(data);
   const tokens = join(data, 'tokens');
   writeFileSync(tokens, 'letmein\n');
-  const page = await browser.newPage({ bypassCSP: true }); // the viewer's own policy would be in the way
-  await page.goto(elsewhere.url);
-  for (const origin of [`http://${elsewhere.address}`, 'https://another.example']) {
+  const page = await browser.newPage({ bypassCSP: true }); // the viewer's policy forbids other origins
+  await page.goto(other.url);
+  for (const origin of [`http://${other.address}`, 'https://another.example']) {
     const server = await serve(data, 0, '--tokens', tokens, '--allow-origin', origin);
     const reached = await page.evaluate(async (address) => {
       const list = (headers) => fetch(`http://${address}/api/datasets`, { headers }).then((answer) => answer.status, () => 'nothing');
@@ -101,6 +102,6 @@ test('Chromium lets pages from elsewhere open sessions and read the list only wh
       });
       return [await list({ Authorization: 'Bearer letmein' }), await list({ Authorization: 'Bearer wrong' }), await list({}), await socket];
     }, server.address);
-    assert.deepEqual(reached, origin.endsWith(elsewhere.address) ? [200, 401, 401, 'open'] : ['nothing', 'nothing', 'nothing', 'nothing']);
+    assert.deepEqual(reached, origin.endsWith(other.address) ? [200, 401, 401, 'open'] : ['nothing', 'nothing', 'nothing', 'nothing']);
   }
 });

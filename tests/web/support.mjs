@@ -1,27 +1,27 @@
-// A server with made data, a browser without a display, and what the tests ask of a page in it.
-//
-// INTERVALE_BIN: the programs' folder. INTERVALE_VIEWER_PAGE: where npm's packages of the viewer are. INTERVALE_WEB_OUT: where pictures are kept.
+// A server with generated data, a headless browser, and queries of the page in it. The environment, which ctest -L web
+// sets: INTERVALE_BIN, the programs' folder; INTERVALE_VIEWER_PAGE, the viewer's folder with its npm packages and
+// tests/browser.mjs; INTERVALE_WEB_OUT, where pictures are written.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { createRequire } from 'node:module';
 import net from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
-const kPatience = 60_000; // milliseconds, for anything to happen
+const kTimeoutMs = 60_000; // for every wait on a page
 
 const need = (name) => process.env[name] ?? assert.fail(`${name} is not set: run these tests by ctest -L web`);
 const bin = need('INTERVALE_BIN');
 const out = need('INTERVALE_WEB_OUT');
 const references = fileURLToPath(new URL('references', import.meta.url));
 mkdirSync(out, { recursive: true });
-const { chromium } = createRequire(join(need('INTERVALE_VIEWER_PAGE'), 'package.json'))('playwright-core');
+const browser = await import(join(need('INTERVALE_VIEWER_PAGE'), 'tests/browser.mjs'));
+export const { launch, pixels, difference } = browser;
 
 export const program = (name, ...args) => execFileSync(join(bin, name), args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] });
 
-// A folder with interval volumes, which goes when the tests end. sample: where it is named otherwise.
+// A folder with interval volumes, deleted when the tests end. sample: of `intervale sample`, if not the name.
 export function makeData(...wanted) {
   const folder = mkdtempSync(join(tmpdir(), 'intervale-web-'));
   process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
@@ -38,9 +38,10 @@ export const kGyroid = { name: 'gyroid', size: 33, range: [-0.4, 0.4] };
 const servers = new Set();
 export const killServers = () => servers.forEach((server) => server.kill('SIGKILL'));
 
-// A running `intervale serve`. port 0: any that is free.
+// Starts `intervale serve`. port 0: a free one.
 export async function serve(folder, port = 0, ...options) {
-  const server = spawn(join(bin, 'intervale'), ['serve', folder, '--listen', `127.0.0.1:${port}`, ...options], { stdio: ['ignore', 'ignore', 'pipe'] });
+  const args = ['serve', folder, '--listen', `127.0.0.1:${port}`, ...options];
+  const server = spawn(join(bin, 'intervale'), args, { stdio: ['ignore', 'ignore', 'pipe'] });
   process.on('exit', () => server.kill('SIGKILL'));
   servers.add(server);
   server.on('exit', () => servers.delete(server));
@@ -62,64 +63,60 @@ export async function serve(folder, port = 0, ...options) {
   };
 }
 
-// A line to that port that carries so many bytes a second of a stream from the server, anything else as it comes, and breaks when the server does.
-export async function slowLine(port, bytesPerSecond) {
-  const relay = net.createServer((near) => {
-    const far = net.connect(port, '127.0.0.1');
+// A TCP proxy to a local port that carries `bytesPerSecond` of a stream from the server, and everything else at full
+// speed. A connection ends when either side closes it. Returns the proxy's port.
+export async function throttledProxy(port, bytesPerSecond) {
+  const proxy = net.createServer((client) => {
+    const server = net.connect(port, '127.0.0.1');
     let timer = null;
     const end = () => {
       clearInterval(timer);
-      near.destroy();
-      far.destroy();
+      client.destroy();
+      server.destroy();
     };
-    for (const socket of [near, far]) socket.on('close', end).on('error', end);
-    near.once('data', (request) => {
-      far.write(request);
-      near.pipe(far);
-      if (!request.includes('/v1/stream')) return far.pipe(near);
+    for (const socket of [client, server]) socket.on('close', end).on('error', end);
+    client.once('data', (request) => {
+      server.write(request);
+      client.pipe(server);
+      if (!request.includes('/v1/stream')) return server.pipe(client);
       let queue = Buffer.alloc(0);
-      far.on('data', (data) => {
+      server.on('data', (data) => {
         queue = Buffer.concat([queue, data]);
-        far.pause();
+        server.pause();
       });
       timer = setInterval(() => {
-        near.write(queue.subarray(0, bytesPerSecond / 20));
+        client.write(queue.subarray(0, bytesPerSecond / 20));
         queue = queue.subarray(bytesPerSecond / 20);
-        if (queue.length === 0) far.resume();
+        if (queue.length === 0) server.resume();
       }, 50);
     });
   });
-  await new Promise((resolve) => relay.listen(0, '127.0.0.1', resolve));
-  relay.unref();
-  return relay.address().port;
+  await new Promise((resolve) => proxy.listen(0, '127.0.0.1', resolve));
+  proxy.unref();
+  return proxy.address().port;
 }
 
-export const launch = () =>
-  chromium.launch({
-    executablePath: process.env.INTERVALE_CHROMIUM ?? '/usr/bin/chromium',
-    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
-  });
-
-// A page that is at this address, and everything that went wrong in it: errors in its console, among them what the Content-Security-Policy forbade.
-export async function open(browser, url, { width = 800, height = 600, expected = [], ...options } = {}) {
+// Opens a page. `errors` collects its exceptions and console errors, which include violations of the
+// Content-Security-Policy. downloaded(): bytes of files received so far, as transferred.
+export async function open(browser, url, { width = 800, height = 600, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, ...options });
   const page = await context.newPage();
-  page.setDefaultTimeout(kPatience);
-  const wrong = [];
+  page.setDefaultTimeout(kTimeoutMs);
+  const errors = [];
   page.on('console', (message) => {
-    if (message.type() === 'error' && !expected.some((text) => message.text().includes(text))) wrong.push(message.text());
+    if (message.type() === 'error') errors.push(message.text());
   });
-  let downloaded = 0; // of the page, its worker's files among it, as they came
+  let downloaded = 0; // includes the worker's files
   context.on('response', (response) => {
     if (!response.url().includes('/api/')) downloaded += Number(response.headers()['content-length'] ?? 0);
   });
-  page.on('pageerror', (error) => wrong.push(String(error)));
+  page.on('pageerror', (error) => errors.push(String(error)));
   await page.goto(url);
   await page.waitForFunction(() => window.intervale !== undefined);
-  return { page, wrong, downloaded: () => downloaded, close: () => context.close() };
+  return { page, errors, downloaded: () => downloaded, close: () => context.close() };
 }
 
-// Until all that the view wants has come and is drawn.
+// Waits until the view is completely refined and drawn.
 export async function settled(page) {
   await page.waitForFunction(() => {
     const { progress, live, stats } = window.intervale;
@@ -128,17 +125,16 @@ export async function settled(page) {
   await drawn(page);
 }
 
-// Until what the page asked of its worker has come back, and the next picture is drawn.
+// Waits until the worker has answered all requests, and the picture is drawn.
 export async function drawn(page) {
+  await digestOf(page); // requests are answered in order
   await page.evaluate(async () => {
-    const answer = window.intervale.next('digest');
-    window.intervale.send({ type: 'digest' });
-    await answer;
     for (let k = 0; k < 3; ++k) await new Promise((resolve) => requestAnimationFrame(resolve));
   });
 }
 
-// The page's mesh: what the native client's --digest says of the same one.
+// The digest of the page's mesh, as the native client's --digest computes it, and its numbers of updates and
+// tetrahedra.
 export async function digestOf(page) {
   return page.evaluate(async () => {
     const answer = window.intervale.next('digest');
@@ -147,97 +143,38 @@ export async function digestOf(page) {
   });
 }
 
-// Changes the view as if by hand, and waits for what follows.
+// Changes the view as the controls do, and waits until it is refined.
 export async function set(page, change) {
   await page.evaluate((change) => {
     window.intervale.set(change);
-    return new Promise((resolve) => setTimeout(resolve, 250)); // views are sent ten times a second at most
+    return new Promise((resolve) => setTimeout(resolve, 250)); // views are sent at most ten times a second
   }, change);
   await settled(page);
 }
 
 export const progressOf = (page) => page.evaluate(() => window.intervale.progress);
-export const skinOf = (page) => page.evaluate(() => ({ ...window.intervale.stats }));
 
-// The canvas as it is drawn, as PNG in base 64; kept under this name.
-export async function photograph(page, name) {
-  const png = await page.evaluate(async () => {
-    const blob = await window.intervale.photograph();
-    return new Promise((resolve) => {
-      const reader = new FileReader();
-      reader.onload = () => resolve(reader.result.split(',')[1]);
-      reader.readAsDataURL(blob);
-    });
-  });
-  if (name) writeFileSync(join(out, `${name}.png`), Buffer.from(png, 'base64'));
-  return png;
-}
-
-// How far two pictures differ: the mean over pixels and channels, 0 to 255, and the share of pixels that differ by more than 32 in any.
-export async function difference(page, a, b) {
-  return page.evaluate(
-    async ([a, b]) => {
-      const pixels = async (png) => {
-        const bytes = Uint8Array.from(atob(png), (c) => c.charCodeAt(0));
-        const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-        const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-        const context = canvas.getContext('2d');
-        context.drawImage(bitmap, 0, 0);
-        return context.getImageData(0, 0, bitmap.width, bitmap.height);
-      };
-      const [p, q] = [await pixels(a), await pixels(b)];
-      if (p.width !== q.width || p.height !== q.height) return { mean: 255, share: 1 };
-      let sum = 0;
-      let far = 0;
-      for (let i = 0; i < p.data.length; i += 4) {
-        let most = 0;
-        for (let k = 0; k < 3; ++k) {
-          const d = Math.abs(p.data[i + k] - q.data[i + k]);
-          sum += d;
-          most = Math.max(most, d);
-        }
-        if (most > 32) ++far;
-      }
-      const count = p.width * p.height;
-      return { mean: sum / count / 3, share: far / count };
-    },
-    [a, b],
-  );
-}
-
-// Compares a picture with the one that is kept in references/. INTERVALE_WEB_REMAKE=1 keeps this one instead.
+// Compares the canvas with references/NAME.png, and writes it to INTERVALE_WEB_OUT. With INTERVALE_WEB_REMAKE=1 it
+// replaces the reference first. Returns its pixels.
 export async function matches(page, name) {
-  const png = await photograph(page, name);
+  const png = await browser.photograph(page);
   const path = join(references, `${name}.png`);
-  if (process.env.INTERVALE_WEB_REMAKE) {
-    mkdirSync(references, { recursive: true });
-    writeFileSync(path, Buffer.from(png, 'base64'));
-  }
+  writeFileSync(join(out, `${name}.png`), Buffer.from(png, 'base64'));
+  if (process.env.INTERVALE_WEB_REMAKE) writeFileSync(path, Buffer.from(png, 'base64'));
   assert.ok(existsSync(path), `there is no reference ${path}`);
-  const { mean, share } = await difference(page, png, readFileSync(path).toString('base64'));
-  assert.ok(mean < 3 && share < 0.02, `${name}: differs by ${mean.toFixed(2)} in the mean, ${(100 * share).toFixed(1)} % of the pixels by much`);
-  return png;
+  const picture = await browser.decode(page, png);
+  const { mean, share } = difference(picture, await browser.decode(page, readFileSync(path).toString('base64')), 32);
+  assert.ok(mean < 3 && share < 0.02, `${name}: mean difference ${mean.toFixed(2)}; ${(100 * share).toFixed(1)} % of the pixels differ`);
+  return picture;
 }
 
-// The shares of pixels that are blue, orange and sand: the alpha surface, the beta surface and the inside.
-export async function colours(page, png) {
-  return page.evaluate(async (png) => {
-    const bytes = Uint8Array.from(atob(png), (c) => c.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-    context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-    let blue = 0;
-    let orange = 0;
-    let sand = 0;
-    for (let i = 0; i < data.length; i += 4) {
-      const [r, g, b] = [data[i], data[i + 1], data[i + 2]];
-      if (Math.max(r, g, b) - Math.min(r, g, b) < 25) continue;
-      if (b > r + 20) ++blue;
-      else if (r - b > 1.6 * (r - g) + 60 || g < 0.75 * r) ++orange;
-      else ++sand;
-    }
-    const all = data.length / 4;
-    return { blue: blue / all, orange: orange / all, sand: sand / all };
-  }, png);
+// The shares of pixels in the colours of the alpha surface, the beta surface and the interior.
+export function surfaceShares(picture) {
+  const kind = (r, g, b) => {
+    if (Math.max(r, g, b) - Math.min(r, g, b) < 25) return 'none';
+    if (b > r + 20) return 'alpha';
+    return r - b > 1.6 * (r - g) + 60 || g < 0.75 * r ? 'beta' : 'interior';
+  };
+  const [alpha, beta, interior] = ['alpha', 'beta', 'interior'].map((name) => browser.share(picture, (r, g, b) => kind(r, g, b) === name));
+  return { alpha, beta, interior };
 }

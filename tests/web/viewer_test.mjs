@@ -5,7 +5,6 @@ import { join } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 
 import {
-  colours,
   difference,
   digestOf,
   drawn,
@@ -17,13 +16,14 @@ import {
   makeData,
   matches,
   open,
-  photograph,
+  pixels,
   program,
   progressOf,
   serve,
   set,
   settled,
-  slowLine,
+  surfaceShares,
+  throttledProxy,
 } from './support.mjs';
 
 const kEverything = { min: [-100, -100, -100], max: [100, 100, 100] };
@@ -41,11 +41,12 @@ before(async () => {
 });
 after(async () => {
   await browser.close();
-  killServers(); // those of tests that failed, too
+  killServers(); // also those that failed tests have left
 });
 
-// The thickness that the picture shows, read off by the legend, at points all over it; x and y from -1 to 1, y up, in heights of the picture's half.
-async function thicknessSeen(page) {
+// The thickness at a grid of points of the picture, from the colours of the legend. x and y are relative to the
+// picture's centre, in halves of its height, y up. most: the thickness at the end of the legend; box: of the data.
+async function measuredThickness(page) {
   return page.evaluate(async () => {
     const legend = document.getElementById('legend-ramp');
     const ramp = legend.getContext('2d').getImageData(0, 0, legend.width, 1).data;
@@ -56,24 +57,25 @@ async function thicknessSeen(page) {
     context.drawImage(bitmap, 0, 0);
     const picture = context.getImageData(0, 0, width, height).data;
     const background = [...picture.slice(0, 3)];
-    const apart = (a, i, b, j) => Math.hypot(a[i] - b[j], a[i + 1] - b[j + 1], a[i + 2] - b[j + 2]);
-    const seen = [];
+    const distance = (a, i, b, j) => Math.hypot(a[i] - b[j], a[i + 1] - b[j + 1], a[i + 2] - b[j + 2]);
+    const points = [];
     for (let v = 4; v < height; v += 13) {
       for (let u = 4; u < width; u += 13) {
         const at = 4 * (v * width + u);
         let best = 0;
-        for (let k = 4; k < ramp.length; k += 4) if (apart(picture, at, ramp, k) < apart(picture, at, ramp, best)) best = k;
-        const empty = apart(picture, at, background, 0) < 2;
-        seen.push({ x: (2 * u + 1 - width) / height, y: (height - 2 * v - 1) / height, thickness: empty ? 0 : (best / 4 / (ramp.length / 4 - 1)) * most });
+        for (let k = 4; k < ramp.length; k += 4) if (distance(picture, at, ramp, k) < distance(picture, at, ramp, best)) best = k;
+        const isEmpty = distance(picture, at, background, 0) < 2;
+        const thickness = isEmpty ? 0 : (best / 4 / (ramp.length / 4 - 1)) * most;
+        points.push({ x: (2 * u + 1 - width) / height, y: (height - 2 * v - 1) / height, thickness });
       }
     }
     const { dims, spacing, origin } = window.intervale.live.dataset;
-    return { seen, most, box: { min: origin, max: origin.map((o, k) => o + (dims[k] - 1) * spacing[k]) } };
+    return { points, most, box: { min: origin, max: origin.map((o, k) => o + (dims[k] - 1) * spacing[k]) } };
   });
 }
 
-// How far the ray through that point of the picture goes in the box.
-function wayThrough(box, { eye, lookAt, up, fov }, x, y) {
+// The length within the box of the ray through such a point.
+function rayLength(box, { eye, lookAt, up, fov }, x, y) {
   const sub = (a, b) => a.map((v, k) => v - b[k]);
   const unit = (a) => a.map((v) => v / Math.hypot(...a));
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -88,34 +90,34 @@ function wayThrough(box, { eye, lookAt, up, fov }, x, y) {
   return Math.max(0, far - near);
 }
 
-// A page on the buckyball that fails its test if anything went wrong in it.
+// Runs a test on a refined page of the buckyball. Fails also if the page has errors.
 async function withPage(hash, options, body) {
-  const { page, wrong, close } = await open(browser, `${server.url}#data=buckyball&${hash}`, options);
+  const { page, errors, close } = await open(browser, `${server.url}#data=buckyball&${hash}`, options);
   try {
     await settled(page);
     await body(page);
-    assert.deepEqual(wrong, []);
+    assert.deepEqual(errors, []);
   } finally {
     await close();
   }
 }
 
 describe('The page', () => {
-  test('comes with a strict policy, compressed, and refines to the end without an error', async () => {
+  test('has a strict policy, is compressed, and refines to full detail without errors', async () => {
     const answer = await fetch(server.url);
     const policy = answer.headers.get('content-security-policy');
     assert.match(policy, /default-src 'none'/);
     assert.doesNotMatch(policy, /'unsafe-eval'|'unsafe-inline'/);
-    const { page, wrong, downloaded, close } = await open(browser, server.url);
+    const { page, errors, downloaded, close } = await open(browser, server.url);
     await settled(page);
     assert.equal(await page.textContent('#progress-text'), 'Done for this view');
     const size = downloaded();
     assert.ok(size > 200_000 && size <= 400_000, `${size} bytes are downloaded before data`);
-    assert.deepEqual(wrong, []);
+    assert.deepEqual(errors, []);
     await close();
   });
 
-  test('has the mesh of the native client, for all of the data and for a view of it', async () => {
+  test('has the same mesh as the native client, for the whole data set and for a view', async () => {
     await withPage('', {}, async (page) => {
       const { view, width, height } = await page.evaluate(() => {
         const { canvas } = window.intervale;
@@ -124,7 +126,7 @@ describe('The page', () => {
         return { view: eye, width: canvas.width, height: canvas.height };
       });
       await set(page, { pixelError: 2 });
-      // Nothing but this view may have been asked for, or there is more than it wants.
+      // In a new page: this one has received updates for earlier views as well.
       const hash = await page.evaluate(() => location.hash);
       const other = await open(browser, server.url + hash);
       await settled(other.page);
@@ -140,7 +142,7 @@ describe('The page', () => {
     });
   });
 
-  test('has its state in the address', async () => {
+  test('keeps its state in the address', async () => {
     await withPage(`${kCamera}&px=4&clip=1,0,0,0.25&show=wireframe&alpha=ff0000,0.5`, {}, async (page) => {
       const state = await page.evaluate(() => window.intervale.state);
       assert.equal(state.pixelError, 4);
@@ -161,15 +163,15 @@ describe('Pictures', () => {
   const size = { width: 480, height: 400 };
   test('show the surfaces', () =>
     withPage(kCamera, size, async (page) => {
-      const { blue, orange } = await colours(page, await matches(page, 'surfaces'));
-      assert.ok(blue > 0.05 && orange < 0.01);
+      const { alpha, beta } = surfaceShares(await matches(page, 'surfaces'));
+      assert.ok(alpha > 0.05 && beta < 0.01);
     }));
-  test('show the solid inside where a plane cuts it', () =>
+  test('show the interior where a plane cuts the solid', () =>
     withPage(`${kCamera}&clip=0,-1,0,0`, size, async (page) => {
       await page.waitForFunction(() => window.intervale.stats.capTriangles > 100);
       await drawn(page);
-      const { sand } = await colours(page, await matches(page, 'clip'));
-      assert.ok(sand > 0.01, `${sand}`);
+      const { interior } = surfaceShares(await matches(page, 'clip'));
+      assert.ok(interior > 0.01, `${interior}`);
     }));
   test('show shrunken tetrahedra', () =>
     withPage(`${kCamera}&roi=-0.5,-1,-0.5,0.5,0,0.5&show=tets&shrink=0.7&px=4`, size, async (page) => {
@@ -178,22 +180,22 @@ describe('Pictures', () => {
       await matches(page, 'tets');
     }));
   test('show thickness', () => withPage(`${kCamera}&show=thickness`, size, (page) => matches(page, 'thickness')));
-  test('show the thickness that a block has along each ray', async () => {
-    const { page, wrong, close } = await open(browser, `${server.url}#data=block&eye=5,-7,4&at=0.1,0,0&up=0,0,1&fov=40&show=thickness`, size);
+  test('show the thickness of a block along each ray', async () => {
+    const { page, errors, close } = await open(browser, `${server.url}#data=block&eye=5,-7,4&at=0.1,0,0&up=0,0,1&fov=40&show=thickness`, size);
     await settled(page);
     await page.waitForFunction(() => !document.getElementById('legend').hidden && parseFloat(document.getElementById('legend-high').textContent) > 1);
     await drawn(page);
-    const { seen, most, box } = await thicknessSeen(page);
+    const { points, most, box } = await measuredThickness(page);
     const { pose } = await page.evaluate(() => window.intervale.state);
     let hit = 0;
-    for (const { x, y, thickness } of seen) {
-      const expected = wayThrough(box, pose, x, y);
-      if (expected > 0 && expected < 0.02 * most) continue; // so little is let shine through
+    for (const { x, y, thickness } of points) {
+      const expected = rayLength(box, pose, x, y);
+      if (expected > 0 && expected < 0.02 * most) continue; // blended with the background
       if (expected > 0) ++hit;
       assert.ok(Math.abs(thickness - expected) < 0.02 * most, `${thickness} instead of ${expected} at ${x}, ${y}, of ${most}`);
     }
-    assert.ok(hit > 20 && hit < seen.length - 20, `${hit} of ${seen.length} rays`);
-    assert.deepEqual(wrong, []);
+    assert.ok(hit > 20 && hit < points.length - 20, `${hit} of ${points.length} rays`);
+    assert.deepEqual(errors, []);
     await close();
   });
   test('show a region refined while the rest is coarse', () =>
@@ -205,33 +207,32 @@ describe('Pictures', () => {
 });
 
 describe('Controls', () => {
-  // What each switch and slider does, seen in the picture: off again, it is as before.
-  for (const [id, change] of [
+  for (const [id, isOn] of [
     ['clip', (page) => page.evaluate(() => window.intervale.state.clip !== null)],
     ['thickness', (page) => page.evaluate(() => window.intervale.state.thickness)],
     ['wireframe', (page) => page.evaluate(() => window.intervale.state.wireframe)],
     ['levels', (page) => page.evaluate(() => window.intervale.state.levels)],
   ]) {
-    test(`${id} changes the picture, and off again gives it back`, () =>
+    test(`${id} changes the picture, and switched off restores it`, () =>
       withPage(kCamera, {}, async (page) => {
-        const first = await photograph(page);
-        const turn = async () => {
+        const first = await pixels(page);
+        const toggle = async () => {
           await page.locator(`label:has(#${id})`).click();
           await page.waitForTimeout(300);
           await settled(page);
         };
-        await turn();
-        assert.ok(await change(page));
-        const { mean } = await difference(page, first, await photograph(page));
+        await toggle();
+        assert.ok(await isOn(page));
+        const { mean } = difference(first, await pixels(page));
         assert.ok(mean > 0.5, `${mean}`);
-        await turn();
-        assert.ok(!(await change(page)));
-        const back = await difference(page, first, await photograph(page));
+        await toggle();
+        assert.ok(!(await isOn(page)));
+        const back = difference(first, await pixels(page));
         assert.ok(back.mean < 0.5, `${back.mean}`);
       }));
   }
 
-  test('keys do what the switches do', () =>
+  test('keys have the effects of the switches', () =>
     withPage(kCamera, {}, async (page) => {
       await page.focus('#canvas');
       for (const [key, name] of [['c', 'clip'], ['g', 'region'], ['t', 'thickness'], ['w', 'wireframe'], ['l', 'levels']]) {
@@ -256,7 +257,7 @@ describe('Controls', () => {
       await page.keyboard.press('Escape');
     }));
 
-  test('dragging turns, the wheel zooms, and new views bring more', () =>
+  test('dragging rotates, the wheel zooms, and closer views have more updates', () =>
     withPage('px=4', {}, async (page) => {
       const before = await progressOf(page);
       const box = await page.locator('#canvas').boundingBox();
@@ -275,13 +276,13 @@ describe('Controls', () => {
       assert.ok((await progressOf(page)).updates > before.updates);
     }));
 
-  test('the error on screen, and budgets, hold', () =>
+  test('the screen-space error and the budget of tetrahedra limit the mesh', () =>
     withPage('px=8', {}, async (page) => {
       const coarse = await progressOf(page);
       await set(page, { pixelError: 0.5 });
       const fine = await progressOf(page);
       assert.ok(fine.updates > 2 * coarse.updates);
-      // No report ever says more than the budget.
+      // No progress report may exceed the budget.
       await page.evaluate(() => {
         window.mostTets = 0;
         window.watching = (async () => {
@@ -297,31 +298,31 @@ describe('Controls', () => {
       assert.equal((await progressOf(page)).updatesShown, (await progressOf(page)).updates);
     }));
 
-  test('the memory budget holds, and says when there is no room', () =>
+  test('the memory budget limits the updates, and the page says so', () =>
     withPage('mb=1', {}, async (page) => {
       await set(page, { region: kEverything });
       const progress = await progressOf(page);
       assert.ok(progress.full);
       assert.ok(progress.updates <= 1e6 / 30, `${progress.updates}`);
-      assert.equal(await page.textContent('#progress-text'), 'Done: no room for more');
+      assert.equal(await page.textContent('#progress-text'), 'Done: memory limit reached');
     }));
 
-  test('full screen, light or dark, and the link to copy', () =>
+  test('full screen, the theme and copying the link work', () =>
     withPage(kCamera, {}, async (page) => {
       await page.click('#fullscreen');
       await page.waitForFunction(() => document.fullscreenElement !== null);
       await page.click('#fullscreen');
       await page.waitForFunction(() => document.fullscreenElement === null);
-      const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
-      const before = await ground();
+      const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+      const before = await background();
       await page.click('#theme');
-      assert.notEqual(await ground(), before);
+      assert.notEqual(await background(), before);
       await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
       await page.click('#copy-link');
       await page.waitForFunction(async () => (await navigator.clipboard.readText()) === location.href);
     }));
 
-  test('another data set is opened, and its name is in the address', () =>
+  test('choosing another data set opens it and changes the address', () =>
     withPage('', {}, async (page) => {
       await page.getByText('gyroid').click();
       await page.waitForFunction(() => window.intervale.live.dataset?.name === 'gyroid');
@@ -348,10 +349,10 @@ describe('Controls', () => {
     }));
 });
 
-describe('A server that is lost', () => {
-  test('is waited for, and the stream goes on with nothing sent twice', async () => {
+describe('After the server is lost', () => {
+  test('the page reconnects and resumes the stream without repeated updates', async () => {
     const first = await serve(data);
-    const port = await slowLine(first.port, 40_000);
+    const port = await throttledProxy(first.port, 40_000);
     const { page, close } = await open(browser, `http://127.0.0.1:${port}/#data=buckyball&roi=-100,-100,-100,100,100,100`);
     await page.waitForFunction(() => window.intervale.progress?.updates > 3000);
     await first.kill();
@@ -371,7 +372,7 @@ describe('A server that is lost', () => {
     await second.kill();
   });
 
-  test('that was never there is said in words, and found when it comes', async () => {
+  test('the banner explains it until a new server is found', async () => {
     const first = await serve(data);
     const { page, close } = await open(browser, first.url);
     await settled(page);
@@ -386,22 +387,22 @@ describe('A server that is lost', () => {
   });
 });
 
-test('A server that wants a token is told one, and it never stands in the address', async () => {
+test('A token that the server requires is requested from the user, and is never part of the address', async () => {
   const file = join(data, 'tokens');
   writeFileSync(file, 'open-sesame-0123456789abcdef0123456789abcdef buckyball\n', { mode: 0o600 });
   const guarded = await serve(data, 0, '--tokens', file);
   const { page, close } = await open(browser, guarded.url);
   await page.waitForSelector('#token-form');
-  assert.equal(await page.isVisible('#token-trouble'), false);
+  assert.equal(await page.isVisible('#token-error'), false);
   await page.fill('#token', 'open-simsim');
   await page.click('#token-form button[type=submit]');
-  await page.waitForSelector('#token-trouble');
-  assert.match(await page.textContent('#token-trouble'), /not known/);
+  await page.waitForSelector('#token-error');
+  assert.match(await page.textContent('#token-error'), /does not accept/);
   const selected = () => {
     const { activeElement: field } = document;
     return field.id === 'token' && field.selectionStart === 0 && field.selectionEnd === field.value.length;
   };
-  assert.ok(await page.evaluate(selected), 'typing again replaces it');
+  assert.ok(await page.evaluate(selected), 'the field is selected, so that typing replaces the token');
   await page.fill('#token', 'open-sesame-0123456789abcdef0123456789abcdef');
   await page.click('#token-form button[type=submit]');
   await settled(page);
@@ -426,7 +427,7 @@ describe('Sizes', () => {
         await page.locator('#save-glb').scrollIntoViewIfNeeded();
         const button = await page.locator('#save-glb').boundingBox();
         assert.ok(button.x >= 0 && button.x + button.width <= width && button.y + button.height <= height, JSON.stringify(button));
-        assert.ok(button.height >= 24, 'large enough to touch');
+        assert.ok(button.height >= 24, 'large enough for touch');
         await page.screenshot({ path: `${process.env.INTERVALE_WEB_OUT}/size-${name}.png` });
       }));
   }

@@ -1,21 +1,21 @@
-// window.intervale: the page's interface for tests and for pages that embed it. What is read is true at that moment; nothing may be changed but by
-// the functions.
-import type { Live } from './live';
+// window.intervale: the page's interface for tests and for embedding pages. Values are read-only (except longestBlock)
+// and current when they are read; changes are made through the functions.
 import type { Progress, Report, Request } from './messages';
 import type { ViewState } from './state';
+import type { Status } from './status';
 import type { Store } from './store';
 import type { Stats, Viewer } from './viewer';
 
 export interface Intervale {
-  readonly state: Readonly<ViewState>; // the view, as in the address; pose null: the whole data set
-  readonly live: Readonly<Live>; // connection, data sets, what failed
+  readonly state: Readonly<ViewState>; // the view, as in the address
+  readonly live: Readonly<Status>; // connection, data sets, errors
   readonly progress: Progress | null;
-  readonly stats: Stats; // longestBlock may be set to 0, to measure from then on
+  readonly stats: Stats; // longestBlock may be set to 0, which restarts its measurement
   readonly canvas: HTMLCanvasElement;
-  set(change: Partial<ViewState>): void; // as if chosen by hand
+  set(change: Partial<ViewState>): void; // as the controls do
   send(request: Request): void; // to the worker
-  next<T extends Report['type']>(type: T): Promise<Extract<Report, { type: T }>>; // the worker's next report of this type
-  photograph(): Promise<Blob | null>; // PNG of the canvas, without handles and guides
+  next<T extends Report['type']>(type: T): Promise<Extract<Report, { type: T }>>; // from the worker
+  photograph(): Promise<Blob | null>; // the canvas as PNG, without outlines
 }
 
 declare global {
@@ -27,16 +27,16 @@ declare global {
 export class Automation {
   private awaited: { type: string; resolve: (report: never) => void }[] = [];
 
-  expose(view: Store<ViewState>, live: Store<Live>, viewer: Viewer, send: (request: Request) => void): void {
+  expose(view: Store<ViewState>, status: Store<Status>, viewer: Viewer, send: (request: Request) => void): void {
     window.intervale = {
       get state() {
         return view.value;
       },
       get live() {
-        return live.value;
+        return status.value;
       },
       get progress() {
-        return live.value.progress;
+        return status.value.progress;
       },
       stats: viewer.stats,
       canvas: viewer.picture.canvas,
@@ -47,10 +47,11 @@ export class Automation {
     };
   }
 
-  reported(report: Report): void {
-    const met = this.awaited.filter(({ type }) => type === report.type);
-    if (met.length === 0) return;
+  // Resolves the promises of next() that wait for this report.
+  received(report: Report): void {
+    const resolved = this.awaited.filter(({ type }) => type === report.type);
+    if (resolved.length === 0) return;
     this.awaited = this.awaited.filter(({ type }) => type !== report.type);
-    for (const { resolve } of met) resolve(report as never);
+    for (const { resolve } of resolved) resolve(report as never);
   }
 }

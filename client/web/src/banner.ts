@@ -1,66 +1,70 @@
-// What is not as it should be, in words, over the picture: lost connections with the time to the next attempt, errors with a button to try again.
+// The banner over the picture: lost connections with the time to the next attempt, errors with a button to try again,
+// and notices.
 import { element, onClick, setText } from './dom';
-import type { Live } from './live';
+import type { Status } from './status';
 import type { Store } from './store';
 
-interface Said {
+interface Message {
   text: string;
   kind: 'bad' | 'warn' | 'good';
-  retry: boolean;
+  retry: boolean; // with a button to try again
 }
 
-const kResumedMs = 4000;
+const kResumedMs = 4000; // how long the notice of a reconnection is shown
 
-function said(live: Readonly<Live>, secondsLeft: number): Said | null {
-  if (live.trouble !== null) return { text: live.trouble, kind: 'bad', retry: true };
-  const { connection } = live;
+function messageOf(status: Readonly<Status>, secondsLeft: number): Message | null {
+  if (status.error !== null) return { text: status.error, kind: 'bad', retry: true };
+  const { connection } = status;
   if (connection.state === 'waiting') {
-    const when = secondsLeft > 0 ? `Connecting again in ${secondsLeft} s` : 'Connecting again';
-    return { text: `Connection lost: ${connection.reason.replace(/\.$/, '')}. ${when} (attempt ${connection.attempt}). What has come stays.`, kind: 'warn', retry: false };
+    const reason = connection.reason.replace(/\.$/, '');
+    const when = secondsLeft > 0 ? `Reconnecting in ${secondsLeft} s` : 'Reconnecting';
+    const text = `Connection lost: ${reason}. ${when} (attempt ${connection.attempt}). The mesh received so far is kept.`;
+    return { text, kind: 'warn', retry: false };
   }
-  if (connection.state === 'connecting' && live.progress) return { text: 'Connecting again…', kind: 'warn', retry: false };
-  if (live.notice !== null) return { text: live.notice, kind: 'good', retry: false };
+  if (connection.state === 'connecting' && status.progress) return { text: 'Reconnecting…', kind: 'warn', retry: false };
+  if (status.notice !== null) return { text: status.notice, kind: 'good', retry: false };
   return null;
 }
 
-export function watchBanner(live: Store<Live>, retry: () => void): void {
-  let due = 0; // when the next attempt is made
-  let ticker = 0;
+// retry: what the button does.
+export function watchBanner(status: Store<Status>, retry: () => void): void {
+  let due = 0; // of the next attempt, performance.now()
+  let countdown = 0; // timer
   let wasLost = false;
-  let last = live.value.connection;
-  let dismissed = '';
+  let last = status.value.connection;
+  let dismissed = ''; // text
   const show = () => {
-    const now = said(live.value, Math.ceil((due - performance.now()) / 1000));
-    element('banner').hidden = !now || now.text === dismissed;
-    if (!now) return;
-    element('banner').className = now.kind;
-    element('banner-text').setAttribute('aria-live', now.kind === 'bad' ? 'assertive' : 'polite');
-    setText(element('banner-text'), now.text);
-    element('retry').hidden = !now.retry;
+    const message = messageOf(status.value, Math.ceil((due - performance.now()) / 1000));
+    element('banner').hidden = !message || message.text === dismissed;
+    if (!message) return;
+    element('banner').className = message.kind;
+    element('banner-text').setAttribute('aria-live', message.kind === 'bad' ? 'assertive' : 'polite');
+    setText(element('banner-text'), message.text);
+    element('retry').hidden = !message.retry;
   };
-  live.watch(['connection', 'trouble', 'notice', 'progress'], ({ connection }) => {
+  status.watch(['connection', 'error', 'notice', 'progress'], ({ connection }) => {
     if (connection.state === 'waiting') {
       if (connection !== last) due = performance.now() + connection.seconds * 1000;
       wasLost = true;
-      if (ticker === 0) ticker = window.setInterval(show, 250);
+      if (countdown === 0) countdown = window.setInterval(show, 250);
     } else {
-      window.clearInterval(ticker);
-      ticker = 0;
+      window.clearInterval(countdown);
+      countdown = 0;
     }
     last = connection;
     show();
   });
-  live.watch(['opened'], ({ opened }) => {
+  status.watch(['opened'], ({ opened }) => {
     if (!wasLost) return;
     wasLost = false;
-    const notice = opened.resumed ? 'Connected again: the stream goes on where it was.' : 'Connected again: the stream begins anew.';
-    live.set({ notice });
-    window.setTimeout(() => live.value.notice === notice && live.set({ notice: null }), kResumedMs);
+    const notice = opened.resumed ? 'Reconnected: the stream was resumed.' : 'Reconnected: the stream was restarted.';
+    status.set({ notice });
+    window.setTimeout(() => status.value.notice === notice && status.set({ notice: null }), kResumedMs);
   });
   onClick('retry', retry);
   onClick('dismiss', () => {
     dismissed = element('banner-text').textContent ?? '';
-    if (live.value.notice !== null) live.set({ notice: null });
+    if (status.value.notice !== null) status.set({ notice: null });
     show();
   });
 }

@@ -1,7 +1,8 @@
-// Where one looks from, and how it moves: pure functions. A camera looks from eye to lookAt; up need not be perpendicular to that.
+// Cameras and how they move: pure functions, world coordinates. Pixels are CSS pixels of the canvas.
 import type { Box, Vec3 } from './messages';
-import { add, along, corners, cross, dot, length, middle, scale, sub, turned, unit } from './vec';
+import { add, along, center, corners, cross, dot, length, rotated, scale, sub, unit } from './vec';
 
+// A camera at eye that looks at lookAt; up need not be perpendicular to that direction.
 export interface Pose {
   eye: Vec3;
   lookAt: Vec3;
@@ -10,21 +11,21 @@ export interface Pose {
 }
 
 export const kFov = 30;
-const kFill = 0.94; // of the picture, by the box
+const kFill = 0.94; // fraction of the picture that fitted() lets the box fill
 
-// Right, up and back, perpendicular and of length 1.
+// The camera's axes: perpendicular, of length 1.
 export function axes(pose: Pose): { right: Vec3; up: Vec3; back: Vec3 } {
   const back = unit(sub(pose.eye, pose.lookAt));
-  const aside = cross(pose.up, back);
-  const right = unit(length(aside) > 1e-9 * length(pose.up) ? aside : cross([back[1], back[2], back[0]], back), [1, 0, 0]);
+  const side = cross(pose.up, back);
+  const right = unit(length(side) > 1e-9 * length(pose.up) ? side : cross([back[1], back[2], back[0]], back), [1, 0, 0]);
   return { right, up: cross(back, right), back };
 }
 
-// The whole box in the picture, seen from above one of its corners. aspect: width over height.
-export function fitted(box: Box, aspect: number, towards: Vec3 = [0.62, -1, 0.52]): Pose {
+// A camera that shows the whole box, seen from the direction `from`. aspect: width over height.
+export function fitted(box: Box, aspect: number, from: Vec3 = [0.62, -1, 0.52]): Pose {
   const half = Math.tan((kFov * Math.PI) / 360) * kFill;
-  const lookAt = middle(box);
-  const back = unit(towards);
+  const lookAt = center(box);
+  const back = unit(from);
   const pose: Pose = { eye: add(lookAt, back), lookAt, up: Math.abs(back[2]) > 0.99 ? [0, 1, 0] : [0, 0, 1], fov: kFov };
   const a = axes(pose);
   const distances = corners(box).map((corner) => {
@@ -34,42 +35,44 @@ export function fitted(box: Box, aspect: number, towards: Vec3 = [0.62, -1, 0.52
   return { ...pose, eye: along(lookAt, back, Math.max(...distances) || 1) };
 }
 
-// World units that one pixel is at the distance of lookAt.
+// World units per pixel at the distance of lookAt. height: of the canvas.
 export function unitsPerPixel(pose: Pose, height: number): number {
   return (2 * length(sub(pose.eye, pose.lookAt)) * Math.tan((pose.fov * Math.PI) / 360)) / Math.max(1, height);
 }
 
-// Turns about lookAt: by `right` radians about up, by `down` about what points to the right. Without poles: up turns too.
+// Rotates about lookAt: by `right` radians about up, by `down` radians about the right axis. up rotates too, so there
+// are no poles.
 export function orbited(pose: Pose, right: number, down: number): Pose {
   const a = axes(pose);
-  const spin = (v: Vec3): Vec3 => turned(turned(v, a.up, -right), a.right, -down);
-  return { ...pose, eye: add(pose.lookAt, spin(sub(pose.eye, pose.lookAt))), up: spin(a.up) };
+  const rotate = (v: Vec3): Vec3 => rotated(rotated(v, a.up, -right), a.right, -down);
+  return { ...pose, eye: add(pose.lookAt, rotate(sub(pose.eye, pose.lookAt))), up: rotate(a.up) };
 }
 
-// Rolls the picture, by the left hand seen from the eye.
+// Rotates about the direction of view, by radians; the scene turns clockwise.
 export function rolled(pose: Pose, angle: number): Pose {
   const a = axes(pose);
-  return { ...pose, up: turned(a.up, a.back, angle) };
+  return { ...pose, up: rotated(a.up, a.back, angle) };
 }
 
-// Moves the scene along with the picture, by pixels.
+// Moves the scene by pixels, right and down.
 export function panned(pose: Pose, right: number, down: number, height: number): Pose {
   const a = axes(pose);
-  const unitsHere = unitsPerPixel(pose, height);
-  const by = add(scale(a.right, -right * unitsHere), scale(a.up, down * unitsHere));
+  const perPixel = unitsPerPixel(pose, height);
+  const by = add(scale(a.right, -right * perPixel), scale(a.up, down * perPixel));
   return { ...pose, eye: add(pose.eye, by), lookAt: add(pose.lookAt, by) };
 }
 
-// Nearer by a factor (below 1) or farther. at: the point in the picture that stays, in pixels from the middle, right and down.
+// Scales the distance from lookAt by a factor (below 1: nearer). at: the point of the picture that does not move, in
+// pixels right and down from its centre.
 export function zoomed(pose: Pose, factor: number, at: [number, number], height: number): Pose {
   const a = axes(pose);
-  const unitsHere = unitsPerPixel(pose, height);
-  const fixed = add(pose.lookAt, add(scale(a.right, at[0] * unitsHere), scale(a.up, -at[1] * unitsHere)));
+  const perPixel = unitsPerPixel(pose, height);
+  const fixed = add(pose.lookAt, add(scale(a.right, at[0] * perPixel), scale(a.up, -at[1] * perPixel)));
   const lookAt = along(fixed, sub(pose.lookAt, fixed), factor);
   return { ...pose, lookAt, eye: along(lookAt, sub(pose.eye, pose.lookAt), factor) };
 }
 
-// A point in the picture: pixels right and down from the upper left corner, and its depth ahead of the eye (0 or less: behind).
+// A point in the picture: pixels from the upper left corner, and the depth in front of the eye (0 or less: behind it).
 export function projected(pose: Pose, p: Vec3, width: number, height: number): { x: number; y: number; depth: number } {
   const a = axes(pose);
   const d = sub(p, pose.eye);
@@ -83,4 +86,10 @@ export function rayThrough(pose: Pose, x: number, y: number, width: number, heig
   const a = axes(pose);
   const perPixel = (2 * Math.tan((pose.fov * Math.PI) / 360)) / height;
   return unit(add(scale(a.back, -1), add(scale(a.right, (x - width / 2) * perPixel), scale(a.up, (height / 2 - y) * perPixel))));
+}
+
+// v without its component along the direction of view.
+export function inViewPlane(pose: Pose, v: Vec3): Vec3 {
+  const a = axes(pose);
+  return add(scale(a.right, dot(a.right, v)), scale(a.up, dot(a.up, v)));
 }

@@ -1,38 +1,33 @@
-// The client core as a module: what bindings.cpp binds. Where it lies is said by INTERVALE_CORE_DIR when the page is built.
-declare module '@core/core.js' {
-  import type { Cap, Dataset, Plane, Box, Progress, Skin, Tets, View } from './messages';
+// The client core as the module '@core/core.js': what core/bindings.cpp binds. INTERVALE_CORE_DIR says where it is when
+// the page is built; tsconfig.json gives it these types.
+import type { Box, Cap, Dataset, Plane, Progress, Skin, Tets, View } from './messages';
 
-  // Texts say what went wrong; empty ones, that nothing did.
-  export interface Viewer {
-    look(view: View): string;
-    openedLine(milliseconds: number): void;
-    lostLine(): void;
-    inbox(bytes: number): Uint8Array; // to be filled with one message; valid until the next call of anything
-    receive(milliseconds: number): string; // what lies in the inbox
-    takeMessages(): ArrayBuffer[]; // to be sent, in order
-    wasOpened(): boolean; // of the last receive: the server opened the session
-    isFresh(): boolean; // ... and the mesh was begun afresh
-    faultCode(): number; // after a failure that the server told; else 1000
-    updates(): number;
-    done(): boolean;
-    dataset(): Dataset;
-    progress(): Omit<Progress, 'skin' | 'memory' | 'busy'>;
-    skin(edges: boolean, all: boolean): Omit<Skin, 'version'>;
-    isStale(): boolean; // the mesh may have changed since the last skin: the next two must not be called
-    cap(plane: Plane): Pick<Cap, 'vertices' | 'triangles'>;
-    tets(box: Box): Omit<Tets, 'box'>;
-    save(path: string): ArrayBuffer | string; // a file of the format that the path ends in; or why there is none
-    digest(): string;
-    delete(): void;
-  }
-  export interface Core {
-    Viewer: new (dataset: string) => Viewer;
-    HEAPU8: Uint8Array;
-  }
-  const createCore: (options: { locateFile: (path: string) => string }) => Promise<Core>;
-  export default createCore;
+// Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
+export interface Viewer {
+  look(view: View): string;
+  openedLine(now: number): void; // the WebSocket was opened
+  lostLine(): void; // ... or closed
+  inbox(bytes: number): Uint8Array; // to be filled with one message; valid until the next call of any function
+  receive(now: number): string; // handles the message in the inbox
+  takeMessages(): ArrayBuffer[]; // to be sent, in order
+  wasOpened(): boolean; // the last receive() opened the session
+  isFresh(): boolean; // ... and started a new mesh
+  faultCode(): number; // the close code of an error that the server reported; else 1000
+  updates(): number;
+  done(): boolean;
+  dataset(): Dataset;
+  progress(): Omit<Progress, 'skin' | 'memory' | 'busy'>;
+  skin(edges: boolean, all: boolean): Omit<Skin, 'version'>; // all: every piece, not only those that changed
+  isStale(): boolean; // the mesh may have changed since the last skin(): cap() and tets() must not be called
+  cap(plane: Plane): Pick<Cap, 'vertices' | 'triangles'>;
+  tets(box: Box): Omit<Tets, 'box'>;
+  save(path: string): ArrayBuffer | string; // the file, in the format of the path's extension; or an error
+  digest(): string;
+  delete(): void;
 }
-declare module '@core/core.wasm?url' {
-  const url: string;
-  export default url;
+export interface Core {
+  Viewer: new (dataset: string) => Viewer;
+  HEAPU8: Uint8Array;
 }
+declare const createCore: (options: { locateFile: (path: string) => string }) => Promise<Core>;
+export default createCore;

@@ -1,26 +1,27 @@
-// What the server has: GET api/datasets, beside the page.
-import type { Listed } from './live';
+// The list of the server's data sets: GET api/datasets, relative to the page.
 import type { Vec3 } from './messages';
+import type { ListedDataset } from './status';
 
-export type Listing = { datasets: Listed[] } | { needsToken: true } | { trouble: string };
+export type Listing = { datasets: ListedDataset[] } | { needsToken: true } | { error: string };
 
+// token: null if the user has given none.
 export async function listDatasets(token: string | null): Promise<Listing> {
   const url = new URL('api/datasets', document.baseURI);
   try {
-    const answer = await fetch(url, token === null ? {} : { headers: { Authorization: `Bearer ${token}` } });
-    if (answer.status === 401) return { needsToken: true };
-    if (answer.status === 503) return { trouble: 'The server is still reading what it has.' };
-    if (!answer.ok) return { trouble: `The server answers ${answer.status} when asked what it has.` };
-    const body: unknown = await answer.json();
+    const response = await fetch(url, token === null ? {} : { headers: { Authorization: `Bearer ${token}` } });
+    if (response.status === 401) return { needsToken: true };
+    if (response.status === 503) return { error: 'The server is still loading its data sets.' };
+    if (!response.ok) return { error: `The list of data sets was not received: the server responded with status ${response.status}.` };
+    const body: unknown = await response.json();
     const list = (body as { datasets?: unknown }).datasets;
-    if (!Array.isArray(list)) return { trouble: 'What the server says it has cannot be understood: it may be of another version than this page.' };
+    if (!Array.isArray(list)) return { error: 'The list of data sets cannot be read: the server may have another version than this page.' };
     return { datasets: list.map(parsed).filter((d) => d !== null) };
   } catch {
-    return { trouble: 'The server does not answer. It may have been stopped, or the network is down.' };
+    return { error: 'The server does not respond. It may be stopped, or the network may be down.' };
   }
 }
 
-// The address of the stream, beside the page.
+// The address of the WebSocket, relative to the page.
 export function streamUrl(): string {
   const url = new URL('v1/stream', document.baseURI);
   url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
@@ -31,7 +32,8 @@ export function streamUrl(): string {
 const number = (x: unknown): number => (x === 'inf' ? Infinity : x === '-inf' ? -Infinity : typeof x === 'number' ? x : 0);
 const vec = (x: unknown): Vec3 => (Array.isArray(x) && x.length === 3 ? [number(x[0]), number(x[1]), number(x[2])] : [0, 0, 0]);
 
-function parsed(entry: unknown): Listed | null {
+// null: not a data set.
+function parsed(entry: unknown): ListedDataset | null {
   const d = entry as Record<string, unknown>;
   if (typeof d?.['name'] !== 'string') return null;
   const full = (d['full'] ?? {}) as Record<string, unknown>;

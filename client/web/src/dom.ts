@@ -1,4 +1,4 @@
-// Elements of index.html by their ids. One that is missing is our own bug.
+// Elements of index.html by their ids. Throws if there is none: a defect of the page.
 export function element<T extends HTMLElement = HTMLElement>(id: string): T {
   const found = document.getElementById(id);
   if (!found) throw new Error(`index.html has no #${id}`);
@@ -11,7 +11,7 @@ export function onClick(id: string, run: () => void): void {
   element(id).addEventListener('click', run);
 }
 
-// Changes text only where it differs, or a screen reader says it again.
+// Leaves equal text alone: a screen reader would announce it again.
 export function setText(target: HTMLElement, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }

@@ -1,4 +1,4 @@
-// Numbers for people. Pure.
+// Numbers as text for the page. Pure functions.
 
 const kGrouped = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
 
@@ -7,13 +7,15 @@ export function count(n: number): string {
   return n < 1e6 ? kGrouped.format(n) : n < 1e9 ? `${short(n / 1e6)} million` : `${short(n / 1e9)} billion`;
 }
 
+// 12.3 MB: decimal units.
 export function bytes(n: number): string {
   if (n < 1000) return `${Math.round(n)} B`;
   const power = Math.min(3, Math.floor(Math.log10(n) / 3));
   return `${short(n / 10 ** (3 * power))} ${['', 'kB', 'MB', 'GB'][power]}`;
 }
 
-// Three digits, no more than are of use; infinities as signs.
+// Three significant digits; from 1,000 on, rounded to an integer; below 1e-3 and from 1e7 on, with an exponent; ±∞; ?
+// for NaN.
 export function short(x: number): string {
   if (!Number.isFinite(x)) return x > 0 ? '∞' : x < 0 ? '−∞' : '?';
   const size = Math.abs(x);
@@ -23,11 +25,11 @@ export function short(x: number): string {
 
 const signed = (text: string): string => text.replace(/^-/, '−');
 
-// A value and how far it may be off, with as many digits as that leaves meaningful: "123,400 ± 300".
+// A value and the bound of its error, with the digits that are significant: "123,400 ± 300". bound 0: the value only.
 export function bounded(value: number, bound: number): string {
   if (!(bound > 0)) return digits(value, 6);
-  const meaningful = value === 0 ? 1 : Math.ceil(Math.log10(Math.abs(value) / bound)) + 1;
-  return `${digits(value, Math.min(7, Math.max(1, meaningful)))} ± ${digits(bound, 1)}`;
+  const significant = value === 0 ? 1 : Math.ceil(Math.log10(Math.abs(value) / bound)) + 1;
+  return `${digits(value, Math.min(7, Math.max(1, significant)))} ± ${digits(bound, 1)}`;
 }
 
 function digits(x: number, n: number): string {
@@ -46,8 +48,8 @@ function superscript(n: number): string {
 
 const kRound = [1, 1.5, 2, 3, 4, 5, 6, 8, 10];
 
-// The next round number, no less than x, and above 0.
-export function roundAbove(x: number): number {
+// The least round number (kRound times a power of ten) that is not less than x. x: above 0.
+export function roundUp(x: number): number {
   const power = 10 ** Math.floor(Math.log10(x));
   return power * kRound.find((round) => x <= round * power * (1 + 1e-12))!;
 }

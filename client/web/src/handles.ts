@@ -1,20 +1,20 @@
-// Handles over the picture: buttons, so that they can be reached by Tab, moved by arrow keys and dragged by a finger.
+// Handles over the picture. They are buttons: reached by Tab, moved by arrow keys, dragged by pointer or touch.
 import { axes, type Pose, projected, unitsPerPixel } from './camera';
 import type { Vec3 } from './messages';
 import { add, dot, length, scale, sub } from './vec';
 
 export interface Handle {
   label: string;
-  icon?: string; // of index.html's symbols
-  at: () => Vec3 | null; // world; null: not there now
-  // by: how far it was dragged in the plane of the picture, in world units at the depth of the handle, from where the drag began.
-  drag: (by: Vec3, start: unknown) => void;
-  begin: () => unknown; // what drag gets as start
-  nudge: (right: number, up: number) => void; // by an arrow key: -1, 0 or 1; times 5 with Shift
+  icon?: string; // a symbol of index.html
+  position: () => Vec3 | null; // world coordinates; null: hidden
+  // A drag begins. Returns what follows it; by: since the drag began, in the view plane, in world units at the handle's
+  // depth.
+  grab: () => (by: Vec3) => void;
+  nudge: (right: number, up: number) => void; // by an arrow key: -1, 0 or 1 steps; 5 with Shift
 }
 
 export class Handles {
-  private placed: { button: HTMLButtonElement; handle: Handle }[] = [];
+  private items: { button: HTMLButtonElement; handle: Handle }[] = [];
 
   constructor(private layer: HTMLElement, private canvas: HTMLCanvasElement, private pose: () => Pose | null) {}
 
@@ -24,41 +24,42 @@ export class Handles {
     button.className = handle.icon ? 'handle large' : 'handle';
     button.setAttribute('aria-label', handle.label);
     button.title = handle.label;
-    button.hidden = true; // until it has a place
+    button.hidden = true; // until place()
     if (handle.icon) button.append(icon(handle.icon));
     this.layer.append(button);
-    this.placed.push({ button, handle });
+    this.items.push({ button, handle });
     this.watch(button, handle);
   }
 
-  // To be called whenever the camera or what the handles hold has changed.
+  // Positions the buttons. To be called whenever the camera or the position of a handle has changed.
   place(): void {
     const pose = this.pose();
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    for (const { button, handle } of this.placed) {
-      const at = pose && handle.at();
-      const spot = at ? projected(pose, at, width, height) : null;
-      const inside = spot !== null && spot.depth > 0 && spot.x > -20 && spot.y > -20 && spot.x < width + 20 && spot.y < height + 20;
-      if (button.hidden === inside) button.hidden = !inside;
-      if (inside) button.style.translate = `${spot.x.toFixed(1)}px ${spot.y.toFixed(1)}px`;
+    for (const { button, handle } of this.items) {
+      const position = pose && handle.position();
+      const at = position ? projected(pose, position, width, height) : null;
+      const isVisible = at !== null && at.depth > 0 && at.x > -20 && at.y > -20 && at.x < width + 20 && at.y < height + 20;
+      if (button.hidden === isVisible) button.hidden = !isVisible;
+      if (isVisible) button.style.translate = `${at.x.toFixed(1)}px ${at.y.toFixed(1)}px`;
     }
   }
 
   private watch(button: HTMLButtonElement, handle: Handle): void {
-    let start: { x: number; y: number; what: unknown; at: Vec3 } | null = null;
+    let start: { x: number; y: number; position: Vec3; drag: (by: Vec3) => void } | null = null;
     button.addEventListener('pointerdown', (event) => {
-      const at = handle.at();
-      if (event.button !== 0 || !at) return;
+      const position = handle.position();
+      if (event.button !== 0 || !position) return;
       button.setPointerCapture(event.pointerId);
-      start = { x: event.clientX, y: event.clientY, what: handle.begin(), at };
+      start = { x: event.clientX, y: event.clientY, position, drag: handle.grab() };
     });
     button.addEventListener('pointermove', (event) => {
       const pose = this.pose();
       if (!start || !pose) return;
       const a = axes(pose);
-      const depth = dot(scale(a.back, -1), sub(start.at, pose.eye)) / length(sub(pose.lookAt, pose.eye));
-      const unitsHere = unitsPerPixel(pose, this.canvas.clientHeight) * depth;
-      handle.drag(add(scale(a.right, (event.clientX - start.x) * unitsHere), scale(a.up, (start.y - event.clientY) * unitsHere)), start.what);
+      const depth = dot(scale(a.back, -1), sub(start.position, pose.eye)) / length(sub(pose.lookAt, pose.eye));
+      const perPixel = unitsPerPixel(pose, this.canvas.clientHeight) * depth;
+      const [right, up] = [(event.clientX - start.x) * perPixel, (start.y - event.clientY) * perPixel];
+      start.drag(add(scale(a.right, right), scale(a.up, up)));
     });
     const end = () => (start = null);
     button.addEventListener('pointerup', end);

@@ -1,25 +1,25 @@
-// Keys. Letters work wherever one is, but where text is typed; arrows, plus and minus only on the picture.
+// The keyboard. Letters work everywhere except in text fields; arrows, plus and minus only while the canvas has focus.
 import { orbited, panned, type Pose, zoomed } from './camera';
-import type { Movable } from './pointer';
+import type { CameraController } from './pointer';
 
 export interface Command {
   key: string; // upper case
-  does: string; // for people
+  description: string; // for the help
   run: () => void;
 }
 
-const kStep = Math.PI / 24;
-const kStepPixels = 40;
-const kZoomStep = 1.15;
+const kRotateStep = Math.PI / 24; // radians
+const kPanStep = 40; // pixels
+const kZoomStep = 1.15; // factor
 
 const kMoves: Record<string, { plain: (pose: Pose) => Pose; shifted: (pose: Pose, height: number) => Pose }> = {
-  ArrowLeft: { plain: (pose) => orbited(pose, -kStep, 0), shifted: (pose, height) => panned(pose, -kStepPixels, 0, height) },
-  ArrowRight: { plain: (pose) => orbited(pose, kStep, 0), shifted: (pose, height) => panned(pose, kStepPixels, 0, height) },
-  ArrowUp: { plain: (pose) => orbited(pose, 0, -kStep), shifted: (pose, height) => panned(pose, 0, -kStepPixels, height) },
-  ArrowDown: { plain: (pose) => orbited(pose, 0, kStep), shifted: (pose, height) => panned(pose, 0, kStepPixels, height) },
+  ArrowLeft: { plain: (pose) => orbited(pose, -kRotateStep, 0), shifted: (pose, height) => panned(pose, -kPanStep, 0, height) },
+  ArrowRight: { plain: (pose) => orbited(pose, kRotateStep, 0), shifted: (pose, height) => panned(pose, kPanStep, 0, height) },
+  ArrowUp: { plain: (pose) => orbited(pose, 0, -kRotateStep), shifted: (pose, height) => panned(pose, 0, -kPanStep, height) },
+  ArrowDown: { plain: (pose) => orbited(pose, 0, kRotateStep), shifted: (pose, height) => panned(pose, 0, kPanStep, height) },
 };
 
-export function watchKeys(canvas: HTMLCanvasElement, movable: Movable, commands: Command[]): void {
+export function watchKeys(canvas: HTMLCanvasElement, controller: CameraController, commands: Command[]): void {
   const zoom = (factor: number) => (pose: Pose, height: number) => zoomed(pose, factor, [0, 0], height);
 
   canvas.addEventListener('keydown', (event) => {
@@ -34,10 +34,10 @@ export function watchKeys(canvas: HTMLCanvasElement, movable: Movable, commands:
         : event.key === '-' || event.key === '_'
           ? zoom(kZoomStep)
           : null;
-    const pose = movable.pose();
+    const pose = controller.pose();
     if (!change || !pose) return;
     event.preventDefault();
-    movable.move(change(pose, canvas.clientHeight));
+    controller.move(change(pose, canvas.clientHeight));
   });
 
   document.addEventListener('keydown', (event) => {
@@ -51,18 +51,18 @@ export function watchKeys(canvas: HTMLCanvasElement, movable: Movable, commands:
   });
 }
 
-// The list of all keys, for the help.
+// Fills the help's list of keys.
 export function listKeys(list: HTMLElement, commands: Command[]): void {
   const rows: [string[], string][] = [
-    [['←', '→', '↑', '↓'], 'Turn'],
-    [['Shift', '←', '→', '↑', '↓'], 'Move'],
+    [['←', '→', '↑', '↓'], 'Rotate'],
+    [['Shift', '←', '→', '↑', '↓'], 'Pan'],
     [['+', '−'], 'Zoom'],
-    ...commands.map(({ key, does }): [string[], string] => [[key], does]),
-    [['Tab'], 'To the next control or handle'],
+    ...commands.map(({ key, description }): [string[], string] => [[key], description]),
+    [['Tab'], 'Next control or handle'],
   ];
-  for (const [keys, does] of rows) {
+  for (const [keys, description] of rows) {
     const term = document.createElement('dt');
     term.append(...keys.map((key) => Object.assign(document.createElement('kbd'), { textContent: key })));
-    list.append(term, Object.assign(document.createElement('dd'), { textContent: does }));
+    list.append(term, Object.assign(document.createElement('dd'), { textContent: description }));
   }
 }

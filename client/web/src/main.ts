@@ -1,4 +1,4 @@
-// The page: joins what is seen, what is chosen and what the worker says.
+// The page: connects the controls, the view's state, the worker and the picture.
 import { Automation } from './automation';
 import { showAxes } from './axes';
 import { watchBanner } from './banner';
@@ -8,173 +8,209 @@ import { element, input, onClick } from './dom';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
 import { showLegend } from './legend';
-import { kNothingYet, type Listed, type Live } from './live';
-import type { View } from './messages';
 import { watchPanel } from './panel';
-import { type Movable, watchPointers } from './pointer';
+import { type CameraController, watchPointers } from './pointer';
 import { watchProgress } from './progress';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
-import { Session, updatesIn } from './session';
 import { fromHash, toHash, type ViewState } from './state';
+import { kInitialStatus, type ListedDataset, type Status } from './status';
 import { Store } from './store';
 import { watchTheme } from './theme';
 import { Viewer } from './viewer';
+import { updatesIn, type Wanted, WorkerClient } from './worker_client';
 
-const kPictureLost = 'The graphics card has dropped the picture; it comes back as soon as the browser lets it. The mesh is still here.';
-const kHashMs = 300; // after the last change
+const kNoWebGl = 'The viewer needs WebGL 2, which this browser does not provide: it may be outdated, or hardware acceleration may be disabled.';
+const kContextLost = 'The WebGL context was lost. The picture returns when the browser restores the context; the mesh is kept.';
+const kHashDelayMs = 300; // after the last change of the view
 
 const view = new Store<ViewState>(fromHash(location.hash));
-const live = new Store<Live>(kNothingYet);
-const automation = new Automation();
+const status = new Store<Status>(kInitialStatus);
 
-function start(): void {
-  const canvas = element<HTMLCanvasElement>('canvas');
-  let viewer: Viewer;
-  // First what takes its time elsewhere: the worker loads its core while this thread makes ready to draw.
-  const session = new Session(live, {
-    skin: (skin) => viewer.takeSkin(skin),
-    cap: (cap) => viewer.takeCap(cap),
-    tets: (tets) => viewer.takeTets(tets),
-    saved: downloadMesh,
-    other: (report) => automation.reported(report),
-  });
-  const firstListing = listDatasets(null);
-  try {
-    viewer = new Viewer(canvas, view);
-  } catch {
-    session.end();
-    live.set({ trouble: 'This browser does not draw with WebGL 2, which the picture needs: it may be old, or drawing by the graphics card switched off.' });
-    return;
+class Page {
+  private readonly canvas = element<HTMLCanvasElement>('canvas');
+  private readonly handles: Handles;
+  private readonly clip: ClipControls;
+  private readonly region: RegionControls;
+
+  constructor(private readonly viewer: Viewer, private readonly worker: WorkerClient) {
+    const pose = () => viewer.pose();
+    const frame = () => viewer.frame;
+    this.handles = new Handles(element('handles'), this.canvas, pose);
+    this.clip = new ClipControls(view, frame, pose, this.handles);
+    this.region = new RegionControls(view, frame, pose, this.handles);
+    this.watchViewer();
+    view.watch([], (value) => {
+      const chosen = value.dataset !== status.value.dataset?.name && status.value.datasets?.find(({ name }) => name === value.dataset);
+      if (chosen) this.open(chosen);
+      else this.updateWorker();
+    });
+    this.watchControls();
+    watchAddress();
   }
-  automation.expose(view, live, viewer, (request) => session.send(request));
 
-  const movable: Movable = {
-    pose: () => viewer.pose(),
-    move: (pose) => view.set({ pose }),
-    centre: (x, y) => viewer.centre(x, y),
-  };
-  const handles = new Handles(element('handles'), canvas, () => viewer.pose());
-  const clip = new ClipControls(view, () => viewer.frame, () => viewer.pose(), handles);
-  const region = new RegionControls(view, () => viewer.frame, () => viewer.pose(), handles);
-
-  const wanted = (): View | null => {
-    const pose = viewer.pose();
-    if (!pose) return null;
-    const { pixelError, region: box, maxTets, memory } = view.value;
-    return { camera: { ...pose, viewport: [canvas.width, canvas.height] }, pixelError, region: box, maxTets, maxUpdates: updatesIn(memory) };
-  };
-  const tetsBox = () => (view.value.tets ? view.value.region : null);
-  const ask = () => {
-    const now = wanted();
-    if (!now || !live.value.dataset) return;
-    session.setView(now);
-    session.setPlane(view.value.clip);
-    session.setTetsBox(tetsBox());
-    session.setEdges(view.value.wireframe);
-  };
-  const open = (dataset: Listed) => {
-    live.set({ dataset, skinVersion: 0 });
-    viewer.open(dataset);
-    clip.opened();
-    region.opened();
-    view.set({ dataset: dataset.name });
-    const now = wanted();
-    if (now) session.open(dataset.name, { view: now, plane: view.value.clip, tetsBox: tetsBox(), edges: view.value.wireframe });
-  };
-
-  viewer.onShown = (version) => {
-    session.send({ type: 'shown', version });
-    live.set({ skinVersion: version });
-  };
-  viewer.onResize = ask;
-  viewer.onContext = (lost) => live.set({ notice: lost ? kPictureLost : null });
-  viewer.onDrawn = () => {
-    const pose = viewer.pose();
-    if (pose) showAxes(element('axes') as unknown as Element, pose);
-    handles.place();
-    showLegend(view.value, viewer.picture.thickness.most);
-  };
-
-  const load = async (asked = listDatasets(live.value.token)) => {
-    live.set({ trouble: null });
-    const listing = await asked;
+  // Opens the data set that the address names, or else the first.
+  async load(request = listDatasets(status.value.token)): Promise<void> {
+    status.set({ error: null });
+    const listing = await request;
     element('token-form').hidden = !('needsToken' in listing);
     if ('needsToken' in listing) {
-      element('token-trouble').hidden = live.value.token === null;
+      element('token-error').hidden = status.value.token === null;
       input('token').focus();
       input('token').select();
-      return live.set({ needsToken: true });
+      return status.set({ needsToken: true });
     }
-    if ('trouble' in listing) return live.set({ trouble: listing.trouble });
-    live.set({ datasets: listing.datasets, needsToken: false });
+    if ('error' in listing) return status.set({ error: listing.error });
+    status.set({ datasets: listing.datasets, needsToken: false });
     const { dataset: name } = view.value;
-    const chosen = name === null ? listing.datasets[0] : listing.datasets.find((one) => one.name === name);
-    if (chosen) open(chosen);
-    else if (name !== null) live.set({ trouble: `The address asks for “${name}”, which this server does not have. Choose another.` });
-  };
+    const chosen = name === null ? listing.datasets[0] : listing.datasets.find((dataset) => dataset.name === name);
+    if (chosen) this.open(chosen);
+    else if (name !== null) status.set({ error: `The server has no data set “${name}”, which the address names. Choose another.` });
+  }
 
-  view.watch([], (value) => {
-    const other = value.dataset !== live.value.dataset?.name && live.value.datasets?.find((one) => one.name === value.dataset);
-    if (other) open(other);
-    else ask();
-  });
+  private watchViewer(): void {
+    const { viewer } = this;
+    viewer.onShown = (version) => {
+      this.worker.send({ type: 'shown', version });
+      status.set({ skinVersion: version });
+    };
+    viewer.onResize = () => this.updateWorker();
+    viewer.onContext = (isLost) => status.set({ notice: isLost ? kContextLost : null });
+    viewer.onDrawn = () => {
+      const pose = viewer.pose();
+      if (pose) showAxes(element('axes') as unknown as Element, pose);
+      this.handles.place();
+      showLegend(view.value, viewer.picture.thickness.maximum);
+    };
+  }
 
-  const reset = () => view.set({ pose: null });
-  const fullScreen = () => void (document.fullscreenElement ? document.exitFullscreen() : element('stage').requestFullscreen()).catch(() => {});
-  const help = () => element<HTMLDialogElement>('help-dialog').showModal();
-  const flip = (name: 'wireframe' | 'levels' | 'thickness') => () => {
-    if (!input(name).disabled) view.set({ [name]: !view.value[name] });
-  };
-  const commands: Command[] = [
-    { key: 'R', does: 'Reset the view', run: reset },
-    { key: 'F', does: 'Full screen', run: fullScreen },
-    { key: 'C', does: 'Clip plane', run: () => clip.toggle() },
-    { key: 'G', does: 'Region, refined to the end', run: () => region.toggle() },
-    { key: 'S', does: 'Shrunken tetrahedra', run: () => region.toggleTets() },
-    { key: 'T', does: 'Thickness', run: flip('thickness') },
-    { key: 'W', does: 'Wireframe', run: flip('wireframe') },
-    { key: 'L', does: 'Colour by level of detail', run: flip('levels') },
-    { key: 'H', does: 'This help', run: help },
-  ];
-  onClick('reset', reset);
-  onClick('fullscreen', fullScreen);
-  onClick('help', help);
-  listKeys(element('keys'), commands);
-  watchKeys(canvas, movable, commands);
-  watchPointers(canvas, movable);
-  watchPanel(view, live);
-  watchSaving(live, (request) => session.send(request), () => viewer.photograph());
-  watchTheme(() => {
-    viewer.picture.setBackground(getComputedStyle(element('stage')).backgroundColor);
-    viewer.picture.guides.setInkOf(getComputedStyle(element('handles')).color);
-    viewer.changed();
-  });
-  const { trouble } = viewer.picture.thickness;
-  element('thickness-note').hidden = trouble === null;
-  element('thickness-note').textContent = trouble;
-  input('thickness').disabled = !viewer.picture.thickness.possible;
+  private watchControls(): void {
+    const { viewer, canvas } = this;
+    const controller: CameraController = {
+      pose: () => viewer.pose(),
+      move: (pose) => view.set({ pose }),
+      centerOn: (x, y) => viewer.centerOn(x, y),
+    };
+    const commands = this.commands();
+    listKeys(element('keys'), commands);
+    watchKeys(canvas, controller, commands);
+    watchPointers(canvas, controller);
+    onClick('reset', resetView);
+    onClick('fullscreen', toggleFullScreen);
+    onClick('help', showHelp);
+    watchPanel(view, status);
+    watchSaving(status, (request) => this.worker.send(request), () => viewer.photograph());
+    watchTheme(() => {
+      viewer.picture.setBackground(getComputedStyle(element('stage')).backgroundColor);
+      viewer.picture.outlines.setColor(getComputedStyle(element('handles')).color);
+      viewer.invalidate();
+    });
+    const { limitation, isAvailable } = viewer.picture.thickness;
+    element('thickness-note').hidden = limitation === null;
+    element('thickness-note').textContent = limitation;
+    input('thickness').disabled = !isAvailable;
+    element('token-form').addEventListener('submit', (event) => {
+      event.preventDefault();
+      element('token-error').hidden = true;
+      status.set({ token: input('token').value });
+      void this.load();
+    });
+    watchBanner(status, () => {
+      const { dataset, datasets } = status.value;
+      if (dataset && datasets) this.open(dataset);
+      else void this.load();
+    });
+  }
 
-  element('token-form').addEventListener('submit', (event) => {
-    event.preventDefault();
-    element('token-trouble').hidden = true;
-    live.set({ token: input('token').value });
-    void load();
-  });
-  watchBanner(live, () => (live.value.dataset && live.value.datasets ? open(live.value.dataset) : void load()));
-  keepAddress();
-  void load(firstListing);
+  private commands(): Command[] {
+    return [
+      { key: 'R', description: 'Reset the view', run: resetView },
+      { key: 'F', description: 'Full screen', run: toggleFullScreen },
+      { key: 'C', description: 'Clip plane', run: () => this.clip.toggle() },
+      { key: 'G', description: 'Region at full detail', run: () => this.region.toggle() },
+      { key: 'S', description: 'Shrunken tetrahedra', run: () => this.region.toggleTets() },
+      { key: 'T', description: 'Thickness', run: () => toggle('thickness') },
+      { key: 'W', description: 'Wireframe', run: () => toggle('wireframe') },
+      { key: 'L', description: 'Colour by level of detail', run: () => toggle('levels') },
+      { key: 'H', description: 'This help', run: showHelp },
+    ];
+  }
+
+  // null: no data set is open.
+  private wanted(): Wanted | null {
+    const pose = this.viewer.pose();
+    if (!pose) return null;
+    const { pixelError, region, maxTets, memory, clip, tets, wireframe } = view.value;
+    const viewport: [number, number] = [this.canvas.width, this.canvas.height];
+    return {
+      view: { camera: { ...pose, viewport }, pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
+      plane: clip,
+      tetsBox: tets ? region : null,
+      edges: wireframe,
+    };
+  }
+
+  private updateWorker(): void {
+    const wanted = this.wanted();
+    if (wanted && status.value.dataset) this.worker.update(wanted);
+  }
+
+  private open(dataset: ListedDataset): void {
+    status.set({ dataset, skinVersion: 0 });
+    this.viewer.open(dataset);
+    this.clip.opened();
+    this.region.opened();
+    view.set({ dataset: dataset.name });
+    const wanted = this.wanted();
+    if (wanted) this.worker.open(dataset.name, wanted);
+  }
 }
 
-// The address follows the view, and the view an address that is typed.
-function keepAddress(): void {
+const resetView = () => view.set({ pose: null });
+
+function toggleFullScreen(): void {
+  const done = document.fullscreenElement ? document.exitFullscreen() : element('stage').requestFullscreen();
+  done.catch(() => {}); // the browser may refuse
+}
+
+const showHelp = () => element<HTMLDialogElement>('help-dialog').showModal();
+
+function toggle(name: 'wireframe' | 'levels' | 'thickness'): void {
+  if (!input(name).disabled) view.set({ [name]: !view.value[name] });
+}
+
+// The address follows the view, and the view follows an address that the user enters.
+function watchAddress(): void {
   let timer = 0;
   view.watch([], (value) => {
     window.clearTimeout(timer);
-    timer = window.setTimeout(() => history.replaceState(null, '', toHash(value) || location.pathname + location.search), kHashMs);
+    timer = window.setTimeout(() => history.replaceState(null, '', toHash(value) || location.pathname + location.search), kHashDelayMs);
   });
   window.addEventListener('hashchange', () => view.set(fromHash(location.hash)));
 }
 
-watchProgress(live);
+function start(): void {
+  watchProgress(status);
+  const automation = new Automation();
+  let viewer: Viewer;
+  // First the worker: it loads the core while this thread prepares to draw.
+  const worker = new WorkerClient(status, {
+    skin: (skin) => viewer.takeSkin(skin),
+    cap: (cap) => viewer.takeCap(cap),
+    tets: (tets) => viewer.takeTets(tets),
+    saved: downloadMesh,
+    any: (report) => automation.received(report),
+  });
+  const listing = listDatasets(null);
+  try {
+    viewer = new Viewer(element<HTMLCanvasElement>('canvas'), view);
+  } catch {
+    worker.terminate();
+    status.set({ error: kNoWebGl });
+    return;
+  }
+  automation.expose(view, status, viewer, (request) => worker.send(request));
+  void new Page(viewer, worker).load(listing);
+}
+
 start();

@@ -20,45 +20,49 @@ import {
 import * as shaders from './shaders';
 import { kSurfaces, type Look, type SurfaceName } from './state';
 
-// One object for all materials: what is set here holds for each of them.
+// All materials refer to these objects: a value set here holds for each of them. Positions are in drawing space.
 export const shared = {
   spacing: { value: new Vector3(1, 1, 1) },
   shift: { value: new Vector3() },
-  clip: { value: new Vector4(0, 0, 0, 0) }, // in drawing space
+  clip: { value: new Vector4(0, 0, 0, 0) },
   hiddenMin: { value: new Vector3(1, 1, 1) },
   hiddenMax: { value: new Vector3(-1, -1, -1) },
-  byLevel: { value: 0 },
-  levels: { value: 1 },
-  depths: { value: new Vector2(0, 1) },
+  colorByLevel: { value: 0 },
+  coarsestLevel: { value: 1 },
+  depthRange: { value: new Vector2(0, 1) },
   shrink: { value: 0.8 },
-  pixelScale: { value: 1 }, // pixels of one unit across, one unit ahead
-  outline: { value: 0.4 },
+  pixelScale: { value: 1 }, // pixels per unit of length, at one unit from the eye
+  edgeWidth: { value: 0.4 },
   alpha: { value: new Vector3() },
   beta: { value: new Vector3() },
   box: { value: new Vector3() },
 };
 
-function material(vertexShader: string, fragmentShader: string, own: Record<string, IUniform>, more: ShaderMaterialParameters = {}): RawShaderMaterial {
+type Uniforms = Record<string, IUniform>;
+type Parameters = ShaderMaterialParameters;
+
+function material(vertexShader: string, fragmentShader: string, uniforms: Uniforms, parameters: Parameters = {}): RawShaderMaterial {
   return new RawShaderMaterial({
     glslVersion: GLSL3,
     vertexShader,
     fragmentShader,
-    uniforms: { ...shared, ...own },
+    uniforms: { ...shared, ...uniforms },
     side: DoubleSide,
     blending: NoBlending,
-    ...more,
+    ...parameters,
   });
 }
 
-// For each of the three surfaces.
+// Each array has one material per surface, in the order of kSurfaces.
 export interface SurfaceMaterials {
-  solid: RawShaderMaterial[];
-  depth: RawShaderMaterial[]; // where the solid ones are, for what shines through
-  veil: RawShaderMaterial[];
+  opaque: RawShaderMaterial[];
+  depth: RawShaderMaterial[]; // opaque surfaces, depth only: what transparent ones are tested against
+  transparent: RawShaderMaterial[];
   edges: RawShaderMaterial[];
 }
 
-const kVeilBlending: ShaderMaterialParameters = {
+// See kTransparentFragment.
+const kAccumulation: Parameters = {
   blending: CustomBlending,
   blendEquation: AddEquation,
   blendSrc: OneFactor,
@@ -69,19 +73,7 @@ const kVeilBlending: ShaderMaterialParameters = {
   transparent: true,
 };
 
-export function surfaceMaterials(): SurfaceMaterials {
-  const each = (make: (color: IUniform, opacity: IUniform) => RawShaderMaterial) => kSurfaces.map((name) => make(shared[name], opacities[name]));
-  const opacities: Record<SurfaceName, IUniform> = { alpha: { value: 1 }, beta: { value: 1 }, box: { value: 1 } };
-  const solid = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
-  return {
-    solid: each((color) => material(shaders.kSkinVertex, shaders.kSkinFragment, { color }, solid)),
-    depth: each((color, opacity) => material(shaders.kSkinVertex, shaders.kVeilFragment, { color, opacity }, { ...solid, colorWrite: false })),
-    veil: each((color, opacity) => material(shaders.kSkinVertex, shaders.kVeilFragment, { color, opacity }, kVeilBlending)),
-    edges: each(() => material(shaders.kSkinVertex, shaders.kEdgeFragment, { ink: { value: new Vector4(0, 0, 0, 0.5) } }, kOver)),
-  };
-}
-
-const kOver: ShaderMaterialParameters = {
+const kAlphaBlending: Parameters = {
   blending: CustomBlending,
   blendEquation: AddEquation,
   blendSrc: SrcAlphaFactor,
@@ -91,39 +83,63 @@ const kOver: ShaderMaterialParameters = {
   depthWrite: false,
 };
 
+// Without depth test: hidden layers are added, too.
+const kAdditive: Parameters = {
+  blending: CustomBlending,
+  blendEquation: AddEquation,
+  blendSrc: OneFactor,
+  blendDst: OneFactor,
+  depthTest: false,
+  depthWrite: false,
+};
+
+export function surfaceMaterials(): SurfaceMaterials {
+  const opacities: Record<SurfaceName, IUniform> = { alpha: { value: 1 }, beta: { value: 1 }, box: { value: 1 } };
+  const each = (fragment: string, uniforms: (name: SurfaceName) => Uniforms, parameters: Parameters) =>
+    kSurfaces.map((name) => material(shaders.kSkinVertex, fragment, uniforms(name), parameters));
+  const colorOf = (name: SurfaceName) => ({ color: shared[name] });
+  const colorAndOpacityOf = (name: SurfaceName) => ({ color: shared[name], opacity: opacities[name] });
+  const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }; // lets edges lie in front
+  return {
+    opaque: each(shaders.kOpaqueFragment, colorOf, offset),
+    depth: each(shaders.kTransparentFragment, colorAndOpacityOf, { ...offset, colorWrite: false }),
+    transparent: each(shaders.kTransparentFragment, colorAndOpacityOf, kAccumulation),
+    edges: each(shaders.kEdgeFragment, () => ({ lineColor: { value: new Vector4(0, 0, 0, 0.5) } }), kAlphaBlending),
+  };
+}
+
+// Applies colours and opacities, and decides which material of each surface is visible.
 export function setLooks(materials: SurfaceMaterials, looks: Record<SurfaceName, Look>): void {
   kSurfaces.forEach((name, i) => {
     const { color, opacity } = looks[name];
-    const { r, g, b } = new Color().setStyle(color, ''); // as it is written: the shaders make it linear
+    const { r, g, b } = new Color().setStyle(color, ''); // without conversion: the shaders make it linear
     shared[name].value.set(r, g, b);
-    const solid = opacity > 0.995;
-    materials.solid[i]!.visible = materials.depth[i]!.visible = solid;
-    materials.veil[i]!.visible = !solid && opacity > 0.005;
-    materials.veil[i]!.uniforms['opacity']!.value = opacity;
+    const opaque = opacity > 0.995;
+    materials.opaque[i]!.visible = materials.depth[i]!.visible = opaque;
+    materials.transparent[i]!.visible = !opaque && opacity > 0.005;
+    materials.transparent[i]!.uniforms['opacity']!.value = opacity;
     materials.edges[i]!.visible = opacity > 0.005;
-    materials.edges[i]!.uniforms['ink']!.value.set(r * 0.25, g * 0.25, b * 0.25, solid ? 0.75 : 0.15 + 0.4 * opacity);
+    materials.edges[i]!.uniforms['lineColor']!.value.set(r * 0.25, g * 0.25, b * 0.25, opaque ? 0.75 : 0.15 + 0.4 * opacity);
   });
 }
 
+const kDepthOnly: Parameters = { colorWrite: false };
 export const capMaterial = () => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box });
-export const capDepthMaterial = () => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box }, { colorWrite: false });
+export const capDepthMaterial = () => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box }, kDepthOnly);
 export const tetsMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {});
-export const tetsDepthMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {}, { colorWrite: false });
+export const tetsDepthMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {}, kDepthOnly);
 
-// depthTest off: every layer counts.
-export function thicknessMaterial(capFacing: number): RawShaderMaterial {
-  const adding: ShaderMaterialParameters = { blending: CustomBlending, blendEquation: AddEquation, blendSrc: OneFactor, blendDst: OneFactor };
-  return material(shaders.kSkinVertex, shaders.kThicknessFragment, { capFacing: { value: capFacing } }, { ...adding, depthTest: false, depthWrite: false });
-}
+// capFacing: see kThicknessFragment.
+export const thicknessMaterial = (capFacing: -1 | 0 | 1) =>
+  material(shaders.kSkinVertex, shaders.kThicknessFragment, { capFacing: { value: capFacing } }, kAdditive);
 
-export function overMaterial(fragment: string, own: Record<string, IUniform>): RawShaderMaterial {
-  return material(shaders.kFullScreenVertex, fragment, own, { ...kOver, depthTest: false });
-}
+// For a full-screen pass that is blended over the picture.
+export const compositeMaterial = (fragment: string, uniforms: Uniforms) =>
+  material(shaders.kFullScreenVertex, fragment, uniforms, { ...kAlphaBlending, depthTest: false });
 
-export function lineMaterial(depthTest: boolean, opacity: number): RawShaderMaterial {
-  return material(shaders.kLineVertex, shaders.kLineFragment, { ink: { value: new Vector4(1, 1, 1, opacity) } }, { ...kOver, depthTest });
-}
+// opacity: 0 to 1.
+export const lineMaterial = (depthTest: boolean, opacity: number) =>
+  material(shaders.kLineVertex, shaders.kLineFragment, { lineColor: { value: new Vector4(1, 1, 1, opacity) } }, { ...kAlphaBlending, depthTest });
 
 export const distanceMaterial = () => material(shaders.kSkinVertex, shaders.kDistanceFragment, {});
-
-export const stagingMaterial = () => material(shaders.kStagingVertex, shaders.kStagingFragment, {});
+export const uploadMaterial = () => material(shaders.kUploadVertex, shaders.kUploadFragment, {});

@@ -1,7 +1,8 @@
-// What the page and the worker say to each other. The worker holds the connection, the client core and the mesh; the page draws and asks.
+// The messages between the page and its worker. The worker holds the connection, the client core and the mesh; the page
+// draws.
 //
-// Positions are in samples (0 at the first, dims - 1 at the last) unless said otherwise, so that 32 bits hold them exactly; world = origin + spacing *
-// position. Cameras, planes and boxes are in world coordinates.
+// Positions are in samples (0 at the first, dims - 1 at the last) unless said otherwise, so that float32 is precise
+// enough; world = origin + spacing * position. Cameras, planes and boxes are in world coordinates.
 
 export type Vec3 = [number, number, number];
 
@@ -15,7 +16,7 @@ export interface Camera {
   lookAt: Vec3;
   up: Vec3;
   fov: number; // vertical, degrees
-  viewport: [number, number]; // pixels of the drawing buffer
+  viewport: [number, number]; // device pixels
 }
 
 // What lies on the normal's side, dot(normal, p) > offset, is cut away. normal: of length 1.
@@ -26,119 +27,121 @@ export interface Plane {
 
 export interface Dataset {
   name: string;
-  dims: Vec3;
+  dims: Vec3; // samples
   spacing: Vec3;
   origin: Vec3;
-  range: [number, number]; // may be infinite
-  maxError: number; // field units
-  updates: number; // in all
+  range: [number, number]; // closed, field units; may be infinite
+  maxError: number; // of the coarsest mesh, field units
+  updates: number; // of the full mesh
   fullTets: number;
   fullVertices: number;
 }
 
 // From the page to the worker.
 export type Request =
-  // Connects and streams; what was open before is closed. url: of the WebSocket, "ws://host:port/v1/stream".
+  // Connects and streams; an open session is closed first. url: of the WebSocket, "ws://host:port/v1/stream".
   | { type: 'open'; url: string; dataset: string; token?: string }
-  // What is wanted from now on. A region is refined to the end; without one, everything until it is off by no more than pixelError on the camera's
-  // screen. Where nothing has been opened yet it is what is asked for first.
+  // The view that is wanted from now on. With a region: that at full detail. Without: everything, until the error is at
+  // most pixelError on the camera's screen. Before the first 'open': the view that the session starts with.
   | { type: 'view'; view: View }
-  | { type: 'clip'; plane: Plane | null } // each answered by a Cap, the last one asked for first; those between may be left out
-  | { type: 'tets'; box: Box | null } // tetrahedra wanted in this box, from now on after each change of the mesh
-  | { type: 'edges'; wanted: boolean } // whether pieces come with their edges
-  | { type: 'shown'; version: number } // the page shows this skin; the next one is made only then
+  // Each is answered by a Cap; if a new one arrives before the answer, only the last is answered.
+  | { type: 'clip'; plane: Plane | null }
+  | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
+  | { type: 'edges'; wanted: boolean } // whether pieces have edges
+  | { type: 'shown'; version: number } // the page shows this version of the skin, so the next may be made
   | { type: 'save'; format: 'vtu' | 'stl' | 'glb' }
-  | { type: 'digest' } // asks for a Digest
+  | { type: 'digest' } // answered by a report of the same type
   | { type: 'close' };
 
 export interface View {
   camera: Camera;
-  pixelError: number; // above 0
+  pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null;
-  maxTets: number | null; // of the mesh
-  maxUpdates: number | null; // kept in memory; some 30 bytes each on the server's side of the fence, see Progress.memory for here
+  maxTets: number | null; // in the mesh; null: no limit
+  maxUpdates: number | null; // kept in memory, about 30 bytes each on the server; null: no limit
 }
 
 // From the worker to the page.
 export type Report =
-  | { type: 'ready' } // the core is loaded; requests before that are kept
+  | { type: 'ready' } // the core is loaded; earlier requests were queued
   | { type: 'connection'; state: ConnectionState }
-  | { type: 'opened'; dataset: Dataset; resumed: boolean } // resumed: the mesh stays, and the stream goes on
+  | { type: 'opened'; dataset: Dataset; resumed: boolean } // resumed: the mesh is kept and the stream continues
   | { type: 'progress'; progress: Progress }
   | { type: 'skin'; skin: Skin }
   | { type: 'cap'; cap: Cap }
   | { type: 'tets'; tets: Tets }
   | { type: 'saved'; format: string; name: string; bytes: ArrayBuffer }
   | { type: 'digest'; digest: string; updates: number; tets: number }
-  | { type: 'error'; text: string }; // what failed, for people; what was open is closed
+  | { type: 'error'; text: string }; // for the user; the session is closed
 
 export type ConnectionState =
   | { state: 'connecting' }
   | { state: 'open' }
-  | { state: 'waiting'; seconds: number; attempt: number; reason: string } // lost; connects again in so many seconds
+  | { state: 'waiting'; seconds: number; attempt: number; reason: string } // lost; the next attempt is in `seconds`
   | { state: 'closed' };
 
 export interface Progress {
-  bytes: number; // received in all, of messages
-  updates: number; // that came so far
-  updatesShown: number; // of those in the mesh; fewer where the budget of tetrahedra hides some
-  tets: number;
+  bytes: number; // received, of messages
+  updates: number; // received
+  updatesShown: number; // in the mesh: fewer than received where the budget of tetrahedra leaves some out
+  tets: number; // of the mesh
   triangles: number; // of the skin
-  updatesToGo: number; // bounds from above for this view: 0 when done
+  updatesToGo: number; // upper bound for this view; 0 when done
   remainingError: number; // field units
-  remainingPixels: number;
-  skin: number; // version of the last one that was sent to the page
-  done: boolean; // all that this view wants has come, and that skin has it
-  full: boolean; // ... that there is room for in memory
-  volume: number; // of the mesh, in world units cubed
-  volumeBound: number; // by how much refining the tetrahedra that a surface passes can change that
-  memory: number; // bytes that the worker's core takes
-  busy: { updates: number; seconds: number }; // decoded and applied so far, and the time that took
+  remainingPixels: number; // screen-space error, pixels
+  skin: number; // version of the last one sent to the page
+  done: boolean; // all that this view wants was received, and is in that skin
+  full: boolean; // the memory budget leaves some updates out
+  volume: number; // of the mesh, cubic world units
+  volumeBound: number; // the most by which refining the tetrahedra on the surfaces can change the volume
+  memory: number; // of the core, bytes
+  busy: { updates: number; seconds: number }; // updates decoded and applied, and the time for it
   reconnects: number;
-  repeated: number; // updates that came though they were there: never any
+  repeated: number; // updates received more than once; 0 unless the server has a defect
 }
 
-// A part of the skin: the mesh's boundary, by where it lies. Vertices are kVertexBytes each: x, y, z as float32; then as int8 the normal of length
-// 127 in world space (of the surface's triangles around it, or the box's), and as uint8 the level of detail: the scale of the triangles around it, 0 the finest.
-// Outward triangles, three uint32 indices each: first those on the alpha surface, then those on beta, then those where the box cuts.
-export const kVertexBytes = 16;
+// A part of the skin: the triangles of the mesh's boundary in one part of the data's box. 16 bytes per vertex: x, y, z
+// as float32; the normal in world space as int8 of length 127 (averaged over the triangles of the vertex's own surface,
+// or that of the box's face); the level of detail as uint8: the scale of the triangles around it, 0 the finest.
+// Triangles: three uint32 indices, counterclockwise seen from outside; first those on the alpha surface, then those on
+// beta, then those on the faces of the data's box.
 export interface Piece {
   id: number;
   vertices: ArrayBuffer;
   indices: ArrayBuffer;
-  edges: ArrayBuffer | null; // two uint32 indices each, every edge once; in the same three groups
-  triangles: [number, number, number]; // how many of each group
+  edges: ArrayBuffer | null; // two uint32 indices each, every edge once per group; in the same three groups
+  triangles: [number, number, number]; // per group
   edgeCounts: [number, number, number];
-  min: Vec3; // bounds of its vertices
+  min: Vec3; // bounds of the vertices
   max: Vec3;
 }
 
-// The next state of the skin: these pieces take the place of those with the same ids, and what is removed goes, all at the same time, or there would be
-// cracks. Pieces without triangles are among the removed.
+// The change to the next version of the skin: `pieces` replace those of the same ids, and `removed` are deleted. To be
+// shown as a whole, or there would be cracks. A piece without triangles is in `removed`.
 export interface Skin {
-  version: number;
-  reset: boolean; // all pieces before go
+  version: number; // from 1
+  reset: boolean; // delete all earlier pieces first
   pieces: Piece[];
-  removed: number[];
+  removed: number[]; // ids
 }
 
-// Where a plane cuts the mesh: the cut through each tetrahedron as triangles by themselves (no indices), 16 bytes a vertex: x, y, z as float32; then
-// three uint8, the distance from the triangle's sides opposite to each corner, 255 or 0, sides that are none of the cut tetrahedron's having 255 at all
-// corners; and as uint8 the level of detail. Which skin it was made with: version.
+// The section of the mesh by a plane: each tetrahedron's as triangles without indices. 16 bytes per vertex: x, y, z as
+// float32; three uint8, one per side of the triangle: 255 at the opposite corner, 0 on the side; 255 at all corners for
+// a side that is not an edge of the tetrahedron's section; the level of detail as uint8.
 export interface Cap {
   plane: Plane | null;
   vertices: ArrayBuffer;
   triangles: number;
-  version: number;
+  version: number; // of the skin made from the same mesh
 }
 
-// Tetrahedra whose middles lie in the box, as they are: four vertices each, 28 bytes: x, y, z and the middle's x, y, z as float32, so that they can be
-// shrunken while they are drawn; then uint8 surface (0 inside, 1 alpha, 2 beta), uint8 level of detail, two of padding. Three uint32 indices for each
-// of the four outward triangles.
+// The tetrahedra whose centres lie in a box. Four vertices each, 28 bytes per vertex: x, y, z and the tetrahedron's
+// centre as float32, so that shaders can shrink it; surface as uint8 (0 inside, 1 alpha, 2 beta); level of detail as
+// uint8; two bytes of padding. Twelve uint32 indices each, of four triangles that face outwards.
 export interface Tets {
   box: Box | null;
   vertices: ArrayBuffer;
   indices: ArrayBuffer;
   count: number;
-  outOf: number; // in the box: count, or more where they are too many
+  outOf: number; // tetrahedra in the box: more than count where they are too many to show
 }

@@ -1,13 +1,14 @@
-// What is under a pixel: draws the skin and the cap into a picture of one pixel, which holds distances from the eye.
+// Picking: draws what is under one pixel into a target of one pixel that holds the distance from the eye.
 import { FloatType, type PerspectiveCamera, type WebGLRenderer, WebGLRenderTarget } from 'three';
 import { distanceMaterial } from './materials';
 
 export class Pick {
   readonly material = distanceMaterial();
   private target = new WebGLRenderTarget(1, 1, { type: FloatType });
-  private read = new Float32Array(4);
+  private pixel = new Float32Array(4);
 
-  // x, y: pixels from the upper left of a picture of width by height. The distance from the eye; null where nothing is drawn.
+  // x, y: CSS pixels from the upper left corner of a canvas of width by height. draw: draws the scene.
+  // The distance from the eye in world units; null where nothing is drawn, or without float render targets.
   distance(renderer: WebGLRenderer, camera: PerspectiveCamera, x: number, y: number, width: number, height: number, draw: () => void): number | null {
     if (!renderer.extensions.has('EXT_color_buffer_float')) return null;
     camera.setViewOffset(width, height, Math.floor(x), Math.floor(y), 1, 1);
@@ -16,8 +17,8 @@ export class Pick {
     renderer.clear();
     draw();
     camera.clearViewOffset();
-    renderer.readRenderTargetPixels(this.target, 0, 0, 1, 1, this.read);
+    renderer.readRenderTargetPixels(this.target, 0, 0, 1, 1, this.pixel);
     renderer.setRenderTarget(null);
-    return this.read[3]! > 0 ? this.read[0]! : null;
+    return this.pixel[3]! > 0 ? this.pixel[0]! : null;
   }
 }

@@ -1,45 +1,45 @@
-// The picture: what is drawn, with what, in which order. Draws when told to, never by itself.
+// The picture: what is drawn, with which materials, in which order. Draws only when asked to.
 import { BufferGeometry, Color, LinearSRGBColorSpace, type Material, Mesh, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { type Pose, rayThrough } from './camera';
+import { CapView } from './cap';
 import { type Frame, planeToDrawing, shiftOf, toDrawing } from './frame';
-import { Guides } from './guides';
 import { setLooks, shared, surfaceMaterials } from './materials';
 import type { Box, Cap, Vec3 } from './messages';
-import { SkinView } from './skin';
+import { Outlines } from './outlines';
 import { Pick } from './pick';
-import { CapView, TetsView } from './solids';
+import { SkinView } from './skin';
 import type { ViewState } from './state';
+import { TetsView } from './tets';
 import { Thickness } from './thickness';
+import { Transparency } from './transparency';
 import { Uploader } from './upload';
-import { Veil } from './veil';
 import { along, corners, dot, length, sub, unit } from './vec';
 
-const kMostPixelRatio = 2;
-const kNowhere: Box = { min: [-1, -1, -1], max: [1, 1, 1] }; // with its ends swapped
+const kMaxPixelRatio = 2; // device pixels per CSS pixel
 
 export class Picture {
   readonly renderer: WebGLRenderer;
   readonly skin: SkinView;
-  readonly guides = new Guides();
+  readonly outlines = new Outlines();
   readonly thickness: Thickness;
   readonly uploader: Uploader;
   readonly cap: CapView;
   readonly tets: TetsView;
   private materials = surfaceMaterials();
-  private veil = new Veil();
+  private transparency = new Transparency();
   private pick = new Pick();
   private camera = new PerspectiveCamera();
   private skinScene = new Scene();
-  private solidScene = new Scene();
   private edgeScene = new Scene();
+  private insideScene = new Scene(); // the cap and the tetrahedra
   private background = new Color();
 
   // Throws if there is no WebGL 2.
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance' });
     this.renderer.autoClear = false;
-    this.renderer.outputColorSpace = LinearSRGBColorSpace; // the shaders write sRGB themselves
-    this.warmUp();
+    this.renderer.outputColorSpace = LinearSRGBColorSpace; // no conversion: the shaders write sRGB
+    this.compileShaders();
     this.uploader = new Uploader(this.renderer);
     this.skin = new SkinView(this.uploader, this.materials);
     this.cap = new CapView(this.uploader);
@@ -47,13 +47,13 @@ export class Picture {
     this.thickness = new Thickness(this.renderer);
     this.skinScene.add(this.skin.faces);
     this.edgeScene.add(this.skin.edges);
-    this.solidScene.add(this.cap.mesh, this.tets.group);
-    for (const scene of [this.skinScene, this.edgeScene, this.solidScene]) scene.matrixWorldAutoUpdate = false;
+    this.insideScene.add(this.cap.mesh, this.tets.group);
+    for (const scene of [this.skinScene, this.edgeScene, this.insideScene]) scene.matrixWorldAutoUpdate = false;
   }
 
-  // Takes the size that the canvas is laid out with. Whether that changed.
+  // Adopts the canvas's size in the layout. Returns whether it changed; the canvas is empty then.
   resize(): boolean {
-    const ratio = Math.min(window.devicePixelRatio || 1, kMostPixelRatio);
+    const ratio = Math.min(window.devicePixelRatio || 1, kMaxPixelRatio);
     const [width, height] = [Math.max(1, this.canvas.clientWidth), Math.max(1, this.canvas.clientHeight)];
     if (this.canvas.width === Math.floor(width * ratio) && this.canvas.height === Math.floor(height * ratio)) return false;
     this.renderer.setPixelRatio(ratio);
@@ -66,17 +66,19 @@ export class Picture {
     shared.shift.value.set(...shiftOf(frame));
   }
 
+  // color: a CSS colour.
   setBackground(color: string): void {
     this.background.setStyle(color, '');
   }
 
-  setLooks(view: ViewState, coarsest: number): void {
+  setLooks(view: ViewState, coarsestLevel: number): void {
     setLooks(this.materials, view);
-    shared.byLevel.value = view.levels ? 1 : 0;
-    shared.levels.value = coarsest;
+    shared.colorByLevel.value = view.levels ? 1 : 0;
+    shared.coarsestLevel.value = coarsestLevel;
     shared.shrink.value = view.shrink;
   }
 
+  // null: no clip plane.
   setCap(frame: Frame, cap: Cap | null): void {
     this.cap.show(cap);
     if (!cap?.plane) return void shared.clip.value.set(0, 0, 0, 0);
@@ -84,84 +86,80 @@ export class Picture {
     shared.clip.value.set(...normal, offset);
   }
 
-  // Shows the tetrahedra that have been uploaded, in a box where the skin is hidden; null: there is none.
-  showTets(frame: Frame, hidden: Box | null): void {
+  // Shows the tetrahedra that have been uploaded, and hides the skin in their box; null: hides nothing.
+  showTets(frame: Frame, box: Box | null): void {
     this.tets.swap();
-    shared.hiddenMin.value.set(...(hidden ? toDrawing(frame, hidden.min) : kNowhere.max));
-    shared.hiddenMax.value.set(...(hidden ? toDrawing(frame, hidden.max) : kNowhere.min));
+    shared.hiddenMin.value.set(...(box ? toDrawing(frame, box.min) : ([1, 1, 1] as Vec3))); // min above max: empty
+    shared.hiddenMax.value.set(...(box ? toDrawing(frame, box.max) : ([-1, -1, -1] as Vec3)));
   }
 
-  draw(frame: Frame, pose: Pose, view: ViewState, withGuides: boolean): void {
-    this.aim(frame, pose);
-    const { renderer, camera } = this;
+  draw(frame: Frame, pose: Pose, view: ViewState, withOutlines: boolean): void {
+    this.setCamera(frame, pose);
+    const { renderer, camera, materials } = this;
     renderer.setRenderTarget(null);
     renderer.setClearColor(this.background, 1);
     renderer.clear();
-    if (view.thickness && this.thickness.possible) {
-      this.thickness.draw(renderer, camera, () => this.layers(frame, pose));
+    if (view.thickness && this.thickness.isAvailable) {
+      this.thickness.draw(renderer, camera, () => this.drawThicknessLayers(frame, pose));
     } else {
-      this.solids(this.materials.solid, this.cap.material, this.tets.material);
+      this.drawOpaque(materials.opaque, this.cap.material, this.tets.material);
       if (view.wireframe) renderer.render(this.edgeScene, camera);
-      if (this.materials.veil.some((material) => material.visible)) {
-        this.veil.draw(
-          renderer,
-          camera,
-          () => this.solids(this.materials.depth, this.cap.depth, this.tets.depth),
-          () => this.faces(this.materials.veil),
-        );
+      if (materials.transparent.some((material) => material.visible)) {
+        const drawDepth = () => this.drawOpaque(materials.depth, this.cap.depth, this.tets.depth);
+        this.transparency.draw(renderer, camera, drawDepth, () => this.drawSkin(materials.transparent));
       }
     }
-    if (withGuides) renderer.render(this.guides.scene, camera);
+    if (withOutlines) renderer.render(this.outlines.scene, camera);
   }
 
-  // The point that is drawn at a pixel of the layout, in the world; null where there is none.
-  at(frame: Frame, pose: Pose, x: number, y: number): Vec3 | null {
-    this.aim(frame, pose);
+  // The point drawn at x, y (CSS pixels from the canvas's upper left corner), world coordinates; null: nothing there.
+  pointAt(frame: Frame, pose: Pose, x: number, y: number): Vec3 | null {
+    this.setCamera(frame, pose);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    const away = this.pick.distance(this.renderer, this.camera, x, y, width, height, () =>
-      this.solids(this.pick.material, this.pick.material, this.tets.material),
+    const distance = this.pick.distance(this.renderer, this.camera, x, y, width, height, () =>
+      this.drawOpaque(this.pick.material, this.pick.material, this.tets.material),
     );
-    return away === null ? null : along(pose.eye, rayThrough(pose, x, y, width, height), away);
+    return distance === null ? null : along(pose.eye, rayThrough(pose, x, y, width, height), distance);
   }
 
-  // Has the shader of the first picture compiled while the mesh is still on its way.
-  private warmUp(): void {
+  // Compiles the shaders of the first picture while the mesh is still being received.
+  private compileShaders(): void {
     const scene = new Scene();
-    scene.add(...this.materials.solid.map((material) => new Mesh(new BufferGeometry(), material)));
+    scene.add(...this.materials.opaque.map((material) => new Mesh(new BufferGeometry(), material)));
     this.renderer.compile(scene, this.camera);
   }
 
-  private faces(materials: Material | Material[]): void {
+  private drawSkin(materials: Material | Material[]): void {
     this.skin.use(materials);
     this.renderer.render(this.skinScene, this.camera);
   }
 
-  private solids(skin: Material | Material[], cap: Material, tets: Material): void {
-    this.faces(skin);
+  private drawOpaque(skin: Material | Material[], cap: Material, tets: Material): void {
+    this.drawSkin(skin);
     this.cap.mesh.material = cap;
     this.tets.use(tets);
-    this.renderer.render(this.solidScene, this.camera);
+    this.renderer.render(this.insideScene, this.camera);
   }
 
-  private layers(frame: Frame, pose: Pose): void {
+  private drawThicknessLayers(frame: Frame, pose: Pose): void {
     const { x, y, z, w } = shared.clip.value;
     const outside = dot([x, y, z], toDrawing(frame, pose.eye)) > w;
     this.cap.thickness.uniforms['capFacing']!.value = outside ? 1 : -1;
-    this.faces(this.thickness.material); // of all surfaces, also of those that are not shown
+    this.drawSkin(this.thickness.material); // all surfaces, also invisible ones
     this.tets.group.visible = false;
     this.cap.mesh.material = this.cap.thickness;
-    this.renderer.render(this.solidScene, this.camera);
+    this.renderer.render(this.insideScene, this.camera);
     this.tets.group.visible = true;
   }
 
-  private aim(frame: Frame, pose: Pose): void {
+  private setCamera(frame: Frame, pose: Pose): void {
     const { camera } = this;
     const ahead = unit(sub(pose.lookAt, pose.eye));
     const depths = corners(frame.box).map((corner) => dot(ahead, sub(corner, pose.eye)));
     const farthest = Math.max(...depths) * 1.02;
     const far = farthest > 0 ? farthest : length(sub(pose.lookAt, pose.eye));
     const near = Math.max(Math.min(...depths) * 0.98, far * 5e-4);
-    shared.depths.value.set(near, far);
+    shared.depthRange.value.set(near, far);
     shared.pixelScale.value = this.canvas.height / 2 / Math.tan((pose.fov * Math.PI) / 360);
     camera.fov = pose.fov;
     camera.aspect = this.canvas.width / this.canvas.height;

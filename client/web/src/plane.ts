@@ -1,42 +1,45 @@
-// Planes that cut a box: pure geometry. What lies on the normal's side of a plane is cut away; normals have length 1.
+// Planes that cut a box: pure geometry. Normals have length 1; what lies on the normal's side of a plane is cut away.
+// World coordinates.
 import type { Box, Plane, Vec3 } from './messages';
-import { add, along, corners, diagonal, dot, kBoxEdges, middle, scale, sub, unit } from './vec';
+import { add, along, center, corners, diagonal, dot, kBoxEdges, scale, sub, unit } from './vec';
 
-const kArm = 0.18; // of the box's diagonal: how far the handle that turns is from the one that moves
+const kNormalLength = 0.18; // of the drawn normal, as a fraction of the box's diagonal
 
-// The least and the greatest offset at which a plane with this normal touches the box.
-export function extent(box: Box, normal: Vec3): [number, number] {
+// The least and the greatest offset of a plane with this normal that touches the box.
+export function offsetRange(box: Box, normal: Vec3): [number, number] {
   const offsets = corners(box).map((corner) => dot(normal, corner));
   return [Math.min(...offsets), Math.max(...offsets)];
 }
 
-export const throughMiddle = (box: Box, normal: Vec3): Plane => ({ normal: unit(normal), offset: dot(unit(normal), middle(box)) });
+export const throughCenter = (box: Box, normal: Vec3): Plane => ({ normal: unit(normal), offset: dot(unit(normal), center(box)) });
 
-// Where a plane is held: the point of it that is nearest to the middle of the box; and the tip of its normal.
-export const holdOf = (box: Box, plane: Plane): Vec3 => along(middle(box), plane.normal, plane.offset - dot(plane.normal, middle(box)));
-export const tipOf = (box: Box, plane: Plane): Vec3 => along(holdOf(box, plane), plane.normal, kArm * diagonal(box));
+// The point of the plane that is nearest to the centre of the box: where the handle that moves the plane is.
+export const handlePosition = (box: Box, plane: Plane): Vec3 => along(center(box), plane.normal, plane.offset - dot(plane.normal, center(box)));
 
-// Moved so far that it touches the box.
+// The tip of the drawn normal: where the handle that rotates the plane is.
+export const normalTip = (box: Box, plane: Plane): Vec3 => along(handlePosition(box, plane), plane.normal, kNormalLength * diagonal(box));
+
+// Moved along its normal until it touches the box, if it does not.
 export function clamped(box: Box, plane: Plane): Plane {
-  const [least, most] = extent(box, plane.normal);
-  return { normal: plane.normal, offset: Math.min(most, Math.max(least, plane.offset)) };
+  const [least, greatest] = offsetRange(box, plane.normal);
+  return { normal: plane.normal, offset: Math.min(greatest, Math.max(least, plane.offset)) };
 }
 
-// Turned about where it is held, so that its normal points to where `tip` lies from there.
-export function turnedTo(box: Box, plane: Plane, tip: Vec3): Plane {
-  const hold = holdOf(box, plane);
-  const normal = unit(sub(tip, hold), plane.normal);
-  return clamped(box, { normal, offset: dot(normal, hold) });
+// Rotated about its handle, so that its normal points to `tip`; then clamped.
+export function rotatedTowards(box: Box, plane: Plane, tip: Vec3): Plane {
+  const handle = handlePosition(box, plane);
+  const normal = unit(sub(tip, handle), plane.normal);
+  return clamped(box, { normal, offset: dot(normal, handle) });
 }
 
-// The axis that v is nearest to, on v's side.
+// The signed unit axis nearest to v.
 export function mainAxis(v: Vec3): Vec3 {
   const i = [0, 1, 2].reduce((best, axis) => (Math.abs(v[axis]!) > Math.abs(v[best]!) ? axis : best), 0);
   return [0, 1, 2].map((axis) => (axis === i ? Math.sign(v[i]!) || 1 : 0)) as Vec3;
 }
 
-// Pairs of points: the sides of the polygon that plane and box have in common.
-export function cutOutline(box: Box, plane: Plane): Vec3[] {
+// The polygon in which the plane cuts the box: its sides as pairs of points, in no order.
+export function planeOutline(box: Box, plane: Plane): Vec3[] {
   const c = corners(box);
   const points: { p: Vec3; edge: readonly [number, number] }[] = [];
   for (const edge of kBoxEdges) {
@@ -44,7 +47,8 @@ export function cutOutline(box: Box, plane: Plane): Vec3[] {
     const [a, b] = [dot(plane.normal, from) - plane.offset, dot(plane.normal, to) - plane.offset];
     if (a > 0 !== b > 0) points.push({ p: add(from, scale(sub(to, from), a / (a - b))), edge });
   }
-  // Two cut edges that lie on the same face are joined. A face is an axis and an end of it.
+  // Two cut edges of the same face are joined. A face is named by its axis and the end of that axis.
   const faces = ([i, j]: readonly [number, number]) => [1, 2, 4].filter((bit) => (i & bit) === (j & bit)).map((bit) => bit * 8 + (i & bit));
-  return points.flatMap((a, i) => points.slice(i + 1).flatMap((b) => (faces(a.edge).some((face) => faces(b.edge).includes(face)) ? [a.p, b.p] : [])));
+  const sharesFace = (a: readonly [number, number], b: readonly [number, number]) => faces(a).some((face) => faces(b).includes(face));
+  return points.flatMap((a, i) => points.slice(i + 1).flatMap((b) => (sharesFace(a.edge, b.edge) ? [a.p, b.p] : [])));
 }

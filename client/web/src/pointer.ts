@@ -1,23 +1,23 @@
-// Mouse, pen and fingers on the picture: turn, move, zoom, roll.
+// Mouse, pen and touch on the canvas: rotate, pan, zoom, roll.
 import { orbited, panned, type Pose, rolled, zoomed } from './camera';
 
-export interface Movable {
-  pose(): Pose | null;
+export interface CameraController {
+  pose(): Pose | null; // null: no data set is open
   move(pose: Pose): void;
-  centre(x: number, y: number): void; // bring what is drawn at this pixel to the middle
+  centerOn(x: number, y: number): void; // see Viewer
 }
 
-const kTurn = Math.PI; // for a drag across the shorter side
-const kWheel = 0.0016; // a pixel of the wheel, as a logarithm
+const kRotation = Math.PI; // radians, for a drag across the canvas's shorter side
+const kWheel = 0.0016; // natural logarithm of the zoom factor, per pixel of the wheel
 
-export function watchPointers(canvas: HTMLCanvasElement, movable: Movable): void {
+export function watchPointers(canvas: HTMLCanvasElement, controller: CameraController): void {
   const down = new Map<number, { x: number; y: number }>();
 
   const change = (make: (pose: Pose, width: number, height: number) => Pose) => {
-    const pose = movable.pose();
-    if (pose) movable.move(make(pose, canvas.clientWidth, canvas.clientHeight));
+    const pose = controller.pose();
+    if (pose) controller.move(make(pose, canvas.clientWidth, canvas.clientHeight));
   };
-  const fromMiddle = (x: number, y: number): [number, number] => {
+  const fromCenter = (x: number, y: number): [number, number] => {
     const box = canvas.getBoundingClientRect();
     return [x - box.left - box.width / 2, y - box.top - box.height / 2];
   };
@@ -34,10 +34,10 @@ export function watchPointers(canvas: HTMLCanvasElement, movable: Movable): void
     const now = { x: event.clientX, y: event.clientY };
     const [dx, dy] = [now.x - last.x, now.y - last.y];
     if (down.size === 1) {
-      const moves = event.shiftKey || (event.buttons & 6) !== 0;
+      const pans = event.shiftKey || (event.buttons & 6) !== 0;
       change((pose, width, height) => {
-        const angle = kTurn / Math.min(width, height);
-        return moves ? panned(pose, dx, dy, height) : orbited(pose, dx * angle, dy * angle);
+        const angle = kRotation / Math.min(width, height);
+        return pans ? panned(pose, dx, dy, height) : orbited(pose, dx * angle, dy * angle);
       });
     } else if (down.size === 2) {
       const other = [...down].find(([id]) => id !== event.pointerId)![1];
@@ -45,8 +45,9 @@ export function watchPointers(canvas: HTMLCanvasElement, movable: Movable): void
       const after = [now.x - other.x, now.y - other.y] as const;
       const factor = Math.hypot(...before) / Math.max(1, Math.hypot(...after));
       const angle = Math.atan2(after[1], after[0]) - Math.atan2(before[1], before[0]);
-      const at = fromMiddle((now.x + other.x) / 2, (now.y + other.y) / 2);
-      change((pose, _, height) => rolled(zoomed(panned(pose, dx / 2, dy / 2, height), factor, at, height), Math.atan2(Math.sin(angle), Math.cos(angle))));
+      const at = fromCenter((now.x + other.x) / 2, (now.y + other.y) / 2);
+      const wrapped = Math.atan2(Math.sin(angle), Math.cos(angle)); // to (-π, π]
+      change((pose, _, height) => rolled(zoomed(panned(pose, dx / 2, dy / 2, height), factor, at, height), wrapped));
     }
     down.set(event.pointerId, now);
   });
@@ -64,7 +65,7 @@ export function watchPointers(canvas: HTMLCanvasElement, movable: Movable): void
     (event) => {
       event.preventDefault();
       const pixels = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 33 : 1) * (event.ctrlKey ? 5 : 1);
-      const at = fromMiddle(event.clientX, event.clientY);
+      const at = fromCenter(event.clientX, event.clientY);
       change((pose, _, height) => zoomed(pose, Math.exp(Math.max(-300, Math.min(300, pixels)) * kWheel), at, height));
     },
     { passive: false },
@@ -72,6 +73,6 @@ export function watchPointers(canvas: HTMLCanvasElement, movable: Movable): void
 
   canvas.addEventListener('dblclick', (event) => {
     const box = canvas.getBoundingClientRect();
-    movable.centre(event.clientX - box.left, event.clientY - box.top);
+    controller.centerOn(event.clientX - box.left, event.clientY - box.top);
   });
 }

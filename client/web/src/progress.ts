@@ -1,98 +1,106 @@
-// How far the view has come: one line below the picture, and the figures in the panel.
+// How far the view is refined: the status line below the picture, and the statistics in the panel.
 import { element, setText } from './dom';
 import { bounded, bytes, count, short } from './format';
-import type { Live } from './live';
 import type { Progress } from './messages';
+import type { Status } from './status';
 import type { Store } from './store';
 
-const kOften = 100; // ms between two looks at numbers
+const kIntervalMs = 100; // between two updates of the page
 
-// What is said of a view, in words.
-export function headline(live: Readonly<Live>): string {
-  const { connection, progress, dataset } = live;
-  if (live.trouble !== null) return 'Stopped';
-  if (live.needsToken) return 'Waiting for a token';
+// The state in a few words.
+export function headline(status: Readonly<Status>): string {
+  const { connection, progress, dataset } = status;
+  if (status.error !== null) return 'Stopped';
+  if (status.needsToken) return 'Waiting for a token';
   if (connection.state === 'waiting') return 'Connection lost';
   if (connection.state === 'connecting' && !progress) return 'Connecting…';
   if (!dataset) return 'Loading…';
-  if (progress?.done) return progress.full ? 'Done: no room for more' : 'Done for this view';
+  if (progress?.done) return progress.full ? 'Done: memory limit reached' : 'Done for this view';
   return 'Refining…';
 }
 
-export function watchProgress(live: Store<Live>): void {
+export function watchProgress(status: Store<Status>): void {
   let timer = 0;
   const show = () => {
     timer = 0;
-    const { value } = live;
-    const { progress } = value;
-    const done = progress?.done === true && value.trouble === null && value.connection.state === 'open';
-    const waiting = value.connection.state === 'waiting';
+    const { value } = status;
     setText(element('progress-text'), headline(value));
-    element('status').className = value.trouble !== null ? 'bad' : waiting ? 'waiting' : done ? 'done' : '';
-    const share = progress ? (progress.done ? 1 : progress.updates / Math.max(1, progress.updates + progress.updatesToGo)) : 0;
-    const bar = element('bar');
-    bar.className = waiting ? 'waiting' : done ? 'done' : '';
-    bar.setAttribute('aria-valuenow', String(Math.round(100 * share)));
-    element('bar-fill').style.transform = `scaleX(${share.toFixed(4)})`;
-    line(value);
-    facts(value);
+    showBar(value);
+    showStatusLine(value);
+    showStatistics(value);
   };
-  live.watch([], () => {
-    if (timer === 0) timer = window.setTimeout(show, kOften);
+  status.watch([], () => {
+    if (timer === 0) timer = window.setTimeout(show, kIntervalMs);
   });
   show();
 }
 
-// What is left of the error in the field, where it is known: of a view that is done by pixels it is not.
-function fieldError({ progress: p, dataset }: Readonly<Live>): string | null {
+function showBar({ progress, error, connection }: Readonly<Status>): void {
+  const isDone = progress?.done === true && error === null && connection.state === 'open';
+  const isWaiting = connection.state === 'waiting';
+  element('status').className = error !== null ? 'bad' : isWaiting ? 'waiting' : isDone ? 'done' : '';
+  const share = progress ? (progress.done ? 1 : progress.updates / Math.max(1, progress.updates + progress.updatesToGo)) : 0;
+  const bar = element('bar');
+  bar.className = isWaiting ? 'waiting' : isDone ? 'done' : '';
+  bar.setAttribute('aria-valuenow', String(Math.round(100 * share)));
+  element('bar-fill').style.transform = `scaleX(${share.toFixed(4)})`;
+}
+
+// The remaining error in units of the field. null: not known, since views limited by the screen-space error report 0.
+function fieldError({ progress: p, dataset }: Readonly<Status>): string | null {
   return p && (p.remainingError > 0 || !dataset || p.updatesShown >= dataset.updates) ? short(p.remainingError) : null;
 }
 
-function line(live: Readonly<Live>): void {
-  const p = live.progress;
-  const field = fieldError(live);
-  const target = element('figures');
-  const parts: [string, string][] = p
-    ? [
-        [pixels(p), 'error'],
-        ...(field === null ? [] : [[`± ${field}`, 'in the field'] as [string, string]]),
-        [bytes(p.bytes), ''],
-        [count(p.updates), 'updates'],
-        [count(p.tets), 'tetrahedra'],
-        [bounded(p.volume, p.volumeBound), 'units³'],
-      ]
-    : [];
-  target.replaceChildren(
-    ...parts.map(([value, unit]) => {
+const screenError = (p: Progress): string => `${short(p.remainingPixels)} px`;
+
+function showStatusLine(status: Readonly<Status>): void {
+  const p = status.progress;
+  const field = fieldError(status);
+  const parts: [value: string, label: string][] = [];
+  if (p) {
+    parts.push([screenError(p), 'error']);
+    if (field !== null) parts.push([field, 'field error']);
+    parts.push([bytes(p.bytes), ''], [count(p.updates), 'updates'], [count(p.tets), 'tetrahedra']);
+    parts.push([bounded(p.volume, p.volumeBound), 'units³']);
+  }
+  element('status-values').replaceChildren(
+    ...parts.map(([value, label]) => {
       const part = document.createElement('span');
-      part.append(Object.assign(document.createElement('b'), { textContent: value }), unit && ` ${unit}`);
+      part.append(Object.assign(document.createElement('b'), { textContent: value }), label && ` ${label}`);
       return part;
     }),
   );
 }
 
-const pixels = (p: Progress): string => `${short(p.remainingPixels)} px`;
+function statistics(status: Readonly<Status>): [name: string, value: string][] {
+  const { progress: p, dataset } = status;
+  if (!p) return [['Received', 'nothing yet']];
+  const rows: [string, string][] = [
+    ['Volume', `${bounded(p.volume, p.volumeBound)} units³`],
+    ['Screen-space error', screenError(p)],
+  ];
+  const field = fieldError(status);
+  if (field !== null) {
+    const percent = dataset && dataset.maxError > 0 ? ` (${short((100 * p.remainingError) / dataset.maxError)} %)` : '';
+    rows.push(['Field error', field + percent]);
+  }
+  rows.push(
+    ['Tetrahedra', count(p.tets)],
+    ['Triangles', count(p.triangles)],
+    ['Updates', p.updatesShown < p.updates ? `${count(p.updates)}, ${count(p.updatesShown)} shown` : count(p.updates)],
+    ['Updates remaining', p.done ? 'none' : `at most ${count(p.updatesToGo)}`],
+    ['Received', bytes(p.bytes)],
+    ['Memory', bytes(p.memory)],
+  );
+  if (p.busy.seconds > 0) rows.push(['Updates per second', count(p.busy.updates / p.busy.seconds)]);
+  if (p.reconnects > 0) rows.push(['Reconnections', String(p.reconnects)]);
+  return rows;
+}
 
-function facts(live: Readonly<Live>): void {
-  const { progress: p, dataset } = live;
-  const field = fieldError(live);
-  const rows: [string, string][] = p
-    ? [
-        ['Volume', `${bounded(p.volume, p.volumeBound)} units³`],
-        ['Error on screen', pixels(p)],
-        ...(field === null ? [] : [['Error in the field', dataset && dataset.maxError > 0 ? `${field} (${short((100 * p.remainingError) / dataset.maxError)} %)` : field] as [string, string]]),
-        ['Tetrahedra', count(p.tets)],
-        ['Triangles', count(p.triangles)],
-        ['Updates', p.updatesShown < p.updates ? `${count(p.updates)}, ${count(p.updatesShown)} shown` : count(p.updates)],
-        ['Still to come', p.done ? 'none' : `at most ${count(p.updatesToGo)}`],
-        ['Received', bytes(p.bytes)],
-        ['Memory', bytes(p.memory)],
-        ...(p.busy.seconds > 0 ? [['Updates in a second', count(p.busy.updates / p.busy.seconds)] as [string, string]] : []),
-        ...(p.reconnects > 0 ? [['Reconnected', p.reconnects === 1 ? 'once' : `${p.reconnects} times`] as [string, string]] : []),
-      ]
-    : [['Received', 'nothing yet']];
-  const list = element('facts');
-  // Rows stay where they are, so that text in them can be selected while numbers change.
+function showStatistics(status: Readonly<Status>): void {
+  const rows = statistics(status);
+  const list = element('statistics');
+  // The elements are kept, so that their text can be selected while numbers change.
   while (list.children.length < 2 * rows.length) list.append(document.createElement(list.children.length % 2 === 0 ? 'dt' : 'dd'));
   while (list.children.length > 2 * rows.length) list.lastElementChild!.remove();
   rows.forEach(([name, value], i) => {

@@ -1,48 +1,52 @@
-// The region of interest: a box in the world that is refined to the end. A switch, six numbers, and seven handles: its faces, and the whole.
-import { axes, type Pose } from './camera';
+// The region of interest: a box in world coordinates that is refined to full detail. Its controls: a switch, six
+// numbers, and seven handles, of its faces and of the whole box.
+import { axes, inViewPlane, type Pose } from './camera';
 import { element, input } from './dom';
 import type { Frame } from './frame';
-import type { Handles } from './handles';
+import type { Handle, Handles } from './handles';
 import type { Box, Vec3 } from './messages';
 import type { ViewState } from './state';
 import type { Store } from './store';
-import { add, dot, middle, scale, sub } from './vec';
+import { add, center, dot, scale, sub } from './vec';
 
-const kNames = ['X', 'Y', 'Z'];
-const kStep = 0.02; // of the box's side, by an arrow key
-const kThinnest = 0.01;
+const kAxisNames = ['X', 'Y', 'Z'];
+const kMoveStep = 0.02; // per arrow key, as a fraction of the data's box
+const kLeastSize = 0.01; // the same
 
-// The middle half of a box.
+type End = 'min' | 'max';
+
+// The box of half the size with the same centre.
 export function middleHalf(box: Box): Box {
   const quarter = scale(sub(box.max, box.min), 0.25);
   return { min: add(box.min, quarter), max: sub(box.max, quarter) };
 }
 
-// One face moved, within the box of the data and not past its opposite.
-export function faceMoved(region: Box, within: Box, axis: number, end: 'min' | 'max', to: number): Box {
+// With one face moved to a coordinate, clamped to the data's box and to the opposite face.
+export function faceMoved(region: Box, data: Box, axis: number, end: End, to: number): Box {
   const moved: Box = { min: [...region.min], max: [...region.max] };
-  const thin = kThinnest * (within.max[axis]! - within.min[axis]!);
-  const [least, most] = end === 'min' ? [within.min[axis]!, region.max[axis]! - thin] : [region.min[axis]! + thin, within.max[axis]!];
-  moved[end][axis] = Math.min(most, Math.max(least, to));
+  const size = kLeastSize * (data.max[axis]! - data.min[axis]!);
+  const [least, greatest] = end === 'min' ? [data.min[axis]!, region.max[axis]! - size] : [region.min[axis]! + size, data.max[axis]!];
+  moved[end][axis] = Math.min(greatest, Math.max(least, to));
   return moved;
 }
 
-// Moved as a whole, staying within the box of the data.
-export function wholeMoved(region: Box, within: Box, by: Vec3): Box {
-  const held = by.map((d, i) => Math.min(within.max[i]! - region.max[i]!, Math.max(within.min[i]! - region.min[i]!, d))) as Vec3;
-  return { min: add(region.min, held), max: add(region.max, held) };
+// Moved as a whole, clamped to the data's box.
+export function wholeMoved(region: Box, data: Box, by: Vec3): Box {
+  const step = by.map((d, i) => Math.min(data.max[i]! - region.max[i]!, Math.max(data.min[i]! - region.min[i]!, d))) as Vec3;
+  return { min: add(region.min, step), max: add(region.max, step) };
 }
 
 export class RegionControls {
-  private last: Box | null = null;
-  private fields: Record<'min' | 'max', HTMLInputElement[]> = { min: [], max: [] };
+  private last: Box | null = null; // the region when it was switched off
+  private fields: Record<End, HTMLInputElement[]> = { min: [], max: [] };
 
   constructor(private view: Store<ViewState>, private frame: () => Frame | null, private pose: () => Pose | null, handles: Handles) {
     input('region').addEventListener('change', () => this.toggle());
     input('tets').addEventListener('change', () => view.set({ tets: input('tets').checked }));
     input('shrink').addEventListener('input', () => view.set({ shrink: input('shrink').valueAsNumber }));
     this.addFields();
-    this.addHandles(handles);
+    handles.add(this.wholeHandle());
+    for (const axis of [0, 1, 2]) for (const end of ['min', 'max'] as const) handles.add(this.faceHandle(axis, end));
     view.watch(['region', 'tets', 'shrink'], () => this.show());
   }
 
@@ -54,19 +58,19 @@ export class RegionControls {
     this.show();
   }
 
-  // The tetrahedra need a region, so they bring one.
+  // Switches the region on as well: tetrahedra are shown only in it.
   toggleTets(): void {
     if (!this.view.value.region) this.toggle();
     this.view.set({ tets: !this.view.value.tets && this.view.value.region !== null });
   }
 
-  // Another data set: where it was in the last means nothing in this.
+  // A data set was opened: the region of the last one does not apply to it.
   opened(): void {
     this.last = null;
     this.show();
   }
 
-  private change(make: (region: Box, within: Box) => Box): void {
+  private change(make: (region: Box, data: Box) => Box): void {
     const frame = this.frame();
     const { region } = this.view.value;
     if (frame && region) this.view.set({ region: make(region, frame.box) });
@@ -89,70 +93,74 @@ export class RegionControls {
   }
 
   private addFields(): void {
+    const label = (text: string) => Object.assign(document.createElement('span'), { textContent: text });
     const grid = element('region-fields');
-    grid.append(document.createElement('span'), ...kNames.map((name) => Object.assign(document.createElement('span'), { textContent: name })));
+    grid.append(label(''), ...kAxisNames.map(label));
     for (const [end, name] of [['min', 'From'], ['max', 'To']] as const) {
-      grid.append(Object.assign(document.createElement('span'), { textContent: name }));
-      this.fields[end] = kNames.map((axis, i) => {
-        const field = Object.assign(document.createElement('input'), { type: 'number', step: 'any', ariaLabel: `${name} ${axis}` });
+      this.fields[end] = kAxisNames.map((axisName, axis) => {
+        const field = Object.assign(document.createElement('input'), { type: 'number', step: 'any', ariaLabel: `${name} ${axisName}` });
         field.addEventListener('change', () => {
-          if (Number.isFinite(field.valueAsNumber)) this.change((region, within) => faceMoved(region, within, i, end, field.valueAsNumber));
+          const to = field.valueAsNumber;
+          if (Number.isFinite(to)) this.change((region, data) => faceMoved(region, data, axis, end, to));
           this.show();
         });
-        grid.append(field);
         return field;
       });
+      grid.append(label(name), ...this.fields[end]);
     }
   }
 
-  private addHandles(handles: Handles): void {
+  private wholeHandle(): Handle {
     const region = () => this.view.value.region;
-    handles.add({
+    return {
       label: 'Move the region',
       icon: 'move4',
-      at: () => region() && middle(region()!),
-      begin: region,
-      drag: (by, start) => this.change((_, within) => wholeMoved(start as Box, within, by)),
+      position: () => region() && center(region()!),
+      grab: () => {
+        const from = region()!;
+        return (by) => this.change((_, data) => wholeMoved(from, data, by));
+      },
       nudge: (right, up) => {
         const pose = this.pose();
         if (!pose) return;
         const a = axes(pose);
-        this.change((now, within) => {
-          const step = kStep * Math.max(...sub(within.max, within.min));
-          return wholeMoved(now, within, add(scale(a.right, right * step), scale(a.up, up * step)));
+        this.change((now, data) => {
+          const step = kMoveStep * Math.max(...sub(data.max, data.min));
+          return wholeMoved(now, data, add(scale(a.right, right * step), scale(a.up, up * step)));
         });
       },
-    });
-    for (const axis of [0, 1, 2]) {
-      for (const end of ['min', 'max'] as const) {
-        handles.add({
-          label: `Move the region's ${end === 'min' ? 'lower' : 'upper'} ${kNames[axis]} face`,
-          at: () => {
-            const now = region();
-            if (!now) return null;
-            const at = middle(now);
-            at[axis] = now[end][axis]!;
-            return at;
-          },
-          begin: region,
-          drag: (by, start) => this.change((_, within) => faceMoved(start as Box, within, axis, end, (start as Box)[end][axis]! + this.alongAxis(by, axis))),
-          nudge: (right, up) =>
-            this.change((now, within) => {
-              const step = kStep * (within.max[axis]! - within.min[axis]!);
-              return faceMoved(now, within, axis, end, now[end][axis]! + (right + up) * step);
-            }),
-        });
-      }
-    }
+    };
   }
 
-  // How far along an axis a drag in the plane of the picture goes.
+  private faceHandle(axis: number, end: End): Handle {
+    const region = () => this.view.value.region;
+    return {
+      label: `Move the region's ${end === 'min' ? 'lower' : 'upper'} ${kAxisNames[axis]} face`,
+      position: () => {
+        const now = region();
+        if (!now) return null;
+        const at = center(now);
+        at[axis] = now[end][axis]!;
+        return at;
+      },
+      grab: () => {
+        const from = region()!;
+        return (by) => this.change((_, data) => faceMoved(from, data, axis, end, from[end][axis]! + this.alongAxis(by, axis)));
+      },
+      nudge: (right, up) =>
+        this.change((now, data) => {
+          const step = kMoveStep * (data.max[axis]! - data.min[axis]!);
+          return faceMoved(now, data, axis, end, now[end][axis]! + (right + up) * step);
+        }),
+    };
+  }
+
+  // The distance along an axis that keeps the handle under a pointer dragged by `by`.
   private alongAxis(by: Vec3, axis: number): number {
     const pose = this.pose();
     if (!pose) return 0;
-    const a = axes(pose);
     const direction: Vec3 = [axis === 0 ? 1 : 0, axis === 1 ? 1 : 0, axis === 2 ? 1 : 0];
-    const seen = add(scale(a.right, dot(a.right, direction)), scale(a.up, dot(a.up, direction)));
-    return dot(by, seen) / Math.max(dot(seen, seen), 0.05);
+    const projected = inViewPlane(pose, direction);
+    return dot(by, projected) / Math.max(dot(projected, projected), 0.05);
   }
 }

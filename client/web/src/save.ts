@@ -1,10 +1,10 @@
-// Things to take away: pictures, meshes, links.
+// Saves pictures and meshes as files, and copies links to the view.
 import { element, onClick } from './dom';
-import type { Live } from './live';
 import type { Request } from './messages';
+import type { Status } from './status';
 import type { Store } from './store';
 
-const kTypes: Record<string, string> = { vtu: 'application/xml', stl: 'model/stl', glb: 'model/gltf-binary', png: 'image/png' };
+const kMimeTypes: Record<string, string> = { vtu: 'application/xml', stl: 'model/stl', glb: 'model/gltf-binary', png: 'image/png' };
 const kFormats = ['vtu', 'stl', 'glb'] as const;
 
 export function download(name: string, blob: Blob): void {
@@ -16,37 +16,37 @@ export function download(name: string, blob: Blob): void {
 }
 
 export const downloadMesh = (format: string, name: string, bytes: ArrayBuffer): void =>
-  download(name, new Blob([bytes], { type: kTypes[format] ?? 'application/octet-stream' }));
+  download(name, new Blob([bytes], { type: kMimeTypes[format] ?? 'application/octet-stream' }));
 
-// picture: draws without handles and guides, and gives what was drawn.
-export function watchSaving(live: Store<Live>, send: (request: Request) => void, picture: () => Promise<Blob | null>): void {
+// photograph: see Viewer.
+export function watchSaving(status: Store<Status>, send: (request: Request) => void, photograph: () => Promise<Blob | null>): void {
   const note = element('share-note');
-  const say = (text: string) => (note.textContent = text);
+  const show = (text: string) => (note.textContent = text);
   onClick('copy-link', async () => {
     try {
       await navigator.clipboard.writeText(location.href);
-      say('Copied: whoever opens it sees this view.');
+      show('Link copied. It opens this view.');
     } catch {
-      say(`The browser does not let this page copy. The link is the address: ${location.href}`);
+      show(`The browser does not allow this page to copy. The link is the page's address: ${location.href}`);
     }
   });
   onClick('save-picture', async () => {
-    const blob = await picture();
-    if (!blob) return void say('The picture could not be made.');
-    download(`${live.value.dataset?.name ?? 'intervale'}.png`, blob);
-    say('Picture saved.');
+    const blob = await photograph();
+    if (!blob) return void show('The picture could not be encoded.');
+    download(`${status.value.dataset?.name ?? 'intervale'}.png`, blob);
+    show('Picture saved.');
   });
   for (const format of kFormats) {
     onClick(`save-${format}`, () => {
-      live.set({ saving: format });
+      status.set({ saving: format });
       send({ type: 'save', format });
-      say(`Writing .${format}…`);
+      show(`Writing .${format}…`);
     });
   }
-  let was: string | null = null;
-  live.watch(['saving', 'skinVersion'], ({ saving, skinVersion }) => {
-    if (was !== null && saving === null) say(live.value.trouble === null ? `.${was} saved.` : '');
-    was = saving;
+  let last: string | null = null;
+  status.watch(['saving', 'skinVersion'], ({ saving, skinVersion }) => {
+    if (last !== null && saving === null) show(status.value.error === null ? `.${last} saved.` : '');
+    last = saving;
     for (const format of kFormats) element<HTMLButtonElement>(`save-${format}`).disabled = saving !== null || skinVersion === 0;
   });
 }

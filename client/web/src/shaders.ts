@@ -1,40 +1,43 @@
-// The shaders of what is drawn, in GLSL ES 3.0. Vertices come packed, as the worker sends them: see messages.ts; positions in samples.
-
-// Where a vertex is in drawing space, and what one needs to know of it.
-const kPlace = `
-uniform mat4 viewMatrix, projectionMatrix;
-uniform vec3 spacing, shift;
-out vec3 place;
-vec3 unpacked(uvec3 bits) { return spacing * uintBitsToFloat(bits) + shift; }
-void put(vec3 p) {
-  place = p;
-  gl_Position = projectionMatrix * viewMatrix * vec4(p, 1.0);
-}
-`;
+// The shaders, in GLSL ES 3.0. Vertices arrive packed, as the worker sends them (see messages.ts), with positions in
+// samples. Lighting is computed in linear colour; inputs and outputs are sRGB.
+import { colorMapGlsl, kLevelColors, kThicknessColors } from './color_maps';
 
 const kPrecision = `
 precision highp float;
 precision highp int;
 `;
 
+// Vertex shaders: from samples to drawing space (vPosition, see frame.ts) and to clip space.
+const kTransform = `
+uniform mat4 viewMatrix, projectionMatrix;
+uniform vec3 spacing, shift;
+out vec3 vPosition;
+vec3 drawing_position(uvec3 bits) { return spacing * uintBitsToFloat(bits) + shift; }
+void transform(vec3 p) {
+  vPosition = p;
+  gl_Position = projectionMatrix * viewMatrix * vec4(p, 1.0);
+}
+`;
+
 export const kSkinVertex = `${kPrecision}
-in uvec4 position; // three floats' bits; the normal and the level
-out vec3 normal;
-flat out float level;
-${kPlace}
+in uvec4 position; // the bits of three floats; then the normal and the level of detail
+out vec3 vNormal;
+flat out float vLevel;
+${kTransform}
 void main() {
-  put(unpacked(position.xyz));
+  transform(drawing_position(position.xyz));
   ivec3 n = ivec3(uvec3(position.w << 24, position.w << 16, position.w << 8)) >> 24;
-  normal = vec3(n) / 127.0;
-  level = float(position.w >> 24);
+  vNormal = vec3(n) / 127.0;
+  vLevel = float(position.w >> 24);
 }`;
 
-// A light at the head, a little to the upper left of it; sky and ground; a soft highlight. From sRGB, to sRGB.
-const kLight = `
+// A directional light that moves with the camera, above and to the left of it; hemisphere ambient light; a weak
+// specular highlight and rim light. Both sides of a surface are lit.
+const kLighting = `
 uniform mat4 viewMatrix;
 uniform vec3 cameraPosition;
-vec3 linear(vec3 c) { return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878); }
-vec3 srgb(vec3 c) { return max(1.055 * pow(max(c, 0.0), vec3(0.41666)) - 0.055, 0.0); }
+vec3 to_linear(vec3 c) { return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878); }
+vec3 to_srgb(vec3 c) { return max(1.055 * pow(max(c, 0.0), vec3(0.41666)) - 0.055, 0.0); }
 vec3 lit(vec3 color, vec3 n, vec3 p) {
   vec3 to_eye = normalize(cameraPosition - p);
   if (dot(n, to_eye) < 0.0) n = -n;
@@ -43,226 +46,216 @@ vec3 lit(vec3 color, vec3 n, vec3 p) {
   vec3 to_light = normalize(to_eye - 0.35 * right + 0.45 * up);
   float sky = 0.5 + 0.5 * dot(n, up);
   float diffuse = max(dot(n, to_light), 0.0);
-  float highlight = pow(max(dot(n, normalize(to_light + to_eye)), 0.0), 32.0);
+  float specular = pow(max(dot(n, normalize(to_light + to_eye)), 0.0), 32.0);
   float rim = 1.0 - max(dot(n, to_eye), 0.0);
-  vec3 base = linear(color);
+  vec3 albedo = to_linear(color);
   vec3 ambient = mix(vec3(0.19, 0.185, 0.18), vec3(0.30, 0.32, 0.35), sky);
-  return srgb(base * (ambient + 0.78 * diffuse) + 0.07 * highlight + 0.05 * rim * rim * rim * (0.4 + base));
+  return to_srgb(albedo * (ambient + 0.78 * diffuse) + 0.07 * specular + 0.05 * rim * rim * rim * (0.4 + albedo));
 }
 `;
 
-// Colours along a scale, evenly apart.
-export type Ramp = readonly (readonly [number, number, number])[];
-
-// Levels of detail: from fine and light to coarse and dark, even in lightness, told apart without red and green (after viridis).
-export const kLevelRamp: Ramp = [
-  [0.98, 0.88, 0.2],
-  [0.45, 0.78, 0.36],
-  [0.14, 0.58, 0.56],
-  [0.23, 0.36, 0.6],
-  [0.32, 0.17, 0.5],
-];
-// Thickness: from nothing and dark to much and light (after inferno).
-export const kThicknessRamp: Ramp = [
-  [0.02, 0.02, 0.1],
-  [0.13, 0.05, 0.3],
-  [0.34, 0.06, 0.43],
-  [0.54, 0.13, 0.42],
-  [0.74, 0.21, 0.33],
-  [0.9, 0.36, 0.2],
-  [0.98, 0.55, 0.04],
-  [0.98, 0.78, 0.17],
-  [0.97, 0.98, 0.62],
-];
-// vec3 ramp(float t): a ramp's colour, t from 0 to 1.
-const rampOf = (stops: Ramp) => `
-vec3 ramp(float t) {
-  vec3 c[${stops.length}] = vec3[${stops.length}](${stops.map((c) => `vec3(${c.map((x) => x.toFixed(3)).join(',')})`).join(',')});
-  float x = clamp(t, 0.0, 1.0) * ${stops.length - 1}.0;
-  int i = min(int(x), ${stops.length - 2});
-  return mix(c[i], c[i + 1], x - float(i));
+const kLevelColoring = `
+uniform float colorByLevel; // 1: levels of detail replace the surface's colour; 0: they do not
+uniform float coarsestLevel;
+${colorMapGlsl(kLevelColors)}
+vec3 colored(vec3 color, float level) {
+  return mix(color, color_map(level / max(coarsestLevel, 1.0)), colorByLevel);
 }
 `;
-const kLevels = `
-uniform float byLevel, levels; // 1 where colours are the levels'; the coarsest level
-${rampOf(kLevelRamp)}
-vec3 colored(vec3 color, float level) { return mix(color, ramp(level / max(levels, 1.0)), byLevel); }
-`;
 
-// What is not drawn: beyond the plane, and in the box that shows tetrahedra.
-const kCut = `
-uniform vec4 clip; // normal and offset; normal 0: none
+// Discards fragments beyond the clip plane, and those in the box that shows shrunken tetrahedra instead.
+const kClipping = `
+uniform vec4 clip; // normal and offset, drawing space; normal 0: no clip plane
 uniform vec3 hiddenMin, hiddenMax;
-in vec3 place;
-void cut() {
-  if (dot(clip.xyz, place) > clip.w) discard;
-  if (all(greaterThan(place, hiddenMin)) && all(lessThan(place, hiddenMax))) discard;
+in vec3 vPosition;
+bool is_hidden() { return all(greaterThan(vPosition, hiddenMin)) && all(lessThan(vPosition, hiddenMax)); }
+void discard_clipped() {
+  if (dot(clip.xyz, vPosition) > clip.w) discard;
+  if (is_hidden()) discard;
 }
 `;
 
 const kSkinColor = `
-in vec3 normal;
-flat in float level;
+in vec3 vNormal;
+flat in float vLevel;
 uniform vec3 color;
-${kCut}${kLevels}${kLight}
-vec3 skin_color() { return lit(colored(color, level), normalize(normal + 1e-6), place); }
+${kClipping}${kLevelColoring}${kLighting}
+vec3 skin_color() { return lit(colored(color, vLevel), normalize(vNormal + 1e-6), vPosition); }
 `;
 
-export const kSkinFragment = `${kPrecision}${kSkinColor}
-out vec4 picture;
+export const kOpaqueFragment = `${kPrecision}${kSkinColor}
+out vec4 fragColor;
 void main() {
-  cut();
-  picture = vec4(skin_color(), 1.0);
+  discard_clipped();
+  fragColor = vec4(skin_color(), 1.0);
 }`;
 
-// Weighted blended transparency: McGuire and Bavoil 2013. Colours are added, each with a weight that falls with the depth; what shines through is
-// multiplied. One blend function serves both targets: colours are added, alphas multiplied.
-export const kVeilFragment = `${kPrecision}${kSkinColor}
+// Weighted blended order-independent transparency: McGuire and Bavoil, 2013. Colours are summed with a weight that
+// decreases with depth; transmittances are multiplied. Both targets share one blend function (WebGL 2 has no other):
+// rgb is added, alpha is multiplied by 1 - source alpha.
+export const kTransparentFragment = `${kPrecision}${kSkinColor}
 uniform float opacity;
-uniform vec2 depths; // nearest and farthest of the data
-layout(location = 0) out vec4 sum;
+uniform vec2 depthRange; // nearest and farthest depth of the data
+layout(location = 0) out vec4 accumulation;
 layout(location = 1) out vec4 weight;
 void main() {
-  cut();
-  float depth = -(viewMatrix * vec4(place, 1.0)).z;
-  float w = exp2(6.0 - 16.0 * clamp((depth - depths.x) / (depths.y - depths.x), 0.0, 1.0)) * opacity;
-  sum = vec4(skin_color() * w, opacity);
+  discard_clipped();
+  float depth = -(viewMatrix * vec4(vPosition, 1.0)).z;
+  float w = exp2(6.0 - 16.0 * clamp((depth - depthRange.x) / (depthRange.y - depthRange.x), 0.0, 1.0)) * opacity;
+  accumulation = vec4(skin_color() * w, opacity);
   weight = vec4(w, 0.0, 0.0, 1.0);
 }`;
 
+// The weighted mean of the transparent colours; alpha: 1 - the product of their transmittances.
+export const kTransparencyCompositeFragment = `${kPrecision}
+in vec2 vUv;
+uniform sampler2D accumulations, weights;
+out vec4 fragColor;
+void main() {
+  vec4 sum = texture(accumulations, vUv);
+  fragColor = vec4(sum.rgb / max(texture(weights, vUv).r, 1e-6), 1.0 - sum.a);
+}`;
+
 export const kEdgeFragment = `${kPrecision}
-in vec3 normal;
-flat in float level;
-uniform vec4 ink;
+in vec3 vNormal;
+flat in float vLevel;
+uniform vec4 lineColor;
 uniform vec3 spacing;
 uniform float pixelScale;
-${kCut}
-out vec4 picture;
+${kClipping}
+out vec4 fragColor;
 void main() {
-  cut();
-  float pixels = exp2(level) * min(spacing.x, min(spacing.y, spacing.z)) * pixelScale * gl_FragCoord.w; // about an edge's length
-  picture = vec4(ink.rgb, ink.a * clamp(pixels / 8.0, 0.12, 1.0)); // many thin lines in a place would be but dark
+  discard_clipped();
+  // About the length of an edge on screen. Short edges fade: where many lie close together they would merge to black.
+  float pixels = exp2(vLevel) * min(spacing.x, min(spacing.y, spacing.z)) * pixelScale * gl_FragCoord.w;
+  fragColor = vec4(lineColor.rgb, lineColor.a * clamp(pixels / 8.0, 0.12, 1.0));
 }`;
 
 export const kCapVertex = `${kPrecision}
-in uvec4 position; // three floats' bits; distances from three sides, and the level
-out vec3 sides;
-flat out float level;
-${kPlace}
+in uvec4 position; // the bits of three floats; then the distances from the triangle's sides, and the level of detail
+out vec3 vSides;
+flat out float vLevel;
+${kTransform}
 void main() {
-  put(unpacked(position.xyz));
-  sides = vec3(uvec3(position.w, position.w >> 8, position.w >> 16) & 255u) / 255.0;
-  level = float(position.w >> 24);
+  transform(drawing_position(position.xyz));
+  vSides = vec3(uvec3(position.w, position.w >> 8, position.w >> 16) & 255u) / 255.0;
+  vLevel = float(position.w >> 24);
 }`;
 
+// The cut faces of tetrahedra, with their edges as dark lines.
 export const kCapFragment = `${kPrecision}
-in vec3 place;
-in vec3 sides;
-flat in float level;
+in vec3 vSides;
+flat in float vLevel;
 uniform vec3 color;
-uniform vec4 clip;
-uniform vec3 hiddenMin, hiddenMax;
-uniform float outline; // pixels
-${kLevels}${kLight}
-out vec4 picture;
+uniform float edgeWidth; // half of it, pixels
+${kClipping}${kLevelColoring}${kLighting}
+out vec4 fragColor;
 void main() {
-  if (all(greaterThan(place, hiddenMin)) && all(lessThan(place, hiddenMax))) discard;
-  vec3 to_eye = normalize(cameraPosition - place);
+  if (is_hidden()) discard;
+  vec3 to_eye = normalize(cameraPosition - vPosition);
   vec3 facing = dot(clip.xyz, to_eye) < 0.0 ? -clip.xyz : clip.xyz;
-  vec3 shade = lit(colored(color, level), normalize(facing + 0.7 * to_eye), place); // a cut at a slant is to be read, too
-  vec3 slope = fwidth(sides);
-  vec3 pixels = sides / max(slope, 1e-6);
-  float near = min(min(pixels.x, pixels.y), pixels.z);
-  float line = 1.0 - smoothstep(outline - 0.5, outline + 0.5, near);
-  float small = clamp(0.14 / max(max(max(slope.x, slope.y), slope.z), 1e-6), 0.0, 1.0); // fades where triangles are but a few pixels
-  picture = vec4(mix(shade, shade * 0.45, line * small), 1.0);
+  // The normal is bent towards the eye, so that a cut seen at a grazing angle is not too dark.
+  vec3 shade = lit(colored(color, vLevel), normalize(facing + 0.7 * to_eye), vPosition);
+  vec3 slope = fwidth(vSides);
+  vec3 pixels = vSides / max(slope, 1e-6);
+  float nearest = min(min(pixels.x, pixels.y), pixels.z);
+  float line = 1.0 - smoothstep(edgeWidth - 0.5, edgeWidth + 0.5, nearest);
+  float fade = clamp(0.14 / max(max(max(slope.x, slope.y), slope.z), 1e-6), 0.0, 1.0); // triangles of a few pixels
+  fragColor = vec4(mix(shade, shade * 0.45, line * fade), 1.0);
 }`;
 
 export const kTetsVertex = `${kPrecision}
 in uvec3 position;
 in uvec3 center;
-in uint kind; // surface and level
+in uint kind; // surface and level of detail
 uniform float shrink;
-out vec3 whole; // the place before shrinking
-flat out float level;
-out vec2 share; // how many corners are on alpha and on beta, over the triangle
-${kPlace}
+out vec3 vUnshrunk;
+flat out float vLevel;
+out vec2 vOnSurface; // interpolated over the triangle: 1 where all corners lie on alpha; the same for beta
+${kTransform}
 void main() {
-  vec3 c = unpacked(center);
-  whole = unpacked(position);
-  put(c + (whole - c) * shrink);
+  vec3 c = drawing_position(center);
+  vUnshrunk = drawing_position(position);
+  transform(c + (vUnshrunk - c) * shrink);
   uint surface = kind & 255u;
-  share = vec2(surface == 1u, surface == 2u);
-  level = float((kind >> 8) & 255u);
+  vOnSurface = vec2(surface == 1u, surface == 2u);
+  vLevel = float((kind >> 8) & 255u);
 }`;
 
 export const kTetsFragment = `${kPrecision}
-in vec3 place;
-in vec3 whole;
-flat in float level;
-in vec2 share;
+in vec3 vPosition;
+in vec3 vUnshrunk;
+flat in float vLevel;
+in vec2 vOnSurface;
 uniform vec3 alpha, beta, box;
 uniform vec4 clip;
-${kLevels}${kLight}
-out vec4 picture;
+${kLevelColoring}${kLighting}
+out vec4 fragColor;
 void main() {
-  vec3 n = normalize(cross(dFdx(place), dFdy(place)));
-  if (dot(clip.xyz, whole) > clip.w) discard;
-  vec3 color = share.x > 0.999 ? alpha : share.y > 0.999 ? beta : box;
-  color *= 0.5 + 0.5 * abs(dot(n, normalize(cameraPosition - place))); // what is seen at a slant is darker, or gaps do not show
-  picture = vec4(lit(colored(color, level), n, place), 1.0);
+  vec3 n = normalize(cross(dFdx(vPosition), dFdy(vPosition)));
+  if (dot(clip.xyz, vUnshrunk) > clip.w) discard;
+  vec3 color = vOnSurface.x > 0.999 ? alpha : vOnSurface.y > 0.999 ? beta : box;
+  color *= 0.5 + 0.5 * abs(dot(n, normalize(cameraPosition - vPosition))); // darker at grazing angles: shows the gaps
+  fragColor = vec4(lit(colored(color, vLevel), n, vPosition), 1.0);
 }`;
 
-// Adds what is behind to, and takes what is in front from, the way of each ray: the sum is its length within the solid.
+// Back faces add their distance from the eye, front faces subtract it: the sum is the length of the ray in the solid.
 export const kThicknessFragment = `${kPrecision}
-in vec3 place;
+in vec3 vPosition;
 uniform vec3 cameraPosition;
 uniform vec4 clip;
-uniform float capFacing; // 0: the skin; otherwise a cap, 1 where it is seen from outside, -1 from inside
+uniform float capFacing; // 0: a mesh surface; 1: a cap seen from outside the solid; -1: a cap seen from inside
 out vec4 sum;
 void main() {
-  if (capFacing == 0.0 && dot(clip.xyz, place) > clip.w) discard;
+  if (capFacing == 0.0 && dot(clip.xyz, vPosition) > clip.w) discard;
   bool front = capFacing == 0.0 ? gl_FrontFacing : capFacing > 0.0;
-  float way = distance(cameraPosition, place);
-  sum = vec4(front ? -way : way, 1.0, 0.0, 0.0);
+  float eyeDistance = distance(cameraPosition, vPosition);
+  sum = vec4(front ? -eyeDistance : eyeDistance, 1.0, 0.0, 0.0);
 }`;
 
+export const kThicknessCompositeFragment = `${kPrecision}
+in vec2 vUv;
+uniform sampler2D thickness;
+uniform float maximum; // at the end of the colour map
+out vec4 fragColor;
+${colorMapGlsl(kThicknessColors)}
+void main() {
+  float t = clamp(texture(thickness, vUv).r / maximum, 0.0, 1.0);
+  fragColor = vec4(color_map(t), smoothstep(0.0, 0.004, t));
+}`;
+
+// Reduces the thickness to 32 x 32 blocks: each fragment is the maximum of a block, sampled at every few texels.
+export const kBlockMaximumFragment = `${kPrecision}
+uniform sampler2D thickness;
+uniform ivec2 size;
+out vec4 maximum;
+void main() {
+  ivec2 block = (size + 31) / 32;
+  ivec2 first = ivec2(gl_FragCoord.xy) * block;
+  ivec2 stride = max(block / 16, 1);
+  float greatest = 0.0;
+  for (int y = 0; y < block.y; y += stride.y)
+    for (int x = 0; x < block.x; x += stride.x)
+      greatest = max(greatest, texelFetch(thickness, min(first + ivec2(x, y), size - 1), 0).r);
+  maximum = vec4(greatest, 0.0, 0.0, 1.0);
+}`;
+
+// For picking: the distance from the eye in red; alpha 1 where something is drawn.
 export const kDistanceFragment = `${kPrecision}
 uniform vec3 cameraPosition;
-${kCut}
-out vec4 picture;
+${kClipping}
+out vec4 fragColor;
 void main() {
-  cut();
-  picture = vec4(distance(cameraPosition, place), 0.0, 0.0, 1.0);
+  discard_clipped();
+  fragColor = vec4(distance(cameraPosition, vPosition), 0.0, 0.0, 1.0);
 }`;
 
+// One triangle that covers the screen, without vertex attributes.
 export const kFullScreenVertex = `${kPrecision}
-out vec2 at;
+out vec2 vUv;
 void main() {
-  at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0;
-  gl_Position = vec4(at * 2.0 - 1.0, 0.0, 1.0);
-}`;
-
-export const kVeilOverFragment = `${kPrecision}
-in vec2 at;
-uniform sampler2D sums, weights;
-out vec4 picture;
-void main() {
-  vec4 sum = texture(sums, at);
-  picture = vec4(sum.rgb / max(texture(weights, at).r, 1e-6), 1.0 - sum.a);
-}`;
-
-// Thin is dark and thick is bright: inferno, by a polynomial of degree 6 (Matt Zucker's fit, public domain).
-export const kThicknessOverFragment = `${kPrecision}
-in vec2 at;
-uniform sampler2D sums;
-uniform float most; // what the end of the ramp stands for
-out vec4 picture;
-${rampOf(kThicknessRamp)}
-void main() {
-  float way = texture(sums, at).r;
-  float t = clamp(way / most, 0.0, 1.0);
-  picture = vec4(ramp(t), smoothstep(0.0, 0.004, t));
+  vUv = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0;
+  gl_Position = vec4(vUv * 2.0 - 1.0, 0.0, 1.0);
 }`;
 
 export const kLineVertex = `${kPrecision}
@@ -271,31 +264,15 @@ uniform mat4 viewMatrix, projectionMatrix;
 void main() { gl_Position = projectionMatrix * viewMatrix * vec4(position, 1.0); }`;
 
 export const kLineFragment = `${kPrecision}
-uniform vec4 ink;
-out vec4 picture;
-void main() { picture = ink; }`;
+uniform vec4 lineColor;
+out vec4 fragColor;
+void main() { fragColor = lineColor; }`;
 
-// Draws nothing; but what is given to it to draw is uploaded.
-export const kStagingVertex = `${kPrecision}
+// For uploads (upload.ts): reads the attribute, so that its buffer is needed; draws nothing.
+export const kUploadVertex = `${kPrecision}
 in uvec3 position;
 void main() { gl_Position = vec4(uintBitsToFloat(position), 0.0); }`;
 
-export const kStagingFragment = `${kPrecision}
-out vec4 picture;
-void main() { picture = vec4(0.0); }`;
-
-// The greatest of a block's sums, of which one in a stride is looked at.
-export const kMostFragment = `${kPrecision}
-uniform sampler2D sums;
-uniform ivec2 size;
-out vec4 most;
-void main() {
-  ivec2 block = (size + 31) / 32;
-  ivec2 first = ivec2(gl_FragCoord.xy) * block;
-  ivec2 stride = max(block / 16, 1);
-  float greatest = 0.0;
-  for (int y = 0; y < block.y; y += stride.y)
-    for (int x = 0; x < block.x; x += stride.x)
-      greatest = max(greatest, texelFetch(sums, min(first + ivec2(x, y), size - 1), 0).r);
-  most = vec4(greatest, 0.0, 0.0, 1.0);
-}`;
+export const kUploadFragment = `${kPrecision}
+out vec4 fragColor;
+void main() { fragColor = vec4(0.0); }`;

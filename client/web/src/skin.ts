@@ -1,13 +1,14 @@
-// The skin's pieces on the graphics card. A new skin is taken as a whole: its pieces are uploaded a few at a time, between pictures, and only then
-// take the place of the old ones, all at once. Nothing here looks at single vertices.
+// The skin: the boundary of the mesh, as pieces on the graphics card. The pieces of a new version are uploaded a few
+// per frame; once all are there they replace the old ones in one step, so that no frame shows cracks. Nothing here
+// visits single vertices.
 import { BufferAttribute, BufferGeometry, Group, LineSegments, type Material, Mesh, Sphere, Vector3 } from 'three';
 import { type Frame, toDrawing } from './frame';
 import type { SurfaceMaterials } from './materials';
 import type { Piece, Skin, Vec3 } from './messages';
 import type { Uploader } from './upload';
-import { add, diagonal, middle } from './vec';
+import { add, center, diagonal } from './vec';
 
-interface Drawn {
+interface PieceObjects {
   mesh: Mesh;
   lines: LineSegments | null;
   bytes: number;
@@ -18,98 +19,95 @@ export class SkinView {
   readonly faces = new Group();
   readonly edges = new Group();
   version = 0; // of what is shown; 0: nothing yet
-  triangles = 0;
-  bytes = 0; // of buffers
-  private pieces = new Map<number, Drawn>();
-  private waiting: Skin[] = [];
-  private staged: { id: number; drawn: Drawn }[] = [];
-  private uploaded = 0; // pieces of the first that waits
+  triangles = 0; // shown
+  bytes = 0; // of the buffers of what is shown
+  private pieces = new Map<number, PieceObjects>(); // shown, by id
+  private pending: Skin[] = []; // oldest first
+  private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
 
   constructor(private uploader: Uploader, private materials: SurfaceMaterials) {
     for (const group of [this.faces, this.edges]) group.matrixAutoUpdate = false;
   }
 
-  get busy(): boolean {
-    return this.waiting.length > 0;
+  get isBusy(): boolean {
+    return this.pending.length > 0;
   }
 
   take(skin: Skin): void {
-    this.waiting.push(skin);
+    this.pending.push(skin);
   }
 
-  // Uploads while the uploader is open. Whether a skin is complete: then `swap` is due.
+  // Uploads within the uploader's budget. Returns whether the first pending version is complete: swap() is next.
   upload(frame: Frame): boolean {
-    const skin = this.waiting[0];
+    const skin = this.pending[0];
     if (!skin) return false;
-    while (this.uploaded < skin.pieces.length && this.uploader.open) {
-      const piece = skin.pieces[this.uploaded++]!;
-      const drawn = this.made(piece, frame);
-      this.uploader.send(drawn.mesh.geometry, drawn.bytes);
-      if (drawn.lines) this.uploader.send(drawn.lines.geometry, 0); // counted already
-      this.staged.push({ id: piece.id, drawn });
+    while (this.uploaded.length < skin.pieces.length && this.uploader.hasBudget) {
+      const piece = skin.pieces[this.uploaded.length]!;
+      const objects = this.objectsOf(piece, frame);
+      this.uploader.send(objects.mesh.geometry, objects.bytes);
+      if (objects.lines) this.uploader.send(objects.lines.geometry, 0); // counted with the mesh
+      this.uploaded.push({ id: piece.id, objects });
     }
-    return this.uploaded === skin.pieces.length;
+    return this.uploaded.length === skin.pieces.length;
   }
 
-  // The first skin that waits takes the place of what is shown.
+  // Shows the first pending version.
   swap(): void {
-    const skin = this.waiting.shift()!;
-    if (skin.reset) for (const id of [...this.pieces.keys()]) this.drop(id);
-    for (const id of skin.removed) this.drop(id);
-    for (const { id, drawn } of this.staged) {
-      this.drop(id);
-      this.pieces.set(id, drawn);
-      this.faces.add(drawn.mesh);
-      if (drawn.lines) this.edges.add(drawn.lines);
-      this.triangles += drawn.triangles;
-      this.bytes += drawn.bytes;
+    const skin = this.pending.shift()!;
+    if (skin.reset) for (const id of [...this.pieces.keys()]) this.remove(id);
+    for (const id of skin.removed) this.remove(id);
+    for (const { id, objects } of this.uploaded) {
+      this.remove(id);
+      this.pieces.set(id, objects);
+      this.faces.add(objects.mesh);
+      if (objects.lines) this.edges.add(objects.lines);
+      this.triangles += objects.triangles;
+      this.bytes += objects.bytes;
     }
-    this.staged = [];
-    this.uploaded = 0;
+    this.uploaded = [];
     this.version = skin.version;
   }
 
   clear(): void {
-    for (const { drawn } of this.staged) free(drawn);
-    this.staged = [];
-    this.uploaded = 0;
-    this.waiting = [];
-    for (const id of [...this.pieces.keys()]) this.drop(id);
+    for (const { objects } of this.uploaded) dispose(objects);
+    this.uploaded = [];
+    this.pending = [];
+    for (const id of [...this.pieces.keys()]) this.remove(id);
     this.version = 0;
   }
 
-  // What the faces are drawn with from now on: one material, or one for each surface.
+  // materials: for the next draw; either one, or one per surface.
   use(materials: Material | Material[]): void {
     for (const { mesh } of this.pieces.values()) mesh.material = materials;
   }
 
-  private drop(id: number): void {
-    const drawn = this.pieces.get(id);
-    if (!drawn) return;
+  private remove(id: number): void {
+    const objects = this.pieces.get(id);
+    if (!objects) return;
     this.pieces.delete(id);
-    this.faces.remove(drawn.mesh);
-    if (drawn.lines) this.edges.remove(drawn.lines);
-    this.triangles -= drawn.triangles;
-    this.bytes -= drawn.bytes;
-    free(drawn);
+    this.faces.remove(objects.mesh);
+    if (objects.lines) this.edges.remove(objects.lines);
+    this.triangles -= objects.triangles;
+    this.bytes -= objects.bytes;
+    dispose(objects);
   }
 
-  private made(piece: Piece, frame: Frame): Drawn {
+  private objectsOf(piece: Piece, frame: Frame): PieceObjects {
     const vertices = new BufferAttribute(new Uint32Array(piece.vertices), 4);
-    const sphere = bounds(piece, frame);
-    const geometry = (indices: ArrayBuffer, counts: [number, number, number], each: number) => {
+    const sphere = boundingSphere(piece, frame);
+    const geometry = (indices: ArrayBuffer, counts: [number, number, number], indicesEach: number) => {
       const made = new BufferGeometry();
       made.setAttribute('position', vertices);
       made.setIndex(new BufferAttribute(new Uint32Array(indices), 1));
       made.boundingSphere = sphere;
       let start = 0;
       counts.forEach((count, surface) => {
-        if (count > 0) made.addGroup(start, count * each, surface);
-        start += count * each;
+        if (count > 0) made.addGroup(start, count * indicesEach, surface);
+        start += count * indicesEach;
       });
       return made;
     };
-    const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials.solid);
+    const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials.opaque);
     const lines = piece.edges ? new LineSegments(geometry(piece.edges, piece.edgeCounts, 2), this.materials.edges) : null;
     for (const object of [mesh, lines]) if (object) object.matrixAutoUpdate = false;
     return {
@@ -121,13 +119,15 @@ export class SkinView {
   }
 }
 
-function bounds(piece: Piece, frame: Frame): Sphere {
-  const world = (p: Vec3): Vec3 => add(frame.origin, [p[0] * frame.spacing[0], p[1] * frame.spacing[1], p[2] * frame.spacing[2]]);
+// In drawing space.
+function boundingSphere(piece: Piece, frame: Frame): Sphere {
+  const { origin, spacing } = frame;
+  const world = (p: Vec3): Vec3 => add(origin, [p[0] * spacing[0], p[1] * spacing[1], p[2] * spacing[2]]);
   const box = { min: world(piece.min), max: world(piece.max) };
-  return new Sphere(new Vector3(...toDrawing(frame, middle(box))), diagonal(box) / 2);
+  return new Sphere(new Vector3(...toDrawing(frame, center(box))), diagonal(box) / 2);
 }
 
-function free(drawn: Drawn): void {
-  drawn.mesh.geometry.dispose();
-  drawn.lines?.geometry.dispose();
+function dispose(objects: PieceObjects): void {
+  objects.mesh.geometry.dispose();
+  objects.lines?.geometry.dispose();
 }

@@ -1,9 +1,12 @@
-// What a view is, and how it is written into the address, so that it can be sent to a colleague. Pure.
+// The state of the view, and how it is written into the fragment of the page's address, so that a link shows the same
+// view. Pure functions. The fragment:
 //
-// #data=NAME&eye=x,y,z&at=x,y,z&up=x,y,z&fov=30 and, where they are not as at first: px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset,
-// roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets thickness wire levels), shrink, alpha beta box (rrggbb,opacity).
-import type { Pose } from './camera';
-import { kFov } from './camera';
+//   #data=NAME&eye=x,y,z&at=x,y,z&up=x,y,z&fov=30
+//
+// and, where they differ from the defaults: px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset,
+// roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe), shrink, and alpha, beta and box
+// (each rrggbb,opacity).
+import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
 import { cross, length, sub, unit } from './vec';
 
@@ -13,27 +16,27 @@ export interface Look {
 }
 
 export type SurfaceName = 'alpha' | 'beta' | 'box';
-export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // in the order of a piece's groups
+export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // the order of the groups in a Piece
 
 export interface ViewState {
-  dataset: string | null; // null: the first that the server has
-  pose: Pose | null; // null: the whole data set
-  pixelError: number;
-  maxTets: number | null;
-  memory: number | null; // MB for updates
+  dataset: string | null; // null: the server's first
+  pose: Pose | null; // null: shows the whole data set
+  pixelError: number; // largest screen-space error, pixels; 0.1 to 64
+  maxTets: number | null; // null: no limit
+  memory: number | null; // MB for updates; null: no limit
   clip: Plane | null;
   region: Box | null;
-  tets: boolean; // shrunken, in the region
-  shrink: number;
+  tets: boolean; // shrunken tetrahedra in the region
+  shrink: number; // their size, 0.4 to 1
   thickness: boolean;
   wireframe: boolean;
-  levels: boolean;
+  levels: boolean; // colour by level of detail
   alpha: Look;
   beta: Look;
   box: Look;
 }
 
-export const kFirst: Readonly<ViewState> = {
+export const kDefaults: Readonly<ViewState> = {
   dataset: null,
   pose: null,
   pixelError: 1,
@@ -53,7 +56,7 @@ export const kFirst: Readonly<ViewState> = {
 
 const kFlags = ['tets', 'thickness', 'levels', 'wireframe'] as const;
 
-// Seven digits: a hundredth of a pixel on any screen.
+// Seven digits: precise to a hundredth of a pixel on any screen.
 const write = (numbers: number[]): string => numbers.map((n) => String(Number(n.toPrecision(7)))).join(',');
 
 export function toHash(state: ViewState): string {
@@ -66,57 +69,60 @@ export function toHash(state: ViewState): string {
     put('up', write(state.pose.up));
     if (state.pose.fov !== kFov) put('fov', write([state.pose.fov]));
   }
-  if (state.pixelError !== kFirst.pixelError) put('px', write([state.pixelError]));
+  if (state.pixelError !== kDefaults.pixelError) put('px', write([state.pixelError]));
   if (state.maxTets !== null) put('tets', write([state.maxTets]));
   if (state.memory !== null) put('mb', write([state.memory]));
   if (state.clip) put('clip', write([...state.clip.normal, state.clip.offset]));
   if (state.region) put('roi', write([...state.region.min, ...state.region.max]));
   const flags = kFlags.filter((flag) => state[flag]);
   if (flags.length > 0) put('show', flags.join(','));
-  if (state.shrink !== kFirst.shrink) put('shrink', write([state.shrink]));
+  if (state.shrink !== kDefaults.shrink) put('shrink', write([state.shrink]));
   for (const name of kSurfaces) {
     const look = state[name];
-    if (look.color !== kFirst[name].color || look.opacity !== kFirst[name].opacity) put(name, `${look.color.slice(1)},${write([look.opacity])}`);
+    const standard = kDefaults[name];
+    if (look.color !== standard.color || look.opacity !== standard.opacity) put(name, `${look.color.slice(1)},${write([look.opacity])}`);
   }
   return parts.length > 0 ? '#' + parts.join('&') : '';
 }
 
-const kFar = 1e30; // beyond it, what is drawn in 32 bits is nowhere
+const kGreatest = 1e30; // greater coordinates would overflow float32 on the graphics card
 
-// n numbers that are not too large, or null.
+// n comma-separated numbers, or null if there are not exactly n or one is too large.
 function read(text: string | null, n: number): number[] | null {
   const numbers = text === null ? [] : text.split(',').map((word) => (word.trim() === '' ? NaN : Number(word)));
-  return numbers.length === n && numbers.every((x) => Math.abs(x) <= kFar) ? numbers : null;
+  return numbers.length === n && numbers.every((x) => Math.abs(x) <= kGreatest) ? numbers : null;
 }
 
-// One that is not along the line of sight: as wished, or else what is nearest to it.
-function upFor(eye: Vec3, lookAt: Vec3, wish: Vec3): Vec3 {
+// An up vector that is not parallel to the direction of view: the preferred one if possible.
+function upFor(eye: Vec3, lookAt: Vec3, preferred: Vec3): Vec3 {
   const ahead = unit(sub(lookAt, eye));
-  for (const up of [wish, [0, 0, 1], [0, 1, 0]] as Vec3[]) {
+  for (const up of [preferred, [0, 0, 1], [0, 1, 0]] as Vec3[]) {
     if (length(cross(ahead, unit(up))) > 1e-3) return unit(up);
   }
   return [1, 0, 0];
 }
 
-function readOne(text: string | null, least: number, most: number): number | null {
+function readClamped(text: string | null, least: number, greatest: number): number | null {
   const number = read(text, 1);
-  return number ? Math.min(most, Math.max(least, number[0]!)) : null;
+  return number ? Math.min(greatest, Math.max(least, number[0]!)) : null;
 }
 
-// What is missing or makes no sense is as at first.
+// Fields that are missing or invalid get their defaults; numbers out of range are clamped.
 export function fromHash(hash: string): ViewState {
   const fields = new URLSearchParams(hash.replace(/^#/, '').replaceAll('+', '%2B'));
   const get = (key: string) => fields.get(key);
-  const state: ViewState = { ...kFirst, dataset: get('data') };
+  const state: ViewState = { ...kDefaults, dataset: get('data') };
   const eye = read(get('eye'), 3);
   const at = read(get('at'), 3);
   const up = read(get('up'), 3);
   if (eye && at && eye.some((x, i) => x !== at[i])) {
-    state.pose = { eye: eye as Vec3, lookAt: at as Vec3, up: upFor(eye as Vec3, at as Vec3, (up ?? [0, 0, 1]) as Vec3), fov: readOne(get('fov'), 5, 120) ?? kFov };
+    const [from, to] = [eye as Vec3, at as Vec3];
+    const fov = readClamped(get('fov'), 5, 120) ?? kFov;
+    state.pose = { eye: from, lookAt: to, up: upFor(from, to, (up ?? [0, 0, 1]) as Vec3), fov };
   }
-  state.pixelError = readOne(get('px'), 0.1, 64) ?? kFirst.pixelError;
-  state.maxTets = readOne(get('tets'), 1, 1e9);
-  state.memory = readOne(get('mb'), 1, 1e5);
+  state.pixelError = readClamped(get('px'), 0.1, 64) ?? kDefaults.pixelError;
+  state.maxTets = readClamped(get('tets'), 1, 1e9);
+  state.memory = readClamped(get('mb'), 1, 1e5);
   const clip = read(get('clip'), 4);
   if (clip && (clip[0] || clip[1] || clip[2])) state.clip = { normal: unit(clip.slice(0, 3) as Vec3), offset: clip[3]! };
   const roi = read(get('roi'), 6);
@@ -127,10 +133,10 @@ export function fromHash(hash: string): ViewState {
   const shown = (get('show') ?? '').split(',');
   for (const flag of kFlags) state[flag] = shown.includes(flag);
   state.tets = state.tets && state.region !== null;
-  state.shrink = readOne(get('shrink'), 0.4, 1) ?? kFirst.shrink;
+  state.shrink = readClamped(get('shrink'), 0.4, 1) ?? kDefaults.shrink;
   for (const name of kSurfaces) {
     const look = /^([0-9a-f]{6}),([0-9.e-]+)$/i.exec(get(name) ?? '');
-    const opacity = readOne(look?.[2] ?? null, 0, 1);
+    const opacity = readClamped(look?.[2] ?? null, 0, 1);
     if (look && opacity !== null) state[name] = { color: '#' + look[1]!.toLowerCase(), opacity };
   }
   return state;

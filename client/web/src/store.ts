@@ -1,4 +1,4 @@
-// Values that others watch. Watchers are called at once, in the order they came, with the names of what changed.
+// An observable record. Watchers are called synchronously, in the order in which they were added.
 export class Store<T extends object> {
   private watchers: ((value: Readonly<T>, changed: ReadonlySet<keyof T>) => void)[] = [];
 
@@ -18,7 +18,7 @@ export class Store<T extends object> {
     for (const watcher of this.watchers) watcher(this.current, changed);
   }
 
-  // names: those that matter; all if there are none. Called once right away, too.
+  // Calls the watcher now, and after each change of one of these names; none: of any name.
   watch(names: (keyof T)[], watcher: (value: Readonly<T>) => void): void {
     this.watchers.push((value, changed) => {
       if (names.length === 0 || names.some((name) => changed.has(name))) watcher(value);

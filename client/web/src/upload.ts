@@ -1,43 +1,47 @@
-// Brings geometry to the graphics card before it is to be drawn. three.js uploads what it draws: so it draws nothing of it, into a picture of one pixel.
+// Uploads geometry to the graphics card before it is drawn, a limited amount per frame. three.js uploads what it draws,
+// so each geometry is drawn once with an empty draw range into a target of one pixel.
 import { BufferAttribute, BufferGeometry, Camera, Mesh, Scene, Sphere, type WebGLRenderer, WebGLRenderTarget } from 'three';
-import { stagingMaterial } from './materials';
+import { uploadMaterial } from './materials';
 
-const kStretchMs = 4; // of uploading between two pictures, and
-const kStretchBytes = 2e6; // ... at most so many: the browser takes them to another process, and waits for that where they are many
+// The budget of a frame. Bytes are limited, too: the browser copies them to its GPU process, and blocks this thread
+// while too many are on their way.
+const kBudgetMs = 4;
+const kBudgetBytes = 2e6;
 
 export class Uploader {
   private scene = new Scene();
   private target = new WebGLRenderTarget(1, 1);
-  private mesh = new Mesh(new BufferGeometry(), stagingMaterial());
-  private nobody = new Camera();
-  private end = 0;
+  private mesh = new Mesh(new BufferGeometry(), uploadMaterial());
+  private camera = new Camera();
+  private deadline = 0; // performance.now()
   private bytesLeft = 0;
 
   constructor(private renderer: WebGLRenderer) {
     this.mesh.frustumCulled = false;
     this.scene.add(this.mesh);
-    const nothing = new BufferGeometry(); // once, so that the first piece finds the shader ready
-    nothing.setAttribute('position', new BufferAttribute(new Uint32Array(4), 4));
-    this.send(nothing, 0);
-    nothing.dispose();
+    const empty = new BufferGeometry(); // compiles the shader, so that the first piece need not wait for it
+    empty.setAttribute('position', new BufferAttribute(new Uint32Array(4), 4));
+    this.send(empty, 0);
+    empty.dispose();
   }
 
-  begin(): void {
-    this.end = performance.now() + kStretchMs;
-    this.bytesLeft = kStretchBytes;
+  beginFrame(): void {
+    this.deadline = performance.now() + kBudgetMs;
+    this.bytesLeft = kBudgetBytes;
   }
 
-  // Whether there is time for more, since begin().
-  get open(): boolean {
-    return this.bytesLeft > 0 && performance.now() < this.end;
+  // Whether this frame's budget is not used up.
+  get hasBudget(): boolean {
+    return this.bytesLeft > 0 && performance.now() < this.deadline;
   }
 
+  // bytes: what to count against the budget.
   send(geometry: BufferGeometry, bytes: number): void {
-    geometry.boundingSphere ??= new Sphere(); // or three.js goes through all vertices to sort what it draws
+    geometry.boundingSphere ??= new Sphere(); // else three.js visits all vertices to compute one
     geometry.setDrawRange(0, 0);
     this.mesh.geometry = geometry;
     this.renderer.setRenderTarget(this.target);
-    this.renderer.render(this.scene, this.nobody);
+    this.renderer.render(this.scene, this.camera);
     this.renderer.setRenderTarget(null);
     geometry.setDrawRange(0, Infinity);
     this.bytesLeft -= bytes;

@@ -1,22 +1,24 @@
-// The picture and what comes from the worker for it: uploads between frames, draws when something has changed, and tells the worker what is shown.
+// Schedules the picture: uploads what the worker sends between frames, draws when something has changed, and reports
+// which version of the skin is shown.
 import { fitted, type Pose } from './camera';
 import { type Frame, frameOf } from './frame';
-import type { Listed } from './live';
+import { GpuFence } from './gpu_fence';
 import type { Cap, Skin, Tets } from './messages';
 import { Picture } from './picture';
 import type { ViewState } from './state';
+import type { ListedDataset } from './status';
 import type { Store } from './store';
 import { add, sub } from './vec';
 
 export interface Stats {
   frames: number; // drawn
-  lastFrameMs: number; // what the last took on this thread
-  longestBlock: number; // ms of this thread that taking, uploading or swapping a skin took at a stretch, drawing apart; since it was last set to 0
-  skinVersion: number; // on screen
+  lastFrameMs: number; // of this thread, for the last frame
+  longestBlock: number; // ms: longest block of this thread by uploads, since it was last set to 0
+  skinVersion: number; // shown; 0: none
   skinTriangles: number;
   skinBytes: number; // of buffers on the graphics card
-  capTriangles: number; // on screen
-  tets: number; // shrunken, on screen
+  capTriangles: number; // shown
+  tets: number; // shrunken tetrahedra shown
   firstMeshMs: number; // from navigation to the first picture with triangles; 0: none yet
 }
 
@@ -33,193 +35,184 @@ export class Viewer {
     tets: 0,
     firstMeshMs: 0,
   };
-  frame: Frame | null = null;
-  onShown: (version: number) => void = () => {};
+  frame: Frame | null = null; // of the open data set
+  onShown: (version: number) => void = () => {}; // of the skin
   onDrawn: () => void = () => {};
   onResize: () => void = () => {};
-  onContext: (lost: boolean) => void = () => {};
-  private coarsest = 1;
-  private cap: Cap | null = null; // that waits to be shown
-  private dirty = true;
-  private asked = false;
-  private lost = false;
-  private fence: WebGLSync | null = null; // behind the last picture
+  onContext: (isLost: boolean) => void = () => {}; // the WebGL context was lost or restored
+  private coarsestLevel = 1;
+  private pendingCap: Cap | null = null;
+  private isDirty = true; // a draw is needed
+  private isScheduled = false; // step() is requested
+  private isLost = false; // the WebGL context
+  private fence: GpuFence;
 
   // Throws if there is no WebGL 2.
   constructor(canvas: HTMLCanvasElement, private view: Store<ViewState>) {
     this.picture = new Picture(canvas);
+    this.fence = new GpuFence(this.picture.renderer.getContext() as WebGL2RenderingContext);
     new ResizeObserver(() => {
       if (!this.picture.resize()) return;
       this.onResize();
-      this.draw(); // at once: the canvas has just been emptied
+      this.draw(); // at once: resizing clears the canvas
     }).observe(canvas);
     canvas.addEventListener('webglcontextlost', () => {
-      this.lost = true;
-      this.fence = null;
+      this.isLost = true;
+      this.fence.forget();
       this.onContext(true);
     });
     canvas.addEventListener('webglcontextrestored', () => {
-      this.lost = false;
+      this.isLost = false;
       this.onContext(false);
-      this.changed(); // buffers come again from what the pieces keep
+      this.invalidate(); // three.js uploads the buffers again, from the arrays it keeps
     });
-    this.picture.thickness.onMost = () => this.changed();
+    this.picture.thickness.onMaximum = () => this.invalidate();
     view.watch([], () => {
       this.applyLooks();
-      this.changed();
+      this.invalidate();
     });
   }
 
-  open(dataset: Listed): void {
+  open(dataset: ListedDataset): void {
     this.picture.skin.clear();
-    this.cap = null;
+    this.pendingCap = null;
     this.frame = frameOf(dataset);
     this.picture.setFrame(this.frame);
     this.picture.setCap(this.frame, null);
     this.picture.tets.clear();
     this.picture.showTets(this.frame, null);
-    this.coarsest = Math.max(1, Math.ceil(Math.log2(Math.max(...dataset.dims) - 1)) - 1);
+    this.coarsestLevel = Math.max(1, Math.ceil(Math.log2(Math.max(...dataset.dims) - 1)) - 1);
     this.picture.resize();
     this.applyLooks();
-    this.changed();
+    this.invalidate();
   }
 
-  // Where one looks from: as chosen, or else at everything.
+  // The chosen camera, or else one that shows the whole data set; null: none is open.
   pose(): Pose | null {
     const { canvas } = this.picture;
-    return this.view.value.pose ?? (this.frame ? fitted(this.frame.box, canvas.clientWidth / Math.max(1, canvas.clientHeight)) : null);
+    const aspect = canvas.clientWidth / Math.max(1, canvas.clientHeight);
+    return this.view.value.pose ?? (this.frame ? fitted(this.frame.box, aspect) : null);
   }
 
   takeSkin(skin: Skin): void {
     this.timed(() => this.picture.skin.take(skin));
-    this.ask();
+    this.schedule();
   }
 
-  // A cap of a skin that is still to be shown waits for it.
+  // Shown together with the skin that it belongs to, or at once if that is shown already.
   takeCap(cap: Cap): void {
-    this.cap = cap;
-    this.ask();
+    this.pendingCap = cap;
+    this.schedule();
   }
 
   takeTets(tets: Tets): void {
     this.picture.tets.take(tets);
-    this.ask();
+    this.schedule();
   }
 
-  changed(): void {
-    this.dirty = true;
-    this.ask();
+  // Requests a draw.
+  invalidate(): void {
+    this.isDirty = true;
+    this.schedule();
   }
 
-  // What is seen without handles and guides.
+  // The canvas as PNG, without outlines; null if the browser cannot encode it.
   photograph(): Promise<Blob | null> {
     this.draw(false);
     return new Promise((resolve) => {
       this.picture.canvas.toBlob(resolve, 'image/png');
-      this.changed();
+      this.invalidate();
     });
   }
 
-  // Brings what is drawn at this pixel to the middle, to turn about it.
-  centre(x: number, y: number): void {
+  // Makes the point drawn at x, y (CSS pixels of the canvas) the centre of rotation.
+  centerOn(x: number, y: number): void {
     const pose = this.pose();
-    const at = this.frame && pose && !this.lost ? this.picture.at(this.frame, pose, x, y) : null;
-    if (!at || !pose) return;
-    this.view.set({ pose: { ...pose, lookAt: at, eye: add(at, sub(pose.eye, pose.lookAt)) } });
+    const point = this.frame && pose && !this.isLost ? this.picture.pointAt(this.frame, pose, x, y) : null;
+    if (!point || !pose) return;
+    this.view.set({ pose: { ...pose, lookAt: point, eye: add(point, sub(pose.eye, pose.lookAt)) } });
   }
 
-  private ask(): void {
-    if (this.asked) return;
-    this.asked = true;
+  private schedule(): void {
+    if (this.isScheduled) return;
+    this.isScheduled = true;
     requestAnimationFrame(() => this.step());
   }
 
   private step(): void {
-    this.asked = false;
-    if (this.lost) return;
-    if (this.drawing()) return this.ask();
+    this.isScheduled = false;
+    if (this.isLost) return;
+    // While the graphics card draws, any other WebGL call could block this thread until it is done; so none is made.
+    if (this.fence.isPending) return this.schedule();
     const { skin } = this.picture;
-    const shown = this.frame && this.waiting() ? this.timed(() => this.upload(this.frame!)) : 0;
-    if (this.dirty) this.draw();
+    const { frame } = this;
+    const shown = frame && this.isUploading() ? this.timed(() => this.upload(frame)) : 0;
+    if (this.isDirty) this.draw();
     if (shown > 0) {
       Object.assign(this.stats, { skinVersion: shown, skinTriangles: skin.triangles, skinBytes: skin.bytes });
-      if (this.stats.firstMeshMs === 0 && skin.triangles > 0) this.stats.firstMeshMs = performance.mark('intervale: first mesh').startTime;
+      if (this.stats.firstMeshMs === 0 && skin.triangles > 0) {
+        this.stats.firstMeshMs = performance.mark('intervale: first mesh').startTime;
+      }
       this.onShown(shown);
     }
-    if (this.waiting() || this.dirty) this.ask();
+    if (this.isUploading() || this.isDirty) this.schedule();
   }
 
-  private waiting(): boolean {
-    return this.picture.skin.busy || this.picture.tets.busy || this.cap !== null;
+  private isUploading(): boolean {
+    return this.picture.skin.isBusy || this.picture.tets.isBusy || this.pendingCap !== null;
   }
 
-  // Goes on with what waits to be uploaded. The version of the skin that is complete now; 0: none.
+  // Uploads for one frame's budget. Returns the version of the skin that this completed; 0: none.
   private upload(frame: Frame): number {
     const { skin, tets, uploader } = this.picture;
-    uploader.begin();
+    uploader.beginFrame();
     let shown = 0;
     if (skin.upload(frame)) {
-      if (this.cap && !uploader.open) return 0; // both in the next stretch
+      if (this.pendingCap && !uploader.hasBudget) return 0; // skin and cap together, in the next frame
       skin.swap();
       shown = skin.version;
-      this.dirty = true;
+      this.isDirty = true;
     }
-    if (this.cap && (!skin.busy || this.cap.version <= skin.version)) this.showCap(this.cap);
-    const complete = skin.busy ? null : tets.upload();
+    const cap = this.pendingCap;
+    if (cap && (!skin.isBusy || cap.version <= skin.version)) this.showCap(frame, cap);
+    const complete = skin.isBusy ? null : tets.upload();
     if (complete) {
       this.picture.showTets(frame, complete.box);
       this.stats.tets = complete.box ? complete.count : 0;
-      this.dirty = true;
+      this.isDirty = true;
     }
     return shown;
   }
 
-  private draw(withGuides = true): void {
+  private draw(withOutlines = true): void {
     const pose = this.pose();
-    if (!this.frame || !pose || this.lost) return;
+    if (!this.frame || !pose || this.isLost) return;
     const start = performance.now();
-    this.dirty = false;
+    this.isDirty = false;
     const { clip, region } = this.view.value;
-    this.picture.guides.set(this.frame, { region, plane: clip });
-    this.picture.draw(this.frame, pose, this.view.value, withGuides);
-    this.putFence();
+    this.picture.outlines.set(this.frame, region, clip);
+    this.picture.draw(this.frame, pose, this.view.value, withOutlines);
+    this.fence.insert();
     this.stats.frames++;
     this.stats.lastFrameMs = performance.now() - start;
     this.onDrawn();
   }
 
-  // Whether the graphics card is still at the last picture. Whatever is asked of it meanwhile may have to wait, and this thread with it; so nothing is.
-  private drawing(): boolean {
-    if (!this.fence) return false;
-    const gl = this.picture.renderer.getContext() as WebGL2RenderingContext;
-    if (gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return true;
-    gl.deleteSync(this.fence);
-    this.fence = null;
-    return false;
-  }
-
-  private putFence(): void {
-    const gl = this.picture.renderer.getContext() as WebGL2RenderingContext;
-    if (this.fence) gl.deleteSync(this.fence);
-    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    gl.flush();
-  }
-
-  private showCap(cap: Cap): void {
-    this.cap = null;
-    this.dirty = true;
-    if (this.frame) this.picture.setCap(this.frame, cap);
+  private showCap(frame: Frame, cap: Cap): void {
+    this.pendingCap = null;
+    this.isDirty = true;
+    this.picture.setCap(frame, cap);
     this.stats.capTriangles = cap.plane ? cap.triangles : 0;
   }
 
   private applyLooks(): void {
-    this.picture.setLooks(this.view.value, this.coarsest);
+    this.picture.setLooks(this.view.value, this.coarsestLevel);
   }
 
   private timed<T>(work: () => T): T {
     const start = performance.now();
-    const made = work();
+    const result = work();
     this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
-    return made;
+    return result;
   }
 }

@@ -1,16 +1,17 @@
-// Stands in for the worker where the page is looked at without a server: a thick gyroid, meshed on ever finer grids by clipping tetrahedra. Speaks
-// src/messages.ts. The data set's name chooses what goes wrong: "lost" loses its connection, "broken" fails, "full" has no room.
+// A fake of the page's worker, for tests without a server: speaks src/messages.ts. Its mesh is the part of a gyroid
+// field between two values, clipped from the tetrahedra of successively finer grids. The data set's name selects a
+// fault: "lost" loses its connection, "broken" fails to open, "full" reaches its memory limit.
 
-const kSide = 48; // samples from end to end
+const kSide = 48; // of the cube, in sample spacings
 const kRange = [-0.45, 0.75];
-const kGrids = [6, 12, 24];
-const kPiece = 16;
+const kGrids = [6, 12, 24]; // cells per side
+const kPieceSide = 16; // of a piece of the skin, in sample spacings
 
 const field = (x, y, z) => {
   const [a, b, c] = [x, y, z].map((v) => (v / kSide) * 2 * Math.PI * 1.25);
   return Math.sin(a) * Math.cos(b) + Math.sin(b) * Math.cos(c) + Math.sin(c) * Math.cos(a);
 };
-const gradient = ([x, y, z]) => {
+const gradientDirection = ([x, y, z]) => {
   const h = 0.01;
   const g = [field(x + h, y, z) - field(x - h, y, z), field(x, y + h, z) - field(x, y - h, z), field(x, y, z + h) - field(x, y, z - h)];
   const l = Math.hypot(...g) || 1;
@@ -37,7 +38,8 @@ class Mesh {
       }
       return cuts.get(key);
     };
-    // What of a tetrahedron is inside; faces between neighbours stay the same because vertices are taken in the order of their numbers.
+    // The tetrahedra of the part where sign * (f - value) >= 0. Neighbours split a common face alike, since vertices
+    // are taken in the order of their indices.
     const clip = (tet, value, sign, surface) => {
       const sorted = [...tet].sort((a, b) => a - b);
       const inside = sorted.filter((v) => sign * (this.vertices[v].f - value) >= 0);
@@ -63,7 +65,8 @@ class Mesh {
         for (const part of clip(tet, kRange[0], 1, 1)) this.tets.push(...clip(part, kRange[1], -1, 2));
       }
     }
-    this.tets = this.tets.filter((tet) => Math.abs(this.volume(tet)) > 1e-9).map((tet) => (this.volume(tet) > 0 ? tet : [tet[1], tet[0], tet[2], tet[3]]));
+    const oriented = ([a, b, c, d]) => (this.volume([a, b, c, d]) > 0 ? [a, b, c, d] : [b, a, c, d]);
+    this.tets = this.tets.filter((tet) => Math.abs(this.volume(tet)) > 1e-9).map(oriented);
     this.level = Math.round(Math.log2(step));
   }
   volume(tet) {
@@ -71,22 +74,23 @@ class Mesh {
     const [u, v, w] = [b, c, d].map((p) => p.map((x, i) => x - a[i]));
     return (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6;
   }
-  middle(tet) {
+  center(tet) {
     return [0, 1, 2].map((d) => tet.reduce((sum, v) => sum + this.vertices[v].p[d] / 4, 0));
   }
   static faces([a, b, c, d]) {
     return [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
   }
+  // The pieces of the boundary: the faces that only one tetrahedron has.
   skin() {
-    const seen = new Map();
+    const unpaired = new Map();
     for (const tet of this.tets) for (const face of Mesh.faces(tet)) {
       const key = [...face].sort((a, b) => a - b).join(' ');
-      if (seen.has(key)) seen.delete(key);
-      else seen.set(key, { face, at: this.middle(tet) });
+      if (unpaired.has(key)) unpaired.delete(key);
+      else unpaired.set(key, { face, at: this.center(tet) });
     }
     const pieces = new Map();
-    for (const { face, at } of seen.values()) {
-      const id = at.reduce((sum, x) => sum * 8 + Math.floor(Math.min(x, kSide - 1) / kPiece), 0);
+    for (const { face, at } of unpaired.values()) {
+      const id = at.reduce((sum, x) => sum * 8 + Math.floor(Math.min(x, kSide - 1) / kPieceSide), 0);
       if (!pieces.has(id)) pieces.set(id, [[], [], []]);
       const surfaces = face.map((v) => this.vertices[v].surface);
       const group = surfaces.every((s) => s === 1) ? 0 : surfaces.every((s) => s === 2) ? 1 : 2;
@@ -94,27 +98,29 @@ class Mesh {
     }
     return [...pieces].map(([id, groups]) => this.piece(id, groups));
   }
+  // groups: the faces on alpha, on beta and on the cube.
   piece(id, groups) {
-    const numbers = new Map();
-    const list = [];
+    const indexOf = new Map();
+    const list = []; // vertices: p, and the normal n
     const indices = [];
     const edges = [];
     const edgeCounts = [0, 0, 0];
     groups.forEach((faces, group) => {
-      const known = new Set();
+      const known = new Set(); // edges
       for (const face of faces) {
         const ps = face.map((v) => this.vertices[v].p);
         const axis = [0, 1, 2].find((d) => ps.every((p) => p[d] === ps[0][d] && (p[d] === 0 || p[d] === kSide)));
         const side = axis === undefined ? 'i' : `${axis}${ps[0][axis]}`;
         const own = face.map((v) => {
           const key = `${v} ${group} ${group === 2 ? side : ''}`;
-          if (!numbers.has(key)) {
-            numbers.set(key, list.length);
+          if (!indexOf.has(key)) {
+            indexOf.set(key, list.length);
             const { p } = this.vertices[v];
-            const n = group === 2 ? [0, 1, 2].map((d) => (d === axis ? (p[d] === 0 ? -1 : 1) : 0)) : gradient(p).map((x) => (group === 0 ? -x : x));
-            list.push({ p, n });
+            const ofCube = () => [0, 1, 2].map((d) => (d === axis ? (p[d] === 0 ? -1 : 1) : 0));
+            const ofSurface = () => gradientDirection(p).map((x) => (group === 0 ? -x : x));
+            list.push({ p, n: group === 2 ? ofCube() : ofSurface() });
           }
-          return numbers.get(key);
+          return indexOf.get(key);
         });
         indices.push(...own);
         for (const [a, b] of [[0, 1], [1, 2], [2, 0]]) {
@@ -139,32 +145,39 @@ class Mesh {
       triangles: groups.map((faces) => faces.length), edgeCounts, min: bound(Math.min), max: bound(Math.max),
     };
   }
+  // The section by a plane, in samples.
   cap(plane) {
-    const out = [];
+    const corners = []; // of triangles: p, and the distances from the sides
     for (const tet of this.tets) {
       const d = tet.map((v) => this.vertices[v].p.reduce((sum, x, i) => sum + x * plane.normal[i], -plane.offset));
       const pos = [0, 1, 2, 3].filter((i) => d[i] > 0);
       if (pos.length === 0 || pos.length === 4) continue;
       const neg = [0, 1, 2, 3].filter((i) => d[i] <= 0);
       const point = (i, j) => this.vertices[tet[i]].p.map((x, k) => x + (d[i] / (d[i] - d[j])) * (this.vertices[tet[j]].p[k] - x));
-      const ring = pos.length === 2 ? [[pos[0], neg[0]], [pos[0], neg[1]], [pos[1], neg[1]], [pos[1], neg[0]]] : pos.length === 1 ? neg.map((n) => [pos[0], n]) : pos.map((p) => [p, neg[0]]);
-      const points = ring.map(([i, j]) => point(i, j));
+      const edges =
+        pos.length === 2 ? [[pos[0], neg[0]], [pos[0], neg[1]], [pos[1], neg[1]], [pos[1], neg[0]]]
+        : pos.length === 1 ? neg.map((n) => [pos[0], n])
+        : pos.map((p) => [p, neg[0]]);
+      const points = edges.map(([i, j]) => point(i, j));
       const all = [[255, 0, 0], [0, 255, 0], [0, 0, 255]];
-      if (points.length === 3) out.push(...points.map((p, i) => ({ p, sides: all[i] })));
-      // The side opposite to the middle corner is a diagonal, and none of the tetrahedron's.
-      else for (const [a, b, c] of [[0, 1, 2], [2, 3, 0]]) out.push({ p: points[a], sides: [255, 255, 0] }, { p: points[b], sides: [0, 255, 0] }, { p: points[c], sides: [0, 255, 255] });
+      if (points.length === 3) corners.push(...points.map((p, i) => ({ p, sides: all[i] })));
+      // The side opposite to the second corner is the quadrilateral's diagonal: not drawn as an edge.
+      else for (const triangle of [[0, 1, 2], [2, 3, 0]]) {
+        corners.push(...triangle.map((i, k) => ({ p: points[i], sides: [[255, 255, 0], [0, 255, 0], [0, 255, 255]][k] })));
+      }
     }
-    const vertices = new ArrayBuffer(16 * out.length);
+    const vertices = new ArrayBuffer(16 * corners.length);
     const view = new DataView(vertices);
-    out.forEach(({ p, sides }, i) => {
+    corners.forEach(({ p, sides }, i) => {
       p.forEach((x, d) => view.setFloat32(16 * i + 4 * d, x, true));
       sides.forEach((s, d) => view.setUint8(16 * i + 12 + d, s));
       view.setUint8(16 * i + 15, this.level);
     });
-    return { vertices, triangles: out.length / 3 };
+    return { vertices, triangles: corners.length / 3 };
   }
+  // The tetrahedra whose centres are in a box, in samples.
   inBox(box) {
-    const tets = this.tets.filter((tet) => this.middle(tet).every((x, d) => x >= box.min[d] && x <= box.max[d]));
+    const tets = this.tets.filter((tet) => this.center(tet).every((x, d) => x >= box.min[d] && x <= box.max[d]));
     const vertices = new ArrayBuffer(28 * 4 * tets.length);
     const view = new DataView(vertices);
     const indices = new Uint32Array(12 * tets.length);
@@ -172,7 +185,7 @@ class Mesh {
       tet.forEach((v, i) => {
         const at = 28 * (4 * t + i);
         this.vertices[v].p.forEach((x, d) => view.setFloat32(at + 4 * d, x, true));
-        this.middle(tet).forEach((x, d) => view.setFloat32(at + 12 + 4 * d, x, true));
+        this.center(tet).forEach((x, d) => view.setFloat32(at + 12 + 4 * d, x, true));
         view.setUint8(at + 24, this.vertices[v].surface);
         view.setUint8(at + 25, this.level);
       });
@@ -183,7 +196,7 @@ class Mesh {
 }
 
 let mesh = null;
-let step = -1;
+let step = -1; // the index of the mesh's grid
 let version = 0;
 let plane = null;
 let box = null;
@@ -191,69 +204,74 @@ let wantsEdges = false;
 let name = '';
 let timer = 0;
 
-const say = (report) => self.postMessage(report);
-const samples = (p) => p.map((x) => x + kSide / 2); // the world's origin is in the middle
+const post = (report) => self.postMessage(report);
+const toSamples = (p) => p.map((x) => x + kSide / 2); // the origin of the world is the centre of the cube
 
-function progress(done) {
+function postProgress(done) {
   const updates = [0, 900, 6200, 48000][step + 1];
-  say({ type: 'progress', progress: {
+  post({ type: 'progress', progress: {
     bytes: updates * 2.1 + 900, updates, updatesShown: updates, tets: mesh?.tets.length ?? 0, triangles: 0, updatesToGo: done ? 0 : 48000 - updates,
     remainingError: done ? 0.0123 : 0.4 / (step + 2), remainingPixels: done ? 0.92 : 60 / (step + 2), done, full: name === 'full',
     volume: mesh ? mesh.tets.reduce((sum, tet) => sum + mesh.volume(tet), 0) : 0, volumeBound: 900 / 4 ** (step + 1), memory: 12.4e6,
     busy: { updates, seconds: updates / 2.1e6 }, reconnects: 0, repeated: 0,
   } });
 }
-function cap() {
-  const own = plane && { normal: plane.normal, offset: plane.offset + plane.normal.reduce((sum, n) => sum + (n * kSide) / 2, 0) };
-  say({ type: 'cap', cap: { plane, version, ...(own && mesh ? mesh.cap(own) : { vertices: new ArrayBuffer(0), triangles: 0 }) } });
+function postCap() {
+  const inSamples = plane && { normal: plane.normal, offset: plane.offset + plane.normal.reduce((sum, n) => sum + (n * kSide) / 2, 0) };
+  post({ type: 'cap', cap: { plane, version, ...(inSamples && mesh ? mesh.cap(inSamples) : { vertices: new ArrayBuffer(0), triangles: 0 }) } });
 }
-function tets() {
+function postTets() {
   const none = { vertices: new ArrayBuffer(0), indices: new ArrayBuffer(0), count: 0, outOf: 0 };
-  say({ type: 'tets', tets: { box, ...(box && mesh ? mesh.inBox({ min: samples(box.min), max: samples(box.max) }) : none) } });
+  post({ type: 'tets', tets: { box, ...(box && mesh ? mesh.inBox({ min: toSamples(box.min), max: toSamples(box.max) }) : none) } });
 }
-function skin(reset) {
+function postSkin(reset) {
   version++;
   const pieces = mesh.skin();
-  say({ type: 'skin', skin: { version, reset, pieces, removed: [] } });
-  if (plane) cap();
-  if (box) tets();
+  post({ type: 'skin', skin: { version, reset, pieces, removed: [] } });
+  if (plane) postCap();
+  if (box) postTets();
 }
 function refine() {
-  if (step + 1 >= kGrids.length) return progress(true);
+  if (step + 1 >= kGrids.length) return postProgress(true);
   mesh = new Mesh(kGrids[++step]);
-  skin(step === 0);
-  progress(false);
+  postSkin(step === 0);
+  postProgress(false);
+}
+
+function open(dataset) {
+  clearTimeout(timer);
+  [mesh, step, name] = [null, -1, dataset];
+  if (name === 'broken') return post({ type: 'error', text: 'broken: the server has no such data set; see the list.' });
+  post({ type: 'connection', state: { state: 'open' } });
+  post({ type: 'opened', dataset: null, resumed: false });
+  refine();
+  if (name !== 'lost') return;
+  post({ type: 'connection', state: { state: 'waiting', seconds: 8, attempt: 2, reason: 'the connection was interrupted' } });
+  timer = setTimeout(() => {
+    post({ type: 'connection', state: { state: 'connecting' } });
+    post({ type: 'connection', state: { state: 'open' } });
+    post({ type: 'opened', dataset: null, resumed: true });
+    name = 'gyroid';
+    refine();
+  }, 3000);
 }
 
 self.onmessage = ({ data }) => {
   if (data.type === 'open') {
-    clearTimeout(timer);
-    [mesh, step, name] = [null, -1, data.dataset];
-    if (name === 'broken') return say({ type: 'error', text: 'broken: the server has no such data set; see the list.' });
-    say({ type: 'connection', state: { state: 'open' } });
-    say({ type: 'opened', dataset: null, resumed: false });
-    refine();
-    if (name === 'lost') say({ type: 'connection', state: { state: 'waiting', seconds: 8, attempt: 2, reason: 'the server went away' } });
-    if (name === 'lost') timer = setTimeout(() => {
-      say({ type: 'connection', state: { state: 'connecting' } });
-      say({ type: 'connection', state: { state: 'open' } });
-      say({ type: 'opened', dataset: null, resumed: true });
-      name = 'gyroid';
-      refine();
-    }, 3000);
+    open(data.dataset);
   } else if (data.type === 'shown' && name !== 'lost') {
     timer = setTimeout(refine, 30);
   } else if (data.type === 'clip') {
     plane = data.plane;
-    cap();
+    postCap();
   } else if (data.type === 'tets') {
     box = data.box;
-    tets();
+    postTets();
   } else if (data.type === 'edges') {
     wantsEdges = data.wanted;
-    if (mesh) skin(false);
+    if (mesh) postSkin(false);
   } else if (data.type === 'save') {
-    say({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
+    post({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
   }
 };
-say({ type: 'ready' });
+post({ type: 'ready' });

@@ -1,11 +1,18 @@
-// Laws of the page's pure parts: the address, cameras, planes, regions, numbers. Run by `npm test`.
+// Properties of the page's pure functions: the address, cameras, planes, regions, numbers. Needs no browser.
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 import { createServer } from 'vite';
 
-const server = await createServer({ root: new URL('..', import.meta.url).pathname, configFile: false, logLevel: 'error', server: { middlewareMode: true, hmr: false, ws: false, watch: null }, appType: 'custom' });
+const server = await createServer({
+  root: new URL('..', import.meta.url).pathname,
+  configFile: false,
+  logLevel: 'error',
+  server: { middlewareMode: true, hmr: false, ws: false, watch: null },
+  appType: 'custom',
+});
 const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
-const [{ fromHash, toHash, kFirst }, camera, plane, region, format, vec] = await Promise.all(['state', 'camera', 'plane', 'region', 'format', 'vec'].map(load));
+const kModules = ['state', 'camera', 'plane', 'region', 'format', 'vec'];
+const [{ fromHash, toHash, kDefaults }, camera, plane, region, format, vec] = await Promise.all(kModules.map(load));
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -16,48 +23,60 @@ const random = (low = 0, high = 1) => {
   return low + ((high - low) * last) / 2147483648;
 };
 const randomVec = (size = 100) => [0, 1, 2].map(() => random(-size, size));
-const near = (a, b, within = 1e-6) => a.every((x, i) => Math.abs(x - b[i]) <= within * (1 + Math.abs(b[i])));
-function assertAlike(a, b) {
+const isNear = (a, b, within = 1e-6) => a.every((x, i) => Math.abs(x - b[i]) <= within * (1 + Math.abs(b[i])));
+function assertNear(a, b) {
   if (typeof b === 'number') return assert.ok(Math.abs(a - b) <= 1e-6 * (1 + Math.abs(b)), `${a} is not ${b}`);
   if (typeof b !== 'object' || b === null) return assert.equal(a, b);
   assert.deepEqual(Object.keys(a), Object.keys(b));
-  for (const key of Object.keys(b)) assertAlike(a[key], b[key]);
+  for (const key of Object.keys(b)) assertNear(a[key], b[key]);
 }
 const randomPose = () => ({ eye: randomVec(), lookAt: randomVec(), up: vec.unit(randomVec()), fov: 30 });
 
-test('an address gives back the view that it was written from', () => {
+test('an address restores the view that it was written from', () => {
   for (let i = 0; i < 200; ++i) {
     const [a, b] = [randomVec(), randomVec()];
     const state = {
-      dataset: ['buckyball', 'a b/ü&=#+', null][i % 3], pose: i % 2 ? { ...randomPose(), fov: 45 } : null, pixelError: random(0.5, 16),
-      maxTets: i % 4 ? null : Math.round(random(1e4, 1e7)), memory: i % 5 ? null : 20, clip: i % 3 ? { normal: vec.unit(randomVec()), offset: random(-9, 9) } : null,
-      region: { min: a.map((x, d) => Math.min(x, b[d])), max: a.map((x, d) => Math.max(x, b[d])) }, tets: i % 2 === 0, shrink: 0.55,
-      thickness: i % 3 === 0, wireframe: i % 2 === 1, levels: i % 5 === 0, alpha: { color: '#012345', opacity: 0.25 }, beta: kFirst.beta, box: { color: '#ffffff', opacity: 0 },
+      dataset: ['buckyball', 'a b/ü&=#+', null][i % 3],
+      pose: i % 2 ? { ...randomPose(), fov: 45 } : null,
+      pixelError: random(0.5, 16),
+      maxTets: i % 4 ? null : Math.round(random(1e4, 1e7)),
+      memory: i % 5 ? null : 20,
+      clip: i % 3 ? { normal: vec.unit(randomVec()), offset: random(-9, 9) } : null,
+      region: { min: a.map((x, d) => Math.min(x, b[d])), max: a.map((x, d) => Math.max(x, b[d])) },
+      tets: i % 2 === 0,
+      shrink: 0.55,
+      thickness: i % 3 === 0,
+      wireframe: i % 2 === 1,
+      levels: i % 5 === 0,
+      alpha: { color: '#012345', opacity: 0.25 },
+      beta: kDefaults.beta,
+      box: { color: '#ffffff', opacity: 0 },
     };
-    assertAlike(fromHash(toHash(state)), state);
+    assertNear(fromHash(toHash(state)), state);
   }
 });
 
-test('an address that makes no sense is as at first', () => {
-  for (const hash of ['', '#', '#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#eye=1,1,1&at=1,1,1']) {
-    assert.deepEqual(fromHash(hash), kFirst, hash);
+test('an invalid address gives the default view', () => {
+  const invalid = ['#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#eye=1,1,1&at=1,1,1'];
+  for (const hash of ['', '#', ...invalid]) {
+    assert.deepEqual(fromHash(hash), kDefaults, hash);
   }
   assert.equal(fromHash('#px=1e9').pixelError, 64);
   assert.equal(fromHash('#show=tets').tets, false, 'tetrahedra need a region');
 });
 
-test('turning keeps the distance, and turning back the view', () => {
+test('a rotation keeps the distance, and its inverse restores the camera', () => {
   for (let i = 0; i < 100; ++i) {
     const pose = randomPose();
     const [right, down] = [random(-3, 3), random(-3, 3)];
-    const turned = camera.orbited(pose, right, down);
-    assert.ok(near([vec.length(vec.sub(turned.eye, turned.lookAt))], [vec.length(vec.sub(pose.eye, pose.lookAt))]));
+    const rotated = camera.orbited(pose, right, down);
+    assert.ok(isNear([vec.length(vec.sub(rotated.eye, rotated.lookAt))], [vec.length(vec.sub(pose.eye, pose.lookAt))]));
     const back = camera.orbited(camera.orbited(pose, right, 0), -right, 0);
-    assert.ok(near(back.eye, pose.eye, 1e-6));
+    assert.ok(isNear(back.eye, pose.eye, 1e-6));
   }
 });
 
-test('a point under the pointer stays there when zooming', () => {
+test('zooming keeps the point under the pointer', () => {
   for (let i = 0; i < 100; ++i) {
     const pose = randomPose();
     const at = [random(-300, 300), random(-200, 200)];
@@ -66,21 +85,21 @@ test('a point under the pointer stays there when zooming', () => {
     const perPixel = camera.unitsPerPixel(pose, 600);
     const fixed = vec.along(vec.along(pose.lookAt, a.right, at[0] * perPixel), a.up, -at[1] * perPixel);
     const spot = camera.projected(there, fixed, 800, 600);
-    assert.ok(near([spot.x, spot.y], [400 + at[0], 300 + at[1]], 1e-6));
+    assert.ok(isNear([spot.x, spot.y], [400 + at[0], 300 + at[1]], 1e-6));
   }
 });
 
-test('a ray through a pixel meets what is seen there', () => {
+test('the ray through a pixel passes the point that is projected to it', () => {
   for (let i = 0; i < 100; ++i) {
     const pose = randomPose();
     const [x, y] = [random(0, 800), random(0, 600)];
     const p = vec.along(pose.eye, camera.rayThrough(pose, x, y, 800, 600), random(1, 50));
     const spot = camera.projected(pose, p, 800, 600);
-    assert.ok(near([spot.x, spot.y], [x, y], 1e-6));
+    assert.ok(isNear([spot.x, spot.y], [x, y], 1e-6));
   }
 });
 
-test('the view of everything shows every corner, however narrow the picture', () => {
+test('the fitted view shows every corner of the box at any aspect ratio', () => {
   const box = { min: [-10, 0, 5], max: [40, 20, 90] };
   for (const [width, height] of [[1600, 900], [360, 640], [500, 500]]) {
     const pose = camera.fitted(box, width / height);
@@ -91,34 +110,34 @@ test('the view of everything shows every corner, however narrow the picture', ()
   }
 });
 
-test('a plane cuts a box in a closed polygon of 3 to 6 sides, all in the plane', () => {
+test('the outline of a plane in a box is a closed polygon of 3 to 6 sides in the plane', () => {
   const box = { min: [-1, -2, -3], max: [4, 3, 2] };
   for (let i = 0; i < 200; ++i) {
     const normal = vec.unit(randomVec());
-    const [least, most] = plane.extent(box, normal);
+    const [least, most] = plane.offsetRange(box, normal);
     const cut = { normal, offset: random(least, most) };
-    const points = plane.cutOutline(box, cut);
+    const points = plane.planeOutline(box, cut);
     const sides = points.length / 2;
     assert.ok(sides >= 3 && sides <= 6, `${sides} sides`);
     for (const p of points) {
       assert.ok(Math.abs(vec.dot(normal, p) - cut.offset) < 1e-9);
-      assert.equal(points.filter((q) => near(p, q, 1e-9)).length, 2, 'every corner belongs to two sides');
+      assert.equal(points.filter((q) => isNear(p, q, 1e-9)).length, 2, 'every corner belongs to two sides');
     }
   }
 });
 
-test('a plane that is turned goes through where it is held, and touches the box', () => {
+test('a rotated plane touches the box and has a unit normal', () => {
   const box = { min: [-1, -2, -3], max: [4, 3, 2] };
   for (let i = 0; i < 200; ++i) {
     const before = plane.clamped(box, { normal: vec.unit(randomVec()), offset: random(-9, 9) });
-    const turned = plane.turnedTo(box, before, randomVec());
-    const [least, most] = plane.extent(box, turned.normal);
-    assert.ok(turned.offset >= least - 1e-9 && turned.offset <= most + 1e-9);
-    assert.ok(Math.abs(vec.length(turned.normal) - 1) < 1e-9);
+    const rotated = plane.rotatedTowards(box, before, randomVec());
+    const [least, most] = plane.offsetRange(box, rotated.normal);
+    assert.ok(rotated.offset >= least - 1e-9 && rotated.offset <= most + 1e-9);
+    assert.ok(Math.abs(vec.length(rotated.normal) - 1) < 1e-9);
   }
 });
 
-test('a region stays within the data and never turns inside out', () => {
+test('a region stays within the data, and min below max', () => {
   const within = { min: [0, 0, 0], max: [10, 20, 30] };
   let now = region.middleHalf(within);
   for (let i = 0; i < 500; ++i) {
@@ -127,7 +146,7 @@ test('a region stays within the data and never turns inside out', () => {
   }
 });
 
-test('numbers say no more than is known', () => {
+test('numbers have the digits that are significant', () => {
   assert.equal(format.bounded(43844.2, 10), '43,844 ± 10');
   assert.equal(format.bounded(123456, 2000), '123,000 ± 2,000');
   assert.equal(format.bounded(1234.4, 0), '1,234');
@@ -137,6 +156,6 @@ test('numbers say no more than is known', () => {
   assert.equal(format.count(1234567), '1.23 million');
   for (let i = 0; i < 100; ++i) {
     const x = 10 ** random(-8, 8);
-    assert.ok(format.roundAbove(x) >= x * (1 - 1e-9) && format.roundAbove(x) <= 1.6 * x);
+    assert.ok(format.roundUp(x) >= x * (1 - 1e-9) && format.roundUp(x) <= 1.6 * x);
   }
 });

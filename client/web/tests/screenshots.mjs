@@ -1,9 +1,11 @@
-// Takes pictures of the page with the stand-in for the worker: to be looked at. Usage: node tests/look.mjs [NAME…]
-// Each goes to tests/pictures/NAME.png.
+// Screenshots of the page with the fake worker, for review: node tests/screenshots.mjs [NAME…]
+// Each is written to tests/pictures/NAME.png.
 import { mkdir } from 'node:fs/promises';
 import { fileURLToPath } from 'node:url';
-import { launch, openPage, settled, startStand, untilDone } from './stand.mjs';
+import { launch } from './browser.mjs';
+import { openPage, refined, settled, startFakeServer } from './fake_server.mjs';
 
+// isIncomplete: the view is never completely refined.
 const kPictures = {
   wide: {},
   light: { theme: 'light' },
@@ -13,35 +15,35 @@ const kPictures = {
   huge: { width: 3840, height: 2160 },
   clip: { hash: '#data=gyroid&clip=0.8,-0.5,0.3316625,3' },
   'clip-light': { hash: '#data=gyroid&clip=1,0,0,3', theme: 'light' },
-  veil: { hash: '#data=gyroid&alpha=3d7fd6,0.35&beta=f0862a,1&box=d8c49a,0.25' },
-  'veil-all': { hash: '#data=gyroid&alpha=3d7fd6,0.4&beta=f0862a,0.4&box=d8c49a,0.2', theme: 'light' },
+  transparent: { hash: '#data=gyroid&alpha=3d7fd6,0.35&beta=f0862a,1&box=d8c49a,0.25' },
+  'transparent-all': { hash: '#data=gyroid&alpha=3d7fd6,0.4&beta=f0862a,0.4&box=d8c49a,0.2', theme: 'light' },
   tets: { hash: '#data=gyroid&roi=-12,-24,-12,24,12,24&show=tets&shrink=0.75' },
   region: { hash: '#data=gyroid&roi=-12,-12,-12,12,12,12' },
   thickness: { hash: '#data=gyroid&show=thickness' },
   'thickness-clip': { hash: '#data=gyroid&show=thickness&clip=1,0,0,3', theme: 'light' },
   wire: { hash: '#data=gyroid&show=wireframe' },
   levels: { hash: '#data=gyroid&show=levels,wireframe' },
-  lost: { hash: '#data=lost', never: true },
-  broken: { hash: '#data=broken', theme: 'light', never: true },
+  lost: { hash: '#data=lost', isIncomplete: true },
+  broken: { hash: '#data=broken', theme: 'light', isIncomplete: true },
   help: { act: (page) => page.keyboard.press('h') },
   panel: { theme: 'light', act: (page) => page.evaluate(() => document.querySelector('#panel').scrollTo(0, 1e4)) },
-  token: { token: 'x', never: true },
+  token: { token: 'x', isIncomplete: true },
 };
 
 const folder = fileURLToPath(new URL('pictures/', import.meta.url));
 await mkdir(folder, { recursive: true });
 const browser = await launch();
 for (const name of process.argv.length > 2 ? process.argv.slice(2) : Object.keys(kPictures)) {
-  const { hash = '', act, token = null, never, ...layout } = kPictures[name];
-  const stand = await startStand(token);
-  const page = await openPage(browser, stand.address + hash, layout);
-  if (!never) await untilDone(page);
+  const { hash = '', act, token = null, isIncomplete, ...layout } = kPictures[name];
+  const server = await startFakeServer(token);
+  const page = await openPage(browser, server.address + hash, layout);
+  if (!isIncomplete) await refined(page);
   if (act) await act(page);
   await settled(page);
   await settled(page);
   await page.screenshot({ path: `${folder}${name}.png` });
-  console.log(name, JSON.stringify(await page.evaluate(() => window.intervale?.stats)), ...page.complaints);
+  console.log(name, JSON.stringify(await page.evaluate(() => window.intervale?.stats)), ...page.problems);
   await page.context().close();
-  stand.close();
+  server.close();
 }
 await browser.close();

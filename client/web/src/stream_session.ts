@@ -1,0 +1,227 @@
+// A data set that is streamed to the page: feeds the client core with messages, and sends the page the mesh's changes.
+//
+// All messages that have arrived are applied before a new version of the skin is made, and that only after the page has
+// shown the last one. Making versions takes at most about half of the time, so as not to slow down a fast stream.
+import type createCore from '@core/core.js';
+
+import { Connection, kGoingAway } from './connection';
+import type { Box, Plane, Report, View } from './messages';
+
+const kSkinIntervalMs = 40; // least time between two versions
+const kProgressIntervalMs = 100;
+
+export type Core = Awaited<ReturnType<typeof createCore>>;
+export type SendReport = (report: Report, transfer?: Transferable[]) => void;
+
+// What the page wants to be shown with the skin.
+export interface Extras {
+  edges: boolean;
+  plane: Plane | null;
+  box: Box | null;
+}
+
+export class StreamSession {
+  private viewer: InstanceType<Core['Viewer']>;
+  private connection: Connection;
+  private isEnded = false;
+  private isOpen = false; // there is a mesh; stays true while the connection is lost
+
+  private version = 0; // of the last skin sent
+  private shown = 0; // ... and of the one that the page shows
+  private isChanged = false; // the mesh, since the last skin
+  private needsAll = true; // the next skin has every piece
+  private skinTimer = 0;
+  private skinEnd = 0; // when the last one was finished, performance.now()
+  private skinMs = 0; // what it took
+
+  private progressTime = 0; // when it was last reported
+  private progressTimer = 0;
+  private busy = { updates: 0, seconds: 0 };
+
+  constructor(
+    private readonly core: Core,
+    private readonly dataset: string,
+    url: string,
+    token: string | undefined,
+    private extras: Extras,
+    private readonly report: SendReport,
+  ) {
+    this.viewer = new core.Viewer(dataset);
+    this.connection = new Connection(url, token, {
+      connected: () => {
+        this.viewer.openedLine(performance.now());
+        this.send();
+      },
+      received: (message) => this.receive(message),
+      disconnected: () => this.viewer.lostLine(),
+      changed: (state) => report({ type: 'connection', state }),
+      failed: (text) => this.fail(text),
+    });
+  }
+
+  // Connects with the first view.
+  look(view: View): void {
+    const error = this.viewer.look(view);
+    if (error) return this.fail(error);
+    this.connection.start();
+    this.send();
+    this.isChanged = true; // another budget shows other tetrahedra
+    this.reportProgress(true);
+    this.scheduleSkin();
+  }
+
+  pageShows(version: number): void {
+    this.shown = version;
+    this.scheduleSkin();
+  }
+
+  setEdges(wanted: boolean): void {
+    this.extras.edges = wanted;
+    this.needsAll = true;
+    this.isChanged = true;
+    this.reportProgress(true);
+    this.scheduleSkin();
+  }
+
+  setPlane(plane: Plane | null): void {
+    this.extras.plane = plane;
+    this.sendCap();
+  }
+
+  setBox(box: Box | null): void {
+    this.extras.box = box;
+    this.sendTets();
+  }
+
+  close(): void {
+    this.isEnded = true;
+    this.connection.end();
+    clearTimeout(this.skinTimer);
+    clearTimeout(this.progressTimer);
+    this.viewer.delete();
+  }
+
+  save(format: 'vtu' | 'stl' | 'glb'): void {
+    if (!this.isOpen) return this.report({ type: 'error', text: 'There is no mesh to save yet.' });
+    const bytes = this.viewer.save(`mesh.${format}`);
+    if (typeof bytes === 'string') return this.report({ type: 'error', text: `The mesh cannot be saved: ${bytes}` });
+    this.report({ type: 'saved', format, name: `${this.dataset}.${format}`, bytes }, [bytes]);
+  }
+
+  digest(): void {
+    if (!this.isOpen) return;
+    const { updates, tets } = this.viewer.progress();
+    this.report({ type: 'digest', digest: this.viewer.digest(), updates, tets });
+  }
+
+  private fail(text: string): void {
+    if (this.isEnded) return;
+    this.isEnded = true;
+    this.connection.end();
+    this.report({ type: 'error', text });
+    this.report({ type: 'connection', state: { state: 'closed' } });
+  }
+
+  private send(): void {
+    for (const message of this.viewer.takeMessages()) this.connection.send(message);
+  }
+
+  private receive(message: ArrayBuffer): void {
+    const before = this.viewer.updates();
+    const start = performance.now();
+    this.viewer.inbox(message.byteLength).set(new Uint8Array(message));
+    const error = this.viewer.receive(start);
+    const end = performance.now();
+    if (error) {
+      // A server that goes away closes the connection next, and that leads to a reconnection.
+      return this.viewer.faultCode() === kGoingAway ? undefined : this.fail(error);
+    }
+    this.send();
+    const updates = this.viewer.updates();
+    if (updates > before) {
+      this.busy.updates += updates - before;
+      this.busy.seconds += (end - start) / 1000;
+    }
+    if (this.viewer.wasOpened()) this.opened();
+    this.isChanged = true;
+    // The first skin at once: a timer would fire only after all messages that are queued.
+    if (this.version === 0 && updates > 0) return this.sendSkin();
+    this.reportProgress(this.viewer.done());
+    this.scheduleSkin();
+  }
+
+  private opened(): void {
+    const isFresh = this.viewer.isFresh();
+    if (isFresh) this.needsAll = true;
+    this.connection.accepted();
+    this.isOpen = true;
+    this.report({ type: 'connection', state: { state: 'open' } });
+    this.report({ type: 'opened', dataset: this.viewer.dataset(), resumed: !isFresh });
+  }
+
+  // Now, or when the interval since the last report is over: the last state is always reported.
+  private reportProgress(now: boolean): void {
+    if (!this.isOpen) return;
+    const wait = this.progressTime + kProgressIntervalMs - performance.now();
+    if (!now && wait > 0) {
+      if (this.progressTimer === 0) this.progressTimer = setTimeout(() => this.reportProgress(true), wait) as unknown as number;
+      return;
+    }
+    clearTimeout(this.progressTimer);
+    this.progressTimer = 0;
+    this.progressTime = performance.now();
+    const progress = this.viewer.progress();
+    const done = progress.done && !this.isChanged; // not before the complete skin was sent
+    const memory = this.core.HEAPU8.byteLength;
+    this.report({ type: 'progress', progress: { ...progress, done, skin: this.version, memory, busy: { ...this.busy } } });
+  }
+
+  private scheduleSkin(): void {
+    if (this.skinTimer !== 0 || !this.isOpen || !this.isChanged || this.shown !== this.version) return;
+    const pause = this.version === 0 || this.viewer.done() ? 0 : Math.max(kSkinIntervalMs, this.skinMs);
+    const wait = Math.max(0, this.skinEnd + pause - performance.now());
+    this.skinTimer = setTimeout(() => this.sendSkin(), wait) as unknown as number;
+  }
+
+  private sendSkin(): void {
+    this.skinTimer = 0;
+    if (this.isEnded || !this.isChanged || this.shown !== this.version) return;
+    const start = performance.now();
+    this.isChanged = false;
+    const skin = this.viewer.skin(this.extras.edges, this.needsAll);
+    this.needsAll = false;
+    if (skin.pieces.length > 0 || skin.removed.length > 0 || skin.reset) {
+      ++this.version;
+      const buffers = skin.pieces.flatMap(({ vertices, indices, edges }) => [vertices, indices, ...(edges ? [edges] : [])]);
+      this.report({ type: 'skin', skin: { ...skin, version: this.version } }, buffers);
+    }
+    if (this.extras.plane) this.sendCap();
+    if (this.extras.box) this.sendTets();
+    this.skinEnd = performance.now();
+    this.skinMs = this.skinEnd - start;
+    this.reportProgress(this.viewer.done());
+  }
+
+  // At once if the mesh is the last skin's, else with the next skin. An empty one if there is no mesh yet.
+  private sendCap(): void {
+    const { plane } = this.extras;
+    const { version } = this;
+    if (plane === null || version === 0) {
+      return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), triangles: 0, version } });
+    }
+    if (this.viewer.isStale()) return this.scheduleSkin();
+    const cap = this.viewer.cap(plane);
+    this.report({ type: 'cap', cap: { ...cap, plane, version } }, [cap.vertices]);
+  }
+
+  // As sendCap().
+  private sendTets(): void {
+    const { box } = this.extras;
+    if (box === null || this.version === 0) {
+      return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), indices: new ArrayBuffer(0), count: 0, outOf: 0 } });
+    }
+    if (this.viewer.isStale()) return this.scheduleSkin();
+    const tets = this.viewer.tets(box);
+    this.report({ type: 'tets', tets: { ...tets, box } }, [tets.vertices, tets.indices]);
+  }
+}

@@ -1,0 +1,162 @@
+// The page's side of the worker: sends what the view needs at a limited rate, and keeps the status current.
+import { streamUrl } from './datasets';
+import { sameJson } from './format';
+import type { Box, Cap, Plane, Report, Request, Skin, Tets, View } from './messages';
+import type { Status } from './status';
+import type { Store } from './store';
+
+const kIntervalMs = 100; // least time between two views, or two boxes of tetrahedra
+const kBytesPerUpdate = 30; // see View.maxUpdates
+
+// null: no limit.
+export const updatesIn = (megabytes: number | null): number | null =>
+  megabytes === null ? null : Math.round((megabytes * 1e6) / kBytesPerUpdate);
+
+// What the page does with the worker's reports.
+export interface Receiver {
+  skin(skin: Skin): void;
+  cap(cap: Cap): void;
+  tets(tets: Tets): void;
+  saved(format: string, name: string, bytes: ArrayBuffer): void;
+  any(report: Report): void; // every report, after the above
+}
+
+// What the view needs from the worker.
+export interface Wanted {
+  view: View;
+  plane: Plane | null;
+  tetsBox: Box | null;
+  edges: boolean;
+}
+
+export class WorkerClient {
+  private worker: Worker;
+  private view: View | null = null;
+  private sentView: View | null = null;
+  private nextViewAt = 0; // performance.now()
+  private viewTimer = 0;
+  private plane: Plane | null = null;
+  private sentPlane: Plane | null = null;
+  private isAwaitingCap = false;
+  private tetsBox: Box | null = null;
+  private tetsTimer = 0;
+  private edges = false;
+
+  constructor(private status: Store<Status>, private receiver: Receiver) {
+    this.worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'intervale' });
+    this.worker.onmessage = ({ data }: MessageEvent<Report>) => this.receive(data);
+    this.worker.onerror = (event) => this.fail(`The worker failed: ${event.message || 'it could not be loaded'}.`);
+    this.worker.onmessageerror = () => this.fail('A message from the worker could not be read.');
+  }
+
+  terminate(): void {
+    this.worker.terminate();
+  }
+
+  send(request: Request): void {
+    this.worker.postMessage(request);
+  }
+
+  // wanted: what the session starts with.
+  open(dataset: string, wanted: Wanted): void {
+    const { token } = this.status.value;
+    this.status.set({ error: null, progress: null, tets: null, connection: { state: 'connecting' } });
+    this.view = wanted.view;
+    this.sentView = null;
+    this.sendView();
+    this.send({ type: 'open', url: streamUrl(), dataset, ...(token === null ? {} : { token }) });
+    this.plane = this.sentPlane = wanted.plane;
+    this.isAwaitingCap = false;
+    this.send({ type: 'clip', plane: wanted.plane });
+    this.tetsBox = wanted.tetsBox;
+    this.send({ type: 'tets', box: wanted.tetsBox });
+    this.edges = wanted.edges;
+    this.send({ type: 'edges', wanted: wanted.edges });
+  }
+
+  // Sends what differs from what was wanted before.
+  update(wanted: Wanted): void {
+    this.setView(wanted.view);
+    this.plane = wanted.plane;
+    this.requestCap();
+    this.setTetsBox(wanted.tetsBox);
+    if (wanted.edges === this.edges) return;
+    this.edges = wanted.edges;
+    this.send({ type: 'edges', wanted: wanted.edges });
+  }
+
+  // Sends at once, or when the interval since the last one is over: the last view of a motion is always sent.
+  private setView(view: View): void {
+    this.view = view;
+    if (this.viewTimer !== 0 || sameJson(view, this.sentView)) return;
+    const wait = this.nextViewAt - performance.now();
+    if (wait <= 0) return this.sendView();
+    this.viewTimer = window.setTimeout(() => this.sendView(), wait);
+  }
+
+  private sendView(): void {
+    window.clearTimeout(this.viewTimer);
+    this.viewTimer = 0;
+    if (!this.view || sameJson(this.view, this.sentView)) return;
+    this.sentView = this.view;
+    this.nextViewAt = performance.now() + kIntervalMs;
+    this.send({ type: 'view', view: this.view });
+  }
+
+  private setTetsBox(box: Box | null): void {
+    if (sameJson(box, this.tetsBox)) return;
+    this.tetsBox = box;
+    if (this.tetsTimer !== 0) return;
+    this.tetsTimer = window.setTimeout(() => {
+      this.tetsTimer = 0;
+      this.send({ type: 'tets', box: this.tetsBox });
+    }, kIntervalMs);
+  }
+
+  // One request at a time: the latest plane is sent when the last one was answered.
+  private requestCap(): void {
+    if (this.isAwaitingCap || sameJson(this.plane, this.sentPlane)) return;
+    this.sentPlane = this.plane;
+    this.isAwaitingCap = true;
+    this.send({ type: 'clip', plane: this.plane });
+  }
+
+  private receive(report: Report): void {
+    switch (report.type) {
+      case 'connection':
+        this.status.set({ connection: report.state, ...(report.state.state === 'open' ? { error: null } : {}) });
+        break;
+      case 'opened':
+        this.status.set({ opened: { times: this.status.value.opened.times + 1, resumed: report.resumed } });
+        break;
+      case 'progress':
+        this.status.set({ progress: report.progress });
+        break;
+      case 'skin':
+        this.receiver.skin(report.skin);
+        break;
+      case 'cap':
+        this.isAwaitingCap = false;
+        this.receiver.cap(report.cap);
+        this.requestCap();
+        break;
+      case 'tets':
+        this.status.set({ tets: report.tets.box ? { count: report.tets.count, outOf: report.tets.outOf } : null });
+        this.receiver.tets(report.tets);
+        break;
+      case 'saved':
+        this.status.set({ saving: null });
+        this.receiver.saved(report.format, report.name, report.bytes);
+        break;
+      case 'error':
+        this.fail(report.text);
+        break;
+    }
+    this.receiver.any(report);
+  }
+
+  private fail(text: string): void {
+    this.status.set({ error: text, saving: null, connection: { state: 'closed' } });
+    this.isAwaitingCap = false;
+  }
+}

@@ -1,0 +1,69 @@
+// Serves the built page (INTERVALE_VIEWER_OUT, default dist/) with the server's Content-Security-Policy, with
+// fake_worker.js in place of its worker; and opens it in a browser.
+import { createServer } from 'node:http';
+import { readFile } from 'node:fs/promises';
+import { extname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const here = fileURLToPath(new URL('.', import.meta.url));
+const kPage = process.env.INTERVALE_VIEWER_OUT ?? join(here, '../dist');
+const kMimeTypes = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript',
+  '.css': 'text/css',
+  '.svg': 'image/svg+xml',
+  '.wasm': 'application/wasm',
+};
+const kPolicy =
+  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; " +
+  "connect-src 'self' ws: wss:; worker-src 'self'; font-src 'self'";
+// The name selects what the worker simulates: see fake_worker.js.
+const kDatasets = ['gyroid', 'lost', 'broken', 'full'].map((name) => ({
+  name, dims: [49, 49, 49], spacing: [1, 1, 1], origin: [-24, -24, -24], range: [-0.45, 0.75], refine: 'boundary', max_error: 0.61,
+  updates: 48000, coefficients: 90000, full: { vertices: 41000, tets: 197000, indexed_bytes: 3.6e6 },
+}));
+
+// token: what api/datasets requires; null: nothing.
+export async function startFakeServer(token = null) {
+  const server = createServer(async (request, response) => {
+    const path = new URL(request.url, 'http://x').pathname;
+    const send = (body, type) => response.writeHead(200, { 'content-type': type, 'content-security-policy': kPolicy }).end(body);
+    if (path === '/api/datasets') {
+      if (token !== null && request.headers.authorization !== `Bearer ${token}`) return response.writeHead(401).end();
+      return send(JSON.stringify({ datasets: kDatasets }), 'application/json');
+    }
+    try {
+      const isWorker = /\/worker-[^/]*\.js$/.test(path);
+      const file = isWorker ? join(here, 'fake_worker.js') : join(kPage, path === '/' ? 'index.html' : path);
+      send(await readFile(file), kMimeTypes[extname(file)] ?? 'application/octet-stream');
+    } catch {
+      response.writeHead(404).end();
+    }
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  return { address: `http://127.0.0.1:${server.address().port}/`, close: () => server.close() };
+}
+
+// The page at an address. Its `problems` collect console errors and warnings, exceptions, and violations of the policy.
+// script: a function that runs in the page before its own scripts.
+export async function openPage(browser, url, { width = 1280, height = 800, theme = 'dark', script } = {}) {
+  const context = await browser.newContext({ viewport: { width, height }, colorScheme: theme, acceptDownloads: true });
+  const page = await context.newPage();
+  page.problems = [];
+  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && page.problems.push(message.text()));
+  page.on('pageerror', (error) => page.problems.push(String(error)));
+  await page.addInitScript(() =>
+    document.addEventListener('securitypolicyviolation', (event) => console.error(`policy: ${event.violatedDirective} ${event.blockedURI}`)),
+  );
+  if (script) await page.addInitScript(script);
+  await page.goto(url);
+  return page;
+}
+
+// Until the view is completely refined and drawn.
+export const refined = (page) =>
+  page.waitForFunction(() => window.intervale?.progress?.done && window.intervale.stats.frames > 0, null, { timeout: 60_000 });
+
+// Until the effects of an action are drawn.
+export const settled = (page) =>
+  page.evaluate(() => new Promise((resolve) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(resolve)), 200)));
