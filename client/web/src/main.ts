@@ -206,6 +206,7 @@ function start(): void {
     viewer = new Viewer(element<HTMLCanvasElement>('canvas'), view);
   } catch {
     worker.terminate();
+    watchBanner(status, () => location.reload());
     status.set({ error: kNoWebGl });
     return;
   }

@@ -305,3 +305,10 @@ test('a required token is requested, and is not part of the address', async () =
   await page.context().close();
   guarded.close();
 });
+
+test('without WebGL 2 the banner says so', async () => {
+  const page = await openPage(browser, server.address, { script: () => (HTMLCanvasElement.prototype.getContext = () => null) });
+  await page.waitForFunction(() => document.querySelector('#banner-text').textContent.includes('WebGL 2'));
+  assert.ok(await page.isVisible('#banner'));
+  await page.context().close();
+});
