@@ -6,12 +6,14 @@
 #include <vector>
 
 #include "client/view/skin.h"
+#include "common/util/vec3.h"
 
 namespace intervale {
 
-// What lies on the normal's side, dot(normal, p) > offset, is cut away. World coordinates; normal: of length 1.
+// What lies strictly behind the plane, dot(normal, p) < offset, is kept; what lies in it, or on the normal's side, is cut away (plane_cut.h). World
+// coordinates; normal: of length 1.
 struct CutPlane {
-  std::array<double, 3> normal{};
+  Vec3 normal{};
   double offset = 0;
 };
 

@@ -11,6 +11,7 @@
 
 #include "common/front/front.h"
 #include "common/front/front_patches.h"
+#include "common/mesh/normals.h"
 
 namespace intervale {
 
@@ -78,7 +79,6 @@ class Skin {
     double volume = 0, bound = 0;
     std::vector<Triangle> triangles;
   };
-  using Normal = std::array<std::int32_t, 3>;
 
   void forget_all();
   std::vector<std::uint8_t> find_changes();
@@ -95,7 +95,7 @@ class Skin {
   std::uint64_t renamed_ = 0;
   std::vector<FrontPatches::Position> position_;  // by name
   std::vector<Surface> surface_;
-  std::vector<Normal> normal_;                       // sums over triangles of the point's own surface: unit normals times angles times kUnit
+  std::vector<NormalSum> normal_;                    // by name: of the triangles of the point's own surface
   std::vector<std::uint32_t> there_;                 // number of a point's vertex in what is being assembled, if that says so too
   std::vector<Part> parts_;                          // by number of the supercube
   std::vector<std::vector<std::uint32_t>> members_;  // of a piece, by id

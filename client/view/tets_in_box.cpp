@@ -1,12 +1,8 @@
 #include "client/view/tets_in_box.h"
 
+#include "common/util/tetrahedron.h"
+
 namespace intervale {
-namespace {
-
-constexpr std::array<std::uint32_t, 12> kFaces{1, 2, 3, 0, 3, 2, 0, 1, 3, 0, 2, 1};  // of a positive tetrahedron
-
-}  // namespace
-
 TetsInBox tets_in_box(const Skin& skin, const Box& box, std::uint64_t most) {
   const FrontPatches& patches = skin.patches();
   const Grid& grid = patches.grid();
@@ -43,7 +39,7 @@ TetsInBox tets_in_box(const Skin& skin, const Box& box, std::uint64_t most) {
         found.vertices.push_back({float(at[0]) / FrontPatches::kSteps, float(at[1]) / FrontPatches::kSteps, float(at[2]) / FrontPatches::kSteps,
                                   float(middle[0]), float(middle[1]), float(middle[2]), skin.surface(name), std::uint8_t(scale)});
       }
-      for (const std::uint32_t k : kFaces) found.indices.push_back(first + k);
+      for (const auto& face : kTetFaces) found.indices.insert(found.indices.end(), {first + face[0], first + face[1], first + face[2]});
       ++found.count;
     }
   }

@@ -14,6 +14,7 @@
 #include "common/codec/byte_planes.h"
 #include "common/codec/difference_coder.h"
 #include "common/util/atomic_file.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 namespace {
@@ -218,9 +219,9 @@ Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> s
     brick += *step;
     const SupercubeKey first = brick << 6;
     if (scale_of_key(first) < 0 || scale_of_key(first) >= kMaxLevels) return fail("a brick is of no scale");
-    for (std::uint64_t mask = masks[b]; mask != 0; mask &= mask - 1) {
+    for (const int bit : set_bits(masks[b])) {
       if (keys.size() == count) return fail("more supercubes than there should be");
-      keys.push_back(first + unsigned(std::countr_zero(mask)));
+      keys.push_back(first + unsigned(bit));
       const Vertex p = position_of_key(keys.back());
       if (std::max({p.x, p.y, p.z}) > (1 << kMaxLevels) >> (scale_of_key(first) + 2)) return fail("a supercube beyond any grid");
     }

@@ -1,10 +1,10 @@
 #include "common/ivm/refinement.h"
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 
 #include "common/ivm/ranking.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 
@@ -31,8 +31,9 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
     set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
-      for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
-        if (rank(i, std::countr_zero(left)) != 0) wanted.insert(i);
+      for (const int slot : set_bits(set.occupancy()[s])) {
+        if (rank(i, slot) != 0) wanted.insert(i);
+        ++i;
       }
     });
   }
@@ -49,8 +50,9 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& 
     set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
-      for (std::uint64_t left = set.occupancy()[s]; left != 0; left &= left - 1, ++i) {
-        if (updates.contains(i)) ranks[i] = rank(i, std::countr_zero(left));
+      for (const int slot : set_bits(set.occupancy()[s])) {
+        if (updates.contains(i)) ranks[i] = rank(i, slot);
+        ++i;
       }
     });
   }

@@ -9,18 +9,17 @@
 #include <limits>
 #include <vector>
 
+#include "common/util/tetrahedron.h"
+
 namespace intervale {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-// The faces of a positive tetrahedron, counterclockwise seen from outside; face f lies opposite corner f.
-constexpr std::array<std::array<std::uint8_t, 3>, 4> kFaces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
-
 // Faces are numbered 4 * tetrahedron + f.
 Triangle face(const Mesh& mesh, std::uint64_t id) {
   const auto& tet = mesh.tets[id / 4];
-  const auto& corners = kFaces[id % 4];
+  const auto& corners = kTetFaces[id % 4];
   return {tet[corners[0]], tet[corners[1]], tet[corners[2]]};
 }
 

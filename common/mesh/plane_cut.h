@@ -1,8 +1,8 @@
-// Cutting a mesh open: where a plane goes through its tetrahedra and its triangles.
+// Cutting a tetrahedral mesh open with a plane.
 //
-// What is kept lies strictly behind the plane; what lies on it or on its normal's side is cut away. So a plane through a face of the mesh never gives
-// a cut with nothing behind it, and the cuts and the kept parts of the boundary triangles close around what is kept without a gap: where an edge is
-// cut, both have the same point, to the last bit.
+// The rule for points in the plane: what lies strictly behind the plane (distance < 0) is kept; what lies in it, or on its normal's side, is cut
+// away. So a plane through a face of the mesh gives no cut with nothing behind it, and the cuts and the kept parts of the boundary triangles close
+// around what is kept without a gap: where they share an edge of the mesh, both have the same point on it, to the last bit.
 #pragma once
 
 #include <array>
@@ -11,36 +11,38 @@
 
 #include "common/mesh/mesh.h"
 #include "common/util/result.h"
+#include "common/util/vec3.h"
 
 namespace intervale {
 
 // World coordinates. The normal has any length but 0.
 struct Plane {
-  std::array<double, 3> point{};
-  std::array<double, 3> normal{};
+  Vec3 point{};
+  Vec3 normal{};
   friend bool operator==(const Plane&, const Plane&) = default;
 };
 
 // Misuse unless all numbers are finite and the normal is not 0.
 [[nodiscard]] Result<void> check_plane(const Plane& plane);
 
-// How far each point of the mesh is beyond the plane, in its normal's lengths: negative for what is kept.
-[[nodiscard]] std::vector<double> distances_beyond(const Mesh& mesh, const Plane& plane);
+// The signed distance of each point of the mesh from the plane, in world units: negative for what is kept.
+[[nodiscard]] std::vector<double> plane_distances(const Mesh& mesh, const Plane& plane);
 
-// Where an edge between a kept end and one cut away goes through the plane.
-[[nodiscard]] std::array<double, 3> crossing(const std::array<double, 3>& kept, double kept_distance, const std::array<double, 3>& away,
-                                             double away_distance);
+// Where the edge between a kept end (distance < 0) and one cut away (distance >= 0) crosses the plane.
+[[nodiscard]] Vec3 crossing(const Vec3& kept, double kept_distance, const Vec3& away, double away_distance);
 
-// A triangle or a quadrilateral: the first `count` corners, 3 or 4, counterclockwise seen from the normal's side, convex. Its sides are where the
-// plane goes through the tetrahedron's faces.
+// A convex polygon: the first `count` corners, 0 (no cut), 3 or 4, counterclockwise seen from the normal's side. Each side lies in a face of the
+// tetrahedron.
 struct TetCut {
-  std::uint32_t tet = 0;  // index into mesh.tets
   std::uint8_t count = 0;
-  std::array<std::array<double, 3>, 4> corners{};
+  std::array<Vec3, 4> corners{};
 };
 
-// The plane's cut through each tetrahedron that it goes through, in the order of mesh.tets. A tetrahedron that it only touches, in a corner or along
-// an edge, has none; one that lies behind it, with a face in it, has that face. O(points + tetrahedra).
+// The cut through a positive tetrahedron, from its corners' distances, in any unit. A tetrahedron that the plane only touches, in a corner or along
+// an edge, has none; one that lies behind the plane, with a face in it, has that face.
+[[nodiscard]] TetCut cut_tet(const std::array<Vec3, 4>& corners, const std::array<double, 4>& distances);
+
+// The cuts through the tetrahedra of a mesh that have one, in the order of mesh.tets. O(points + tetrahedra).
 [[nodiscard]] std::vector<TetCut> plane_cut(const Mesh& mesh, const Plane& plane);
 
 }  // namespace intervale

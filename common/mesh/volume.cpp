@@ -1,7 +1,7 @@
-#include <array>
 #include <cmath>
 
 #include "common/mesh/mesh.h"
+#include "common/util/vec3.h"
 
 namespace intervale {
 
@@ -10,11 +10,8 @@ double volume_of(const Mesh& mesh) {
   double sum = 0, lost = 0;
   for (const auto& tet : mesh.tets) {
     const auto& origin = mesh.points[tet[0]];
-    std::array<std::array<double, 3>, 3> e;
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t axis = 0; axis < 3; ++axis) e[i][axis] = mesh.points[tet[i + 1]][axis] - origin[axis];
-    const double six_fold = (e[0][1] * e[1][2] - e[0][2] * e[1][1]) * e[2][0] + (e[0][2] * e[1][0] - e[0][0] * e[1][2]) * e[2][1] +
-                            (e[0][0] * e[1][1] - e[0][1] * e[1][0]) * e[2][2];
+    const auto from_origin = [&](int corner) { return subtract(mesh.points[tet[corner]], origin); };
+    const double six_fold = triple_product(from_origin(1), from_origin(2), from_origin(3));
     const double next = sum + six_fold;
     lost += std::abs(sum) >= std::abs(six_fold) ? (sum - next) + six_fold : (six_fold - next) + sum;
     sum = next;

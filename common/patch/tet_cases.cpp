@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <map>
 
+#include "common/util/tetrahedron.h"
+
 namespace intervale {
 namespace {
 
 constexpr int kEdge[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4, 5, -1}};
-constexpr int kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};  // seen counterclockwise from outside a positive tetrahedron
 
 using Polygon = std::vector<PatchCorner>;
 
@@ -41,7 +42,7 @@ int rank(int order, PatchCorner corner) {
 }
 
 // The part of a face inside the range.
-Polygon clip(const int (&face)[3], const std::array<Side, 4>& side) {
+Polygon clip(const std::array<std::uint8_t, 3>& face, const std::array<Side, 4>& side) {
   Polygon polygon;
   for (int i = 0; i < 3; ++i) {
     const int a = face[i], b = face[(i + 1) % 3];
@@ -81,7 +82,7 @@ Polygon section(const std::vector<Polygon>& faces, int which) {
 
 std::vector<std::array<PatchCorner, 4>> tetrahedra(int order, const std::array<Side, 4>& side) {
   std::vector<Polygon> faces;
-  for (const auto& face : kFaces) {
+  for (const auto& face : kTetFaces) {
     Polygon p = clip(face, side);
     if (p.size() >= 3) faces.push_back(std::move(p));
   }

@@ -6,28 +6,17 @@
 #include <vector>
 
 #include "common/mesh/boundary.h"
-#include "common/mesh/io/mesh_writer.h"
+#include "common/mesh/normals.h"
+#include "common/mesh/plane_cut.h"
 
 namespace intervale {
 namespace {
 
-using Vector = std::array<double, 3>;
 using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr std::size_t kAtOnce = 3 * 16384;
 
-Vector minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-Vector mixed(const Vector& a, const Vector& b, double t) { return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])}; }
-
-// 0 stays 0.
-Vector unit_of(const Vector& v) {
-  const double length = std::hypot(v[0], v[1], v[2]);
-  return length > 0 ? Vector{v[0] / length, v[1] / length, v[2] / length} : Vector{};
-}
-
-Vector normal_of(const Vector& a, const Vector& b, const Vector& c) { return unit_of(cross(minus(b, a), minus(c, a))); }
+Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) { return normalized(cross(subtract(b, a), subtract(c, a))); }
 
 // The surfaces' triangles have all their points on one of them; every other one is part of a side of the box, where a surface leaves lines only.
 Part part_of(const Mesh& mesh, const Triangle& t) {
@@ -45,21 +34,14 @@ std::vector<Triangle> ordered_boundary(const Mesh& mesh) {
   return triangles;
 }
 
-// In whole steps of 2^-20, so that their sums do not depend on the triangles' order. Not of length 1.
-using SmoothNormal = std::array<std::int32_t, 3>;
-constexpr double kNormalSteps = 1 << 20;
-
-std::vector<SmoothNormal> smooth_normals(const Mesh& mesh, const std::vector<Triangle>& triangles) {
-  std::vector<SmoothNormal> normals(mesh.points.size());
+std::vector<NormalSum> smooth_normals(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+  std::vector<NormalSum> normals(mesh.points.size());
+  const auto arc_cosine = [](double x) { return std::acos(std::clamp(x, -1.0, 1.0)); };
   for (const Triangle& t : triangles) {
     if (part_of(mesh, t) == Part::box) continue;
-    const Vector normal = normal_of(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vector& at = mesh.points[t[i]];
-      const Vector u = unit_of(minus(mesh.points[t[(i + 1) % 3]], at)), v = unit_of(minus(mesh.points[t[(i + 2) % 3]], at));
-      const double angle = std::acos(std::clamp(dot(u, v), -1.0, 1.0));
-      for (std::size_t axis = 0; axis < 3; ++axis) normals[t[i]][axis] += std::int32_t(std::lround(angle * normal[axis] * kNormalSteps));
-    }
+    const auto added = angle_weighted_normals({mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]}, arc_cosine);
+    for (std::size_t corner = 0; corner < 3; ++corner)
+      for (std::size_t axis = 0; axis < 3; ++axis) normals[t[corner]][axis] += added[corner][axis];
   }
   return normals;
 }
@@ -67,10 +49,10 @@ std::vector<SmoothNormal> smooth_normals(const Mesh& mesh, const std::vector<Tri
 // Convex, counterclockwise; `count` of the corners. Side i leads from corner i to the next.
 struct Polygon {
   unsigned count = 0;
-  std::array<Vector, 4> corners{}, normals{};
+  std::array<Vec3, 4> corners{}, normals{};
   std::array<bool, 4> drawn{};
 
-  void add(const Vector& corner, const Vector& normal, bool side_drawn) {
+  void add(const Vec3& corner, const Vec3& normal, bool side_drawn) {
     corners[count] = corner;
     normals[count] = normal;
     drawn[count++] = side_drawn;
@@ -87,9 +69,9 @@ Polygon clipped(const Polygon& triangle, const std::array<double, 3>& distances)
     if ((here < 0) == (there < 0)) continue;
     const bool leaves = here < 0;
     const std::size_t in = leaves ? i : j, out = leaves ? j : i;
-    const Vector point = crossing(triangle.corners[in], distances[in], triangle.corners[out], distances[out]);
+    const Vec3 point = crossing(triangle.corners[in], distances[in], triangle.corners[out], distances[out]);
     const double t = distances[in] / (distances[in] - distances[out]);
-    kept.add(point, unit_of(mixed(triangle.normals[in], triangle.normals[out], t)), !leaves && triangle.drawn[i]);
+    kept.add(point, normalized(lerp(triangle.normals[in], triangle.normals[out], t)), !leaves && triangle.drawn[i]);
   }
   return kept;
 }
@@ -106,7 +88,7 @@ class Batch {
       const bool opposite_0 = polygon.drawn[i], opposite_1 = last && polygon.drawn[i + 1], opposite_2 = first && polygon.drawn[0];
       const std::uint32_t look = std::uint32_t(part) | unsigned(opposite_0) << 2 | unsigned(opposite_1) << 3 | unsigned(opposite_2) << 4;
       for (const unsigned corner : {0u, i, i + 1}) {
-        const Vector& n = polygon.normals[corner];
+        const Vec3& n = polygon.normals[corner];
         corners_.push_back({viewpoint_.in_scene(polygon.corners[corner]), {float(n[0]), float(n[1]), float(n[2])}, look});
       }
       if (corners_.size() == kAtOnce) flush();
@@ -127,15 +109,15 @@ class Batch {
 void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch) {
   const std::vector<Triangle> triangles = ordered_boundary(mesh);
   const auto smooth = smooth_normals(mesh, triangles);
-  const std::vector<double> distances = options.clip ? distances_beyond(mesh, *options.clip) : std::vector<double>{};
+  const std::vector<double> distances = options.clip ? plane_distances(mesh, *options.clip) : std::vector<double>{};
   for (const Triangle& t : triangles) {
     const Part part = part_of(mesh, t);
-    const Vector flat = normal_of(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
-    if (flat == Vector{}) continue;
+    const Vec3 flat = normal_of(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
+    if (flat == Vec3{}) continue;
     Polygon polygon;
     for (const std::uint32_t point : t) {
-      const Vector normal = part == Part::box ? Vector{} : unit_of({double(smooth[point][0]), double(smooth[point][1]), double(smooth[point][2])});
-      polygon.add(mesh.points[point], normal == Vector{} ? flat : normal, options.edges);
+      const Vec3 normal = part == Part::box ? Vec3{} : normalized({double(smooth[point][0]), double(smooth[point][1]), double(smooth[point][2])});
+      polygon.add(mesh.points[point], normal == Vec3{} ? flat : normal, options.edges);
     }
     if (options.clip) polygon = clipped(polygon, {distances[t[0]], distances[t[1]], distances[t[2]]});
     batch.add(polygon, part);
@@ -143,7 +125,7 @@ void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch
 }
 
 void add_cut(const Mesh& mesh, const Plane& plane, Batch& batch) {
-  const Vector normal = unit_of(plane.normal);
+  const Vec3 normal = normalized(plane.normal);
   for (const TetCut& cut : plane_cut(mesh, plane)) {
     Polygon polygon;
     const auto corners = std::span(cut.corners).first(cut.count);

@@ -8,32 +8,24 @@
 namespace intervale {
 namespace {
 
-using Vector = std::array<double, 3>;
-
-constexpr Vector kThreeQuarter{0.5, 0.42, 1};  // towards the eye
+constexpr Vec3 kThreeQuarter{0.5, 0.42, 1};  // towards the eye
 constexpr std::array<int, 2> kPixels{1280, 960};
 constexpr double kFov = 30;
 constexpr double kMargin = 1.04;    // around the box
 constexpr double kNearest = 0.002;  // ahead of an eye that is inside, in the scene
 
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vector minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-Vector times(double s, const Vector& v) { return {s * v[0], s * v[1], s * v[2]}; }
-Vector unit_of(const Vector& v) { return times(1 / std::hypot(v[0], v[1], v[2]), v); }
-
-Vector middle_of(const Box& box) {
-  Vector middle;
+Vec3 middle_of(const Box& box) {
+  Vec3 middle;  // of both, also where their sum would overflow
   for (std::size_t i = 0; i < 3; ++i) middle[i] = box.min[i] + (box.max[i] - box.min[i]) / 2;
   return middle;
 }
 
 // A camera's axes: all of length 1.
 struct Axes {
-  Vector right, up, back;
+  Vec3 right, up, back;
 };
-Axes axes_of(const Vector& back, const Vector& up) {
-  const Vector b = unit_of(back), right = unit_of(cross(unit_of(up), b));
+Axes axes_of(const Vec3& back, const Vec3& up) {
+  const Vec3 b = normalized(back), right = normalized(cross(normalized(up), b));
   return {right, cross(b, right), b};
 }
 
@@ -44,15 +36,15 @@ Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip) {
   camera.fov = kFov;
   camera.viewport = kPixels;
   camera.look_at = middle_of(box);
-  Vector from = kThreeQuarter;
+  Vec3 from = kThreeQuarter;
   for (std::size_t i = 0; clip && i < 3; ++i) from[i] = std::copysign(from[i], clip->normal[i] < 0 ? -1.0 : 1.0);
   const Axes axes = axes_of(from, camera.up);
   const double tan_y = std::tan(camera.fov * std::numbers::pi / 360), tan_x = tan_y * camera.viewport[0] / camera.viewport[1];
   double distance = 0;
   for (unsigned corner = 0; corner < 8; ++corner) {
-    Vector p;
+    Vec3 p;
     for (std::size_t i = 0; i < 3; ++i) p[i] = (corner >> i & 1) != 0 ? box.max[i] : box.min[i];
-    p = minus(p, camera.look_at);
+    p = subtract(p, camera.look_at);
     const double aside = std::max(std::abs(dot(p, axes.right)) / tan_x, std::abs(dot(p, axes.up)) / tan_y);
     distance = std::max(distance, dot(p, axes.back) + kMargin * aside);
   }
@@ -61,17 +53,16 @@ Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip) {
 }
 
 Viewpoint::Viewpoint(const Camera& camera, const Box& box) : centre(middle_of(box)) {
-  const Vector diagonal = minus(box.max, box.min);
-  unit = std::hypot(diagonal[0], diagonal[1], diagonal[2]) / 2;
-  const Vector from = times(1 / unit, minus(camera.eye, centre));
-  const Axes axes = axes_of(minus(camera.eye, camera.look_at), camera.up);
+  unit = length(subtract(box.max, box.min)) / 2;
+  const Vec3 from = scaled(1 / unit, subtract(camera.eye, centre));
+  const Axes axes = axes_of(subtract(camera.eye, camera.look_at), camera.up);
   const double ahead = dot(from, axes.back);  // of the eye to the middle, along the line of sight
   const double nearest = std::max(kNearest, (ahead - 1) * 0.999), far = std::max(2 * nearest, (ahead + 1) * 1.001);
   const double scale_y = 1 / std::tan(camera.fov * std::numbers::pi / 360), scale_x = scale_y * camera.viewport[1] / camera.viewport[0];
   const double a = (far + nearest) / (nearest - far), b = 2 * far * nearest / (nearest - far);
 
   // Put together in doubles: from afar, what is left of far numbers that nearly cancel is what depths are told apart by.
-  const std::array<Vector, 3> rows{axes.right, axes.up, axes.back};
+  const std::array<Vec3, 3> rows{axes.right, axes.up, axes.back};
   std::array<double, 3> shift;
   for (std::size_t i = 0; i < 3; ++i) shift[i] = -dot(rows[i], from);
   for (std::size_t column = 0; column < 4; ++column) {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "common/mesh/plane_cut.h"
+#include "common/util/vec3.h"
 #include "common/view/lod.h"
 
 namespace intervale {
@@ -16,9 +17,9 @@ namespace intervale {
 struct Viewpoint {
   Viewpoint(const Camera& camera, const Box& box);  // a camera that check_lod lets pass
 
-  [[nodiscard]] std::array<float, 3> in_scene(const std::array<double, 3>& world) const;
+  [[nodiscard]] std::array<float, 3> in_scene(const Vec3& world) const;
 
-  std::array<double, 3> centre;         // the scene's origin, in the world
+  Vec3 centre;                          // the scene's origin, in the world
   double unit;                          // a length of 1 in the scene, in the world
   std::array<float, 3> eye;             // in the scene
   std::array<float, 9> rotation;        // from the scene to right, up and towards the viewer; column by column, as the next

@@ -3,21 +3,16 @@
 #include <cmath>
 #include <cstddef>
 
+#include "common/util/vec3.h"
+
 namespace intervale {
 namespace {
 
-using Vector = std::array<double, 3>;
-
-bool is_finite(const Vector& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
-
-double length(const Vector& v) { return std::hypot(v[0], v[1], v[2]); }
-
 Result<void> check_camera(const Camera& c) {
   if (!is_finite(c.eye) || !is_finite(c.look_at) || !is_finite(c.up)) return misuse("the camera's vectors must be finite");
-  const Vector ahead{c.look_at[0] - c.eye[0], c.look_at[1] - c.eye[1], c.look_at[2] - c.eye[2]};
+  const Vec3 ahead = subtract(c.look_at, c.eye);
   if (!(length(ahead) > 0) || !std::isfinite(length(ahead))) return misuse("the camera must look at another point than the one it is at");
-  const Vector side{ahead[1] * c.up[2] - ahead[2] * c.up[1], ahead[2] * c.up[0] - ahead[0] * c.up[2], ahead[0] * c.up[1] - ahead[1] * c.up[0]};
-  if (!(length(side) > 1e-9 * length(ahead) * length(c.up))) return misuse("the camera's up must not be along its line of sight");
+  if (!(length(cross(ahead, c.up)) > 1e-9 * length(ahead) * length(c.up))) return misuse("the camera's up must not be along its line of sight");
   if (!(c.fov > 0 && c.fov < 180)) return misuse("the field of view must be above 0 and below 180 degrees");
   for (const int pixels : c.viewport) {
     if (pixels < 1 || pixels > 65535) return misuse("the viewport must have 1 to 65535 pixels each way");

@@ -4,46 +4,40 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/util/vec3.h"
+
 namespace intervale {
 namespace {
-
-using Vector = std::array<double, 3>;
 
 // Errors shrink to 1 / (1 + kFade) at a right angle to the edge of the picture, and beyond.
 constexpr double kFade = 15;
 
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-double reach_along(const Vector& reach, const Vector& n) { return reach[0] * std::abs(n[0]) + reach[1] * std::abs(n[1]) + reach[2] * std::abs(n[2]); }
-Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-Vector unit(const Vector& v) {
-  const double n = std::hypot(v[0], v[1], v[2]);
-  return {v[0] / n, v[1] / n, v[2] / n};
-}
+double reach_along(const Vec3& reach, const Vec3& n) { return reach[0] * std::abs(n[0]) + reach[1] * std::abs(n[1]) + reach[2] * std::abs(n[2]); }
 
 }  // namespace
 
 View::View(const Camera& camera, const Grid& grid) : origin_(grid.origin), spacing_(grid.spacing), eye_(camera.eye) {
-  ahead_ = unit({camera.look_at[0] - eye_[0], camera.look_at[1] - eye_[1], camera.look_at[2] - eye_[2]});
-  right_ = unit(cross(ahead_, unit(camera.up)));
+  ahead_ = normalized(subtract(camera.look_at, eye_));
+  right_ = normalized(cross(ahead_, normalized(camera.up)));
   up_ = cross(right_, ahead_);
   tan_y_ = std::tan(camera.fov * (std::numbers::pi / 360));
   tan_x_ = tan_y_ * camera.viewport[0] / camera.viewport[1];
   scale_ = camera.viewport[1] / (2 * tan_y_);
   cos_corner_ = 1 / std::hypot(1.0, tan_x_, tan_y_);
   least_depth_ = 1e-3 * std::min({spacing_[0], spacing_[1], spacing_[2]});
-  const auto side = [this](const Vector& across, double sign, double tangent) {
-    Vector n, e;
+  const auto side = [this](const Vec3& across, double sign, double tangent) {
+    Vec3 n, e;
     for (int i = 0; i < 3; ++i) {
       n[i] = tangent * ahead_[i] + sign * across[i];
       e[i] = ahead_[i] - sign * tangent * across[i];
     }
-    return Side{unit(n), unit(e)};
+    return Side{normalized(n), normalized(e)};
   };
   sides_ = {side(right_, 1, tan_x_), side(right_, -1, tan_x_), side(up_, 1, tan_y_), side(up_, -1, tan_y_)};
 }
 
 double View::pixels_per_unit(const Region& region) const {
-  Vector at, reach;
+  Vec3 at, reach;
   double gap2 = 0, far2 = 0;  // to the nearest point of the region, and to its furthest corner
   for (int i = 0; i < 3; ++i) {
     at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
@@ -76,7 +70,7 @@ bool View::is_near(const Region& region) const {
 }
 
 bool View::is_central(const Region& region) const {
-  Vector at;
+  Vec3 at;
   for (int i = 0; i < 3; ++i) at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
   const double depth = dot(at, ahead_);
   return std::abs(dot(at, right_)) <= tan_x_ / 2 * depth && std::abs(dot(at, up_)) <= tan_y_ / 2 * depth;

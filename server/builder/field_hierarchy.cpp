@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "common/patch/tet_cases.h"
+#include "common/util/bits.h"
 #include "server/builder/error_levels.h"
 #include "server/builder/interpolation_error.h"
 #include "server/builder/relevance.h"
@@ -77,8 +78,7 @@ DiamondContext context_of(const Around& f, const Outline& outline, const Range& 
     alpha ^= side == Side::below ? edges.at[v] : 0;
     beta ^= side == Side::above ? edges.at[v] : 0;
   }
-  for (std::uint32_t left = (alpha | beta) & outline.edges; left != 0; left &= left - 1) {
-    const int e = std::countr_zero(left);
+  for (const int e : set_bits((alpha | beta) & outline.edges)) {
     const Cuts cuts = cuts_between(f[edges.ends[e][0]], f[edges.ends[e][1]], range);
     int n = 0;
     if (alpha >> e & 1) c.cut[e][0] = std::uint16_t(2 * cuts.q[n++] + 1);
@@ -162,8 +162,7 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
           set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
             const SupercubeDiamonds diamonds(outlines_, key);
             UpdateIndex next = set_.first(brick, s);
-            for (std::uint64_t left = set_.occupancy()[s]; left != 0; left &= left - 1) {
-              const int slot = std::countr_zero(left);
+            for (const int slot : set_bits(set_.occupancy()[s])) {
               const Diamond d = diamonds.diamond(slot);
               const Outline& outline = diamonds.outline(slot);
               double error = 0;
@@ -200,11 +199,9 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
           if (slots == 0) return;
           const SupercubeChildren children(set_, key);
           UpdateIndex next = set_.first(brick, s) + UpdateIndex(std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots));
-          for (std::uint64_t left = slots; left != 0; left &= left - 1) {
-            const int slot = std::countr_zero(left);
+          for (const int slot : set_bits(slots)) {
             float& error = errors[next++];
-            for (unsigned some = children.of(slot); some != 0; some &= some - 1)
-              error = std::max(error, errors[children.number_of(slot, std::countr_zero(some))]);
+            for (const int child : set_bits(children.of(slot))) error = std::max(error, errors[children.number_of(slot, child)]);
           }
         });
       });
@@ -301,8 +298,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
         const SupercubeDiamonds diamonds(outlines_, key);
         const SupercubeChildren children(set_, key);
         UpdateIndex next = set_.first(b, s);
-        for (std::uint64_t left = set_.occupancy()[s]; left != 0; left &= left - 1, ++next) {
-          const int slot = std::countr_zero(left);
+        for (const int slot : set_bits(set_.occupancy()[s])) {
           const Diamond diamond = diamonds.diamond(slot);
           const Outline& outline = diamonds.outline(slot);
           const Around f = around(field, domain_, diamond, outline);
@@ -316,6 +312,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
           parts.codes[next] = UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first),
                                          unsigned(level_of(errors_[next])));
           part.full.tets += leaves(cases, domain_, diamond, outline, c.sides | std::uint32_t(centre) << (2 * kCentre), children.of(slot));
+          ++next;
           if (centre != Side::inside) continue;
           if (domain_.contains(diamond.centre))
             ++part.full.vertices;

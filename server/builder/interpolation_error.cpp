@@ -2,14 +2,13 @@
 
 #include <cassert>
 
+#include "common/util/tetrahedron.h"
+#include "common/util/vec3.h"
+
 namespace intervale {
 namespace {
 
 using Int3 = std::array<int, 3>;
-
-Int3 cross(const Int3& a, const Int3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-int dot(const Int3& a, const Int3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Int3 minus(const Int3& a, const Int3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 TetPlan plan_of(const DiamondType& row, int tet) {
   std::array<Int3, 4> p{};
@@ -17,7 +16,7 @@ TetPlan plan_of(const DiamondType& row, int tet) {
   for (int i = 0; i < 4; ++i) p[i] = {row.vertex[local[i]].x, row.vertex[local[i]].y, row.vertex[local[i]].z};
   TetPlan plan;
   // The rows of the inverse of (p0, p2, p3) are gradients: the spine's middle is the origin.
-  const int det = dot(p[0], cross(p[2], p[3]));
+  const int det = triple_product(p[2], p[3], p[0]);
   const std::array<Int3, 3> dual{cross(p[2], p[3]), cross(p[3], p[0]), cross(p[0], p[2])};
   for (int axis = 0; axis < 3; ++axis) {
     for (int i = 0; i < 3; ++i) plan.gradient[axis][i] = double(dual[i][axis]) / det;
@@ -28,12 +27,11 @@ TetPlan plan_of(const DiamondType& row, int tet) {
       plan.high[axis] = std::int8_t(std::max<int>(plan.high[axis], q[axis]));
     }
   }
-  constexpr int others[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
   std::array<TetPlan::Face, 4> faces{};
   for (int i = 0; i < 4; ++i) {
-    const Int3 &a = p[others[i][0]], &b = p[others[i][1]], &c = p[others[i][2]];
-    Int3 n = cross(minus(b, a), minus(c, a));
-    const int g = std::gcd(std::gcd(n[0], n[1]), n[2]), sign = dot(n, minus(p[i], a)) < 0 ? -g : g;
+    const Int3 &a = p[kTetFaces[i][0]], &b = p[kTetFaces[i][1]], &c = p[kTetFaces[i][2]];
+    Int3 n = cross(subtract(b, a), subtract(c, a));
+    const int g = std::gcd(std::gcd(n[0], n[1]), n[2]), sign = dot(n, subtract(p[i], a)) < 0 ? -g : g;
     for (int& v : n) v /= sign;
     for (int k = 0; k < 3; ++k) {
       assert(n[k] >= -1 && n[k] <= 1 && "faces of diamonds are along axes and diagonals");

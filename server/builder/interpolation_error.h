@@ -13,6 +13,9 @@
 #include <vector>
 
 #include "common/diamond/domain.h"
+#include "common/util/bits.h"
+#include "common/util/tetrahedron.h"
+#include "common/util/vec3.h"
 #include "server/builder/outline.h"
 
 namespace intervale {
@@ -107,9 +110,8 @@ template <class T>
 class Tetrahedron {
  public:
   Tetrahedron(const Field<T>& field, const std::array<Vertex, 4>& p) : field_(field), p0_(p[0]) {
-    constexpr int others[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
     for (int i = 0; i < 4; ++i) {
-      const auto [a, b, c] = others[i];
+      const auto [a, b, c] = kTetFaces[i];
       n_[i] = cross(minus(p[b], p[a]), minus(p[c], p[a]));
       const std::int64_t g = std::gcd(std::gcd(n_[i][0], n_[i][1]), n_[i][2]);
       const std::int64_t sign = dot(n_[i], minus(p[i], p[a])) < 0 ? -g : g;
@@ -169,8 +171,6 @@ class Tetrahedron {
  private:
   using I3 = std::array<std::int64_t, 3>;
   static I3 minus(Vertex a, Vertex b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-  static I3 cross(const I3& a, const I3& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-  static std::int64_t dot(const I3& a, const I3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
   // Whether no face has the whole cube [low, low + size] outside.
   [[nodiscard]] bool meets(const I3& low, std::int64_t size) const {
@@ -302,8 +302,7 @@ class DiamondErrors {
   [[nodiscard]] double operator()(const Diamond& d, const Outline& outline, unsigned tets = ~0u) const {
     if (scale_ == 0) return outline.interior ? finest(d) : finest_moved(d, outline);
     double worst = 0;
-    for (unsigned left = tets & outline.tets; left != 0; left &= left - 1) {
-      const int i = std::countr_zero(left);
+    for (const int i : set_bits(tets & outline.tets)) {
       if (scale_ <= kSmall && (outline.unmoved >> i & 1)) {
         worst = std::max(worst, double(unmoved(d, i, outline.interior)));
       } else {
@@ -346,8 +345,8 @@ class DiamondErrors {
   // A diamond at the border, h = 1: there, too.
   [[nodiscard]] double finest_moved(const Diamond& d, const Outline& outline) const {
     double worst = 0;
-    for (unsigned left = outline.edges; left != 0; left &= left - 1) {
-      const auto [i, k] = edge_ends(std::countr_zero(left), d.row->belt);
+    for (const int e : set_bits(outline.edges)) {
+      const auto [i, k] = edge_ends(e, d.row->belt);
       const Vertex a = domain_.clamp(d.vertex(i)), b = domain_.clamp(d.vertex(k)), both{a.x + b.x, a.y + b.y, a.z + b.z};
       if ((both.x | both.y | both.z) & 1) continue;
       const double middle = field_.at({both.x / 2, both.y / 2, both.z / 2});

@@ -10,6 +10,8 @@
 #include <numeric>
 #include <utility>
 
+#include "common/util/bits.h"
+
 namespace intervale {
 namespace {
 
@@ -279,7 +281,7 @@ Supercubes supercubes_of(const BitGrid& relevant, int scale) {
         }
         if (types == 0) continue;
         std::uint64_t slots = 0;
-        for (; types != 0; types &= types - 1) slots |= std::uint64_t(1) << kSlotOfType[std::countr_zero(types)];
+        for (const int type : set_bits(types)) slots |= std::uint64_t(1) << kSlotOfType[type];
         slices[z].emplace_back(supercube_key(scale, {x, y, z}), slots);
       }
     }

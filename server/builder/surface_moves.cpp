@@ -13,6 +13,8 @@
 #include <span>
 
 #include "common/ivm/interval_volume.h"
+#include "common/util/bits.h"
+#include "common/util/vec3.h"
 #include "server/builder/interpolation_error.h"
 
 namespace intervale {
@@ -37,17 +39,13 @@ struct Corner {
   float value;
 };
 
-using Vector = std::array<double, 3>;
-
 // One tetrahedron of the bisection. Its spine goes from corner 0 to corner 3 - cls.
 struct Tet {
   std::array<Corner, 4> corner;
   int scale, cls;
-  std::array<Vector, 4> weight;  // the gradients of the barycentric coordinates, in world units, which a step changes as it does those
-  Vector gradient;               // of the interpolant
+  std::array<Vec3, 4> weight;  // the gradients of the barycentric coordinates, in world units, which a step changes as it does those
+  Vec3 gradient;               // of the interpolant
 };
-
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 float round_up(double value) {
   const float f = float(std::min(value, double(std::numeric_limits<float>::max())));
@@ -241,7 +239,7 @@ class Cubes {
     }
     const int slot = kSlotOfType[type_of(centre, scale)];
     if (!(here.occupancy >> slot & 1)) return {};
-    return here.first + UpdateIndex(std::popcount(here.occupancy & ((std::uint64_t(1) << slot) - 1)));
+    return here.first + UpdateIndex(count_below(here.occupancy, slot));
   }
 
   // Whether there is a patch of that surface in the tetrahedron, or at least in its diamond.

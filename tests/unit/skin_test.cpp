@@ -233,6 +233,36 @@ TEST_P(SkinOf, CutsAddUpToTheVolume) {
   }
 }
 
+// A side of a section's triangle is drawn exactly if it is one of the cut tetrahedron's, and not a diagonal of a quadrilateral.
+TEST_P(SkinOf, CutsDrawTheSidesOfTheirPolygons) {
+  auto client = StreamClient::start(volume->description());
+  ASSERT_TRUE(client);
+  StreamPlan plan(volume);
+  plan.set_lod({});
+  while (const auto batch = plan.next(4096)) ASSERT_TRUE(client->apply(batch->payload));
+  Skin skin(client->front());
+  (void)skin.update();
+  double offset = 0.0123;  // beside the samples
+  for (int i = 0; i < 3; ++i) offset += (grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1) / 2) * std::array{0.6, 0.64, 0.48}[i];
+  const auto cut = cross_section(skin, {{0.6, 0.64, 0.48}, offset});
+  ASSERT_FALSE(cut.empty());
+  std::multiset<std::array<std::array<float, 3>, 2>> drawn, diagonals;
+  for (std::size_t first = 0; first < cut.size(); first += 3) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const SectionVertex &a = cut[first + (k + 1) % 3], &b = cut[first + (k + 2) % 3];
+      EXPECT_EQ(cut[first + k].side[k], 255);
+      EXPECT_EQ(a.side[k], b.side[k]);
+      std::array<std::array<float, 3>, 2> side{{{a.x, a.y, a.z}, {b.x, b.y, b.z}}};
+      std::sort(side.begin(), side.end());
+      (a.side[k] == 0 ? drawn : diagonals).insert(side);
+    }
+  }
+  for (const auto& side : diagonals) {
+    EXPECT_EQ(diagonals.count(side), 2u) << "of two triangles of one quadrilateral";
+    EXPECT_EQ(drawn.count(side), 0u) << "no face of a tetrahedron";
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Random, SkinOf, ::testing::Range(0u, 8u));
 
 // Where nothing hides in diamonds that look empty, the bound holds at every level of detail.
