@@ -8,6 +8,7 @@ import net from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { inflateSync } from 'node:zlib';
 
 const kTimeoutMs = 60_000; // for every wait on a page
 
@@ -177,4 +178,17 @@ export function surfaceShares(picture) {
   };
   const [alpha, beta, interior] = ['alpha', 'beta', 'interior'].map((name) => browser.share(picture, (r, g, b) => kind(r, g, b) === name));
   return { alpha, beta, interior };
+}
+
+// The bytes of an array of a VTK XML file: zlib's blocks behind a table of 64-bit sizes, each in base64 of its own.
+export function vtkArray(file, name) {
+  const text = file.toString('latin1').match(new RegExp(`Name="${name}"[^>]*>([^<]*)<`))[1];
+  const blocks = Number(Buffer.from(text.slice(0, 12), 'base64').readBigUInt64LE());
+  const digits = 4 * Math.ceil((8 * (3 + blocks)) / 3);
+  const table = Buffer.from(text.slice(0, digits), 'base64');
+  const compressed = Buffer.from(text.slice(digits), 'base64');
+  let at = 0;
+  return Buffer.concat(
+    Array.from({ length: blocks }, (_, i) => inflateSync(compressed.subarray(at, (at += Number(table.readBigUInt64LE(8 * (3 + i))))))),
+  );
 }

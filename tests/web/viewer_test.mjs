@@ -24,6 +24,7 @@ import {
   settled,
   surfaceShares,
   throttledProxy,
+  vtkArray,
 } from './support.mjs';
 
 const kEverything = { min: [-100, -100, -100], max: [100, 100, 100] };
@@ -342,6 +343,10 @@ describe('Controls', () => {
       assert.equal(picture.bytes.subarray(1, 4).toString(), 'PNG');
       const vtu = await save('vtu');
       assert.match(vtu.bytes.subarray(0, 2000).toString('latin1'), new RegExp(`NumberOfCells="${tets}"`));
+      const types = vtkArray(vtu.bytes, 'types');
+      assert.equal(types.length, tets);
+      assert.ok(types.every((type) => type === 10));
+      assert.equal(vtkArray(vtu.bytes, 'connectivity').length, tets * 4 * 8);
       const stl = await save('stl');
       assert.equal(stl.bytes.readUInt32LE(80), triangles);
       const glb = await save('glb');

@@ -52,6 +52,10 @@ class MeshOutput {
     text(intervale::decimal(value, digits));
   }
 
+  void fail(std::string message) {
+    if (result_) result_ = intervale::fail(std::move(message));
+  }
+
   Result<void> commit() { return result_ ? file_.commit() : result_; }
 
  private:
