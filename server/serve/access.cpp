@@ -25,7 +25,8 @@ bool is_token(std::string_view text) {
   });
 }
 
-// Star by star: what stands before the next one is found as early as can be, and never looked for again.
+// Greedy: the text between two stars is matched at its first place. Backtracking to the last star only is enough, so
+// the time is O(pattern * name).
 bool matches(std::string_view pattern, std::string_view name) {
   std::size_t p = 0, n = 0, star = std::string_view::npos, resume = 0;
   while (n < name.size()) {
@@ -45,7 +46,7 @@ bool matches(std::string_view pattern, std::string_view name) {
   return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
-// Goes over all of `given` whatever it holds; only its own length shows.
+// Compares all characters, so that the time depends on the length of `given` only.
 bool equal_in_constant_time(std::string_view given, std::string_view secret) {
   volatile unsigned difference = given.size() == secret.size() ? 0 : 1;
   for (std::size_t i = 0; i < given.size(); ++i) {
@@ -80,7 +81,7 @@ std::optional<std::string> from_base64url(std::string_view text) {
     bits -= 8;
     bytes += char(value >> bits & 0xff);
   }
-  if (bits >= 6) return {};  // a digit that gives no byte
+  if (bits >= 6) return {};  // a digit too many
   return bytes;
 }
 
@@ -107,14 +108,14 @@ Result<Tokens> Tokens::parse(std::string_view text) {
     std::vector<std::string> words = words_of(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
     if (words.empty()) continue;
-    const auto wrong = [number](const char* what) { return fail("line " + std::to_string(number) + ": " + what); };
+    const auto error = [number](const char* what) { return fail("line " + std::to_string(number) + ": " + what); };
     std::string token = std::move(words.front());
-    if (!is_token(token)) return wrong("not a token: 1 to 512 of A-Z a-z 0-9 - . _ ~ + / = are wanted");
-    if (!seen.insert(token).second) return wrong("a token that is there already");
+    if (!is_token(token)) return error("invalid token: it must have 1 to 512 of the characters A-Z a-z 0-9 - . _ ~ + / =");
+    if (!seen.insert(token).second) return error("duplicate token");
     words.erase(words.begin());
     tokens.entries_.push_back({std::move(token), words.empty() ? Scope::everything() : std::make_shared<const Scope>(std::move(words))});
   }
-  if (tokens.entries_.empty()) return fail("no tokens, so nobody could come in");
+  if (tokens.entries_.empty()) return fail("no tokens: no client could connect");
   return tokens;
 }
 
@@ -124,7 +125,7 @@ Result<Tokens> Tokens::load(const std::filesystem::path& path) {
   std::string text(kMaxTokenFile + 1, '\0');
   in.read(text.data(), std::streamsize(text.size()));
   text.resize(std::size_t(in.gcount()));
-  if (in.bad() || !in.eof()) return fail("cannot read the tokens in " + path.string() + ": it is no file of 1 MiB at most");
+  if (in.bad() || !in.eof()) return fail("cannot read the tokens in " + path.string() + ": it is larger than 1 MiB, or no file");
   auto tokens = parse(text);
   if (!tokens) return fail("cannot read the tokens in " + path.string() + ": " + tokens.error().message);
   return tokens;

@@ -45,7 +45,8 @@ void AddressCounts::release(const Key& key) {
 }
 
 WriteBudget::Reservation WriteBudget::reserve(std::weak_ptr<Connection> connection, std::size_t bytes, Clock::time_point now) {
-  std::vector<std::shared_ptr<Connection>> keep_alive;  // until the lock is released: a connection's destructor calls release()
+  // Until the lock is released: a connection's destructor calls release().
+  std::vector<std::shared_ptr<Connection>> keep_alive;
   const std::lock_guard lock(mutex_);
   bytes_ += bytes;
   writes_.push_back({std::move(connection), bytes, now});

@@ -1,5 +1,5 @@
-// What a server limits besides its number of connections: message rates, connections by address, unsent bytes. Any thread,
-// except RateLimit.
+// What a server limits besides its number of connections: message rates, connections by address, unsent bytes. Any
+// thread, except RateLimit.
 #pragma once
 
 #include <array>
@@ -71,8 +71,8 @@ class AddressCounts {
   std::map<Key, std::size_t> counts_;
 };
 
-// Bounds the unsent bytes of all sessions. Past the limit, the connections whose writes have been pending the longest are
-// aborted, if that is more than a second.
+// Bounds the unsent bytes of all sessions. Past the limit, the connections whose writes have been pending the longest
+// are aborted, if that is more than a second.
 class WriteBudget {
  public:
   using Clock = std::chrono::steady_clock;

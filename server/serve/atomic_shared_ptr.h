@@ -7,8 +7,8 @@
 
 namespace intervale {
 
-// Any thread. Stands for std::atomic<std::shared_ptr<const T>>, whose implementation in libstdc++ 12 the thread sanitizer
-// reports as a data race.
+// Any thread. Stands for std::atomic<std::shared_ptr<const T>>, whose implementation in libstdc++ 12 the thread
+// sanitizer reports as a data race.
 template <class T>
 class AtomicSharedPtr {
  public:

@@ -10,7 +10,7 @@
 namespace intervale {
 namespace {
 
-// Well formed as in Unicode's table 3-7: nothing overlong, no surrogates, nothing past U+10FFFF.
+// Well-formed UTF-8 (The Unicode Standard, table 3-7): no overlong forms, no surrogates, nothing above U+10FFFF.
 bool is_utf8(std::string_view text) {
   while (!text.empty()) {
     const auto lead = static_cast<unsigned char>(text.front());
@@ -28,8 +28,8 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
-// A name stands in URLs, JSON, metrics, logs and terminals.
-bool fit_for_a_url(const std::string& name) {
+// Names occur in URLs, JSON, metrics, logs and terminals.
+bool is_valid_name(const std::string& name) {
   return !name.empty() && name.size() <= protocol::kMaxName && is_utf8(name) && printable(name) == name &&
          std::none_of(name.begin(), name.end(), [](char c) { return c == '/' || c == '?' || c == '#'; });
 }
@@ -37,13 +37,13 @@ bool fit_for_a_url(const std::string& name) {
 }  // namespace
 
 Result<void> Catalogue::check_name(const std::string& name) {
-  if (fit_for_a_url(name)) return {};
-  return fail("a data set's name must be 1 to 255 bytes of UTF-8 without / ? # and control characters: rename the file");
+  if (is_valid_name(name)) return {};
+  return fail("the name of a data set must be 1 to 255 bytes of UTF-8, without / ? # and control characters: rename the file");
 }
 
 Result<void> Catalogue::add(Volume volume) {
   const std::string name = volume->description().name;
-  if (auto fit = check_name(name); !fit) return fit;
+  if (auto valid = check_name(name); !valid) return valid;
   if (!volumes_.emplace(name, std::move(volume)).second) return fail("two data sets are named '" + name + "': rename one of the files");
   return {};
 }

@@ -1,4 +1,4 @@
-// The data sets a server offers, by name.
+// The data sets that a server offers, by name.
 #pragma once
 
 #include <map>
@@ -11,18 +11,19 @@
 
 namespace intervale {
 
-// Data sets are immutable and shared: whoever found one keeps it as long as needed. Reading is safe from any thread once filled.
+// Data sets are immutable and shared; a pointer from find() stays valid. Reading is safe from any thread once the
+// catalogue is filled.
 class Catalogue {
  public:
   using Volume = std::shared_ptr<const IntervalVolume>;
 
-  // Failure: unfit for a URL's path, or no UTF-8.
+  // Failure: the name is not a valid path segment of a URL, or not UTF-8.
   static Result<void> check_name(const std::string& name);
 
-  // Under its description's name. Failure: the name is taken, or unfit.
+  // Adds it under its description's name. Failure: the name is taken, or invalid.
   Result<void> add(Volume volume);
 
-  [[nodiscard]] Volume find(std::string_view name) const;  // nullptr if there is none
+  [[nodiscard]] Volume find(std::string_view name) const;  // nullptr: none
   [[nodiscard]] const std::map<std::string, Volume, std::less<>>& volumes() const { return volumes_; }
 
  private:

@@ -23,17 +23,17 @@ Result<std::vector<fs::path>> files_in(const fs::path& folder) {
     if (at->path().extension() == ".ivm" && at->is_regular_file(ignored)) files.push_back(at->path());
   }
   if (error) return fail("cannot read the folder " + folder.string() + ": " + error.message());
-  std::sort(files.begin(), files.end());  // the log goes by name, not by the file system's order
+  std::sort(files.begin(), files.end());  // directory_iterator's order is unspecified; the log's is not
   return files;
 }
 
-// For what there is not enough memory for fails, and does not end the server.
+// A file that needs more memory than there is (std::bad_alloc) is an error, and does not end the server.
 template <class Function>
 auto catching(const fs::path& path, const Function& function) -> decltype(function()) {
   try {
     return function();
   } catch (const std::exception& exception) {
-    return fail(path.string() + ": could not be read: " + exception.what());
+    return fail(path.string() + ": cannot be read: " + exception.what());
   }
 }
 
@@ -72,27 +72,27 @@ Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const std::fu
   for (const fs::path& path : *paths) {
     if (!keep_going()) break;
     File file;
-    file.last_seen = stamp_of(path);  // at the start nothing is waited for
+    file.last_seen = stamp_of(path);  // the first load does not wait for a second look
     poll_file(path, file);
     folder_files_[path] = std::move(file);
   }
   return {};
 }
 
-// Reads it if it is to be read. Whether it holds something else than before.
+// Reads the file if it has changed and is stable. True if its contents are new.
 bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
-  // Before it is read: what is written meanwhile is then seen as a change.
+  // Before reading: a write during the read then counts as a change.
   const auto stamp = stamp_of(path);
-  const bool settled = stamp == std::exchange(file.last_seen, stamp);
-  if (!stamp || stamp == file.stamp || !settled) return false;
+  const bool is_stable = stamp == std::exchange(file.last_seen, stamp);
+  if (!stamp || stamp == file.stamp || !is_stable) return false;
   if (max_memory_ && resident_bytes() > *max_memory_) {
-    if (!std::exchange(memory_warned_, true)) spdlog::warn("{} is not read: the process has more memory than it may", path.string());
+    if (!std::exchange(memory_warned_, true)) spdlog::warn("{} is not loaded: the process has reached --max-memory", path.string());
     return false;
   }
   memory_warned_ = false;
   const auto warn_once = [&](const Error& error) {
     if (std::exchange(file.last_warning, error.message) == error.message) return;
-    spdlog::warn("{}: {}", file.volume ? "what was read before stays" : "left out", error.message);
+    spdlog::warn("{}: {}", file.volume ? "the data read before stays in use" : "skipped", error.message);
   };
   const std::string name = path.stem().string();
   if (auto fit = Catalogue::check_name(name); !fit) {
@@ -100,7 +100,8 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
     return false;
   }
   const auto bytes = catching(path, [&] { return read_ivm(path); });
-  if (!bytes) {  // no descriptor left, perhaps, or no right to read it: that may change while the file does not
+  // Not the file's fault, perhaps: out of descriptors, or no permission; tried again even if the file stays as it is.
+  if (!bytes) {
     warn_once(bytes.error());
     return false;
   }
@@ -111,7 +112,8 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
     warn_once({path.string() + ": " + volume.error().message});
     return false;
   }
-  if (file.volume && file.volume->description() == volume->description()) return false;  // which has a hash of the contents
+  // It includes a hash of the contents.
+  if (file.volume && file.volume->description() == volume->description()) return false;
   file.volume = std::make_shared<const IntervalVolume>(std::move(*volume));
   return true;
 }
@@ -124,22 +126,22 @@ std::optional<Catalogue> CatalogueWatcher::poll() {
     if (is_file) continue;
     const auto paths = files_in(input);
     if (!paths) {
-      // Gone for a while, perhaps: what came from there stays.
-      if (!std::exchange(unreadable_folders_[input], true)) spdlog::warn("{}; what was read before stays", paths.error().message);
-      const fs::path folder = (input / "file").parent_path();  // as those in it name it: x/ is x
+      // The folder may be back soon: its data sets stay.
+      if (unreadable_folders_.insert(input).second) spdlog::warn("{}; the data read before stays in use", paths.error().message);
+      const fs::path folder = (input / "file").parent_path();  // without a slash at its end
       for (const auto& [path, file] : folder_files_) {
         if (path.parent_path() == folder) found[path] = file;
       }
       continue;
     }
-    unreadable_folders_[input] = false;
+    unreadable_folders_.erase(input);
     for (const fs::path& path : *paths) {
       const auto known = folder_files_.find(path);
       File file = known == folder_files_.end() ? File() : known->second;
-      const bool had = file.volume != nullptr;
+      const bool was_known = file.volume != nullptr;
       if (poll_file(path, file)) {
         changed = true;
-        spdlog::info("{} {}", path.string(), had ? "has changed and was read again" : "was read");
+        spdlog::info("{} {}", path.string(), was_known ? "was reloaded" : "was loaded");
       }
       found[path] = std::move(file);
     }
@@ -147,7 +149,7 @@ std::optional<Catalogue> CatalogueWatcher::poll() {
   for (const auto& [path, file] : folder_files_) {
     if (found.contains(path) || !file.volume) continue;
     changed = true;
-    spdlog::info("{} has gone", path.string());
+    spdlog::info("{} was removed", path.string());
   }
   folder_files_ = std::move(found);
   if (!changed) return {};
@@ -158,7 +160,7 @@ Catalogue CatalogueWatcher::catalogue() const {
   Catalogue catalogue;
   const auto add = [&catalogue](const fs::path& path, const Catalogue::Volume& volume) {
     if (!volume) return;
-    if (auto added = catalogue.add(volume); !added) spdlog::warn("left out: {} ({})", added.error().message, path.string());
+    if (auto added = catalogue.add(volume); !added) spdlog::warn("skipped: {} ({})", added.error().message, path.string());
   };
   for (const auto& [path, volume] : files_) add(path, volume);
   for (const auto& [path, file] : folder_files_) add(path, file.volume);

@@ -1,4 +1,4 @@
-// Keeps a catalogue like what there is on disk.
+// Loads the data sets that a server offers, and follows the changes in their folders.
 #pragma once
 
 #include <cstdint>
@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,30 +17,33 @@
 
 namespace intervale {
 
-// One thread at a time. Files are read as a whole, not mapped: what happens to one later, truncation too, is no trouble to who has it.
+// One thread at a time. Files are read into memory, not mapped: changes to a file, such as truncation, do not affect
+// sessions that use its data set.
 class CatalogueWatcher {
  public:
-  // Files, and folders whose *.ivm are meant (not those in folders within). While the process has more than max_memory resident, no more is read.
+  // inputs: files, and folders of *.ivm files (without their subfolders). While the process has more than max_memory
+  // bytes resident, poll() and load() read no more files.
   explicit CatalogueWatcher(std::vector<std::filesystem::path> inputs, std::optional<std::uint64_t> max_memory = {})
       : inputs_(std::move(inputs)), max_memory_(max_memory) {}
 
-  // What there is at the start. A file in a folder that is damaged, or has a name unfit for a data set, is logged and left out; one that is named is
-  // an error, like two data sets of one name and a folder that cannot be read. keep_going is asked before each file; where it says no, what was read
-  // so far is the catalogue.
+  // The catalogue at the start. A file in a folder that is damaged, or whose name is invalid, is logged and skipped.
+  // A named file with such a fault is an error; so are two data sets of one name, and a folder that cannot be read.
+  // keep_going is called before each file; if it returns false, the result has the files read so far.
   Result<Catalogue> load(const std::function<bool()>& keep_going = [] { return true; });
 
-  // Looks into the folders again: what is served from now on, if that is something else than before. A file that is new, or another than it was, is
-  // read once it is the same in two looks, so that one that is being written is left alone. Of one that is damaged, or cannot be read (which is
-  // tried again in every look), what was read before stays; it is logged once. One that has gone, goes. Of two data sets of one
-  // name, that of the first file in order stands.
+  // Reads the folders again. Returns the new catalogue, or nullopt if nothing changed. A new or changed file is
+  // loaded once it is the same in two consecutive polls, so that no file is read while it is written. If a file is
+  // damaged or cannot be read, which is logged once, its last good contents stay; a file that cannot be read is tried
+  // again in every poll. A file that was removed leaves the catalogue. Of two data sets of one name, the one whose
+  // file comes first counts.
   std::optional<Catalogue> poll();
 
  private:
   struct File {
-    std::optional<FileStamp> stamp;      // as it was read; nothing if it was not
-    Catalogue::Volume volume;            // nullptr if it could not be read
-    std::optional<FileStamp> last_seen;  // in the last look
-    std::string last_warning;            // said of it since it was last read
+    std::optional<FileStamp> stamp;      // when it was last read; nullopt: never
+    Catalogue::Volume volume;            // its last good contents; nullptr: none
+    std::optional<FileStamp> last_seen;  // in the last poll
+    std::string last_warning;            // logged since it was last read, not to be repeated
   };
   Result<void> load_folder(const std::filesystem::path& folder, const std::function<bool()>& keep_going);
   bool poll_file(const std::filesystem::path& path, File& file);
@@ -47,10 +51,10 @@ class CatalogueWatcher {
 
   std::vector<std::filesystem::path> inputs_;
   std::optional<std::uint64_t> max_memory_;
-  std::vector<std::pair<std::filesystem::path, Catalogue::Volume>> files_;  // files that were named
+  std::vector<std::pair<std::filesystem::path, Catalogue::Volume>> files_;  // named as inputs
   std::map<std::filesystem::path, File> folder_files_;                      // in folders
-  bool memory_warned_ = false;                                              // and that was said
-  std::map<std::filesystem::path, bool> unreadable_folders_;                // folders, and whether that was said
+  bool memory_warned_ = false;                                              // the memory limit was logged
+  std::set<std::filesystem::path> unreadable_folders_;                      // that were logged
 };
 
 }  // namespace intervale

@@ -24,7 +24,8 @@ Connections::Registration Connections::add(const std::shared_ptr<Connection>& co
 }
 
 void Connections::begin_shutdown() {
-  std::vector<std::shared_ptr<Connection>> keep_alive;  // until the lock is released: a connection's destructor calls remove()
+  // Until the lock is released: a connection's destructor calls remove().
+  std::vector<std::shared_ptr<Connection>> keep_alive;
   const std::unique_lock lock(mutex_);
   draining_ = true;
   for (const auto& [id, weak] : connections_) {

@@ -1,4 +1,4 @@
-// What every session of a server shares.
+// The state that all sessions of a server share.
 #pragma once
 
 #include <atomic>
@@ -17,15 +17,16 @@
 
 namespace intervale {
 
-// Outlives every session. The viewer and the options do not change while serving.
+// Outlives every session. options and viewer do not change while serving.
 struct ServerContext {
-  explicit ServerContext(const ServeOptions& wanted) : options(wanted), write_budget(wanted.max_queued_bytes), scheduler(wanted.threads) {}
+  explicit ServerContext(const ServeOptions& requested)
+      : options(requested), write_budget(requested.max_queued_bytes), scheduler(requested.threads) {}
   const ServeOptions options;            // threads is not 0
-  AtomicSharedPtr<Catalogue> catalogue;  // nullptr until it is loaded
+  AtomicSharedPtr<Catalogue> catalogue;  // nullptr: still loading
   StaticFiles viewer;
   Metrics metrics;
-  AtomicSharedPtr<Tokens> tokens;   // nullptr: whoever comes may see everything
-  AtomicSharedPtr<TlsContext> tls;  // nullptr: plain
+  AtomicSharedPtr<Tokens> tokens;   // nullptr: no token is required
+  AtomicSharedPtr<TlsContext> tls;  // nullptr: plain TCP
   Connections connections;
   AddressCounts addresses;
   WriteBudget write_budget;

@@ -1,6 +1,6 @@
-// Schedules the sessions' computations on a limited number of workers. Selecting and encoding updates takes milliseconds,
-// reading and writing messages microseconds: in order of arrival, a new connection would wait for the next batch of every
-// other session.
+// Schedules the sessions' computations on a limited number of workers. Selecting and encoding updates takes
+// milliseconds, reading and writing messages microseconds: in order of arrival, a new connection would wait for the
+// next batch of every other session.
 #pragma once
 
 #include <boost/asio/associated_executor.hpp>
@@ -27,8 +27,8 @@ class FairScheduler {
 
  public:
   using Time = std::chrono::steady_clock::duration;
-  // interactive: nothing was sent yet for the session's view. bulk: its stream continues. Interactive work goes first, but
-  // leaves an eighth of the time to bulk work, so that no session starves.
+  // interactive: nothing was sent yet for the session's view. bulk: its stream continues. Interactive work goes
+  // first, but leaves an eighth of the time to bulk work, so that no session starves.
   enum class Priority { interactive, bulk };
 
   // The scheduler's state of one session, which owns it. Not moved or destroyed between async_acquire() and release().
@@ -50,9 +50,9 @@ class FairScheduler {
   FairScheduler(const FairScheduler&) = delete;
   FairScheduler& operator=(const FairScheduler&) = delete;
 
-  // Completes with void(), on the handler's executor, once a worker is assigned to the session. The session then computes
-  // and calls release(), without waiting for anything in between. A flow has at most one bulk request outstanding. Flows
-  // whose last interactive work was long share all workers but one, if there are two or more.
+  // Completes with void(), on the handler's executor, once a worker is assigned to the session. The session then
+  // computes and calls release(), without waiting for anything in between. A flow has at most one bulk request
+  // outstanding. Flows whose last interactive work was long share all workers but one, if there are two or more.
   template <class Token>
   auto async_acquire(Flow& flow, Priority priority, Token&& token) {
     return boost::asio::async_initiate<Token, void()>(

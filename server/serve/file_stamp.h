@@ -1,4 +1,4 @@
-// Whether a file is still the one it was.
+// Detects that a file has changed.
 #pragma once
 
 #include <sys/stat.h>
@@ -13,13 +13,13 @@
 namespace intervale {
 
 struct FileStamp {
-  std::int64_t seconds = 0, nanoseconds = 0;                  // when it was last written
-  std::int64_t changed_seconds = 0, changed_nanoseconds = 0;  // when anything about it was last changed, who may read it too; cannot be set
+  std::int64_t seconds = 0, nanoseconds = 0;                  // last modification
+  std::int64_t changed_seconds = 0, changed_nanoseconds = 0;  // last status change (ctime), which programs cannot set
   std::uint64_t bytes = 0, device = 0, inode = 0;
   friend bool operator==(const FileStamp&, const FileStamp&) = default;
 };
 
-// Nothing if there is no such file. Follows links, as those of a mounted secret, which change all at once.
+// nullopt if there is no such file. Follows links: a mounted Kubernetes secret is replaced by changing a link.
 [[nodiscard]] inline std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) return {};
@@ -27,10 +27,10 @@ struct FileStamp {
                    std::uint64_t(status.st_size), std::uint64_t(status.st_dev), std::uint64_t(status.st_ino)};
 }
 
-// Files that are read together.
+// A set of files that are read together.
 class FileChanges {
  public:
-  // Whether any of them is another than when this was last asked, or this is the first time.
+  // True if a file has changed since the last call, and in the first call.
   bool check(std::initializer_list<std::filesystem::path> paths) {
     std::vector<std::optional<FileStamp>> stamps;
     for (const std::filesystem::path& path : paths) stamps.push_back(stamp_of(path));
@@ -38,7 +38,7 @@ class FileChanges {
     stamps_ = std::move(stamps);
     return true;
   }
-  // They could not be read: the next look is the first again.
+  // Makes the next check() return true.
   void reset() { stamps_.clear(); }
 
  private:

@@ -1,4 +1,4 @@
-// Small words for reading header fields.
+// Helpers for parsing HTTP header fields.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace intervale {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-// What stands before the separator, trimmed; that and the separator are taken away.
+// Removes the text up to the separator, and the separator, from `rest`; returns the text, trimmed.
 [[nodiscard]] inline std::string_view split_off(std::string_view& rest, char separator) {
   const auto end = rest.find(separator);
   const std::string_view item = rest.substr(0, end);

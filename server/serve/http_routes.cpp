@@ -13,7 +13,7 @@ constexpr const char* kHtml = "text/html; charset=utf-8";
 constexpr const char* kJson = "application/json";
 constexpr const char* kPrometheus = "text/plain; version=0.0.4; charset=utf-8";
 
-std::string escaped(std::string_view text) {
+std::string html_escaped(std::string_view text) {
   std::string html;
   for (const char c : text) {
     switch (c) {
@@ -48,24 +48,24 @@ std::string front_page(const Catalogue& catalogue, const Scope* scope) {
   std::string page =
       "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Intervale</title>\n<h1>Intervale</h1>\n"
       "<p>This server streams interval volumes: tetrahedral meshes of the part of a volume whose values lie in a range, coarse first and refined as "
-      "far as you ask. Fetch one with <code>intervale-client fetch ws://HOST:PORT/NAME -o mesh.vtu</code>.</p>\n<ul>\n";
+      "far as the client asks. Fetch one with <code>intervale-client fetch ws://HOST:PORT/NAME -o mesh.vtu</code>.</p>\n<ul>\n";
   for (const auto& [name, volume] : catalogue.volumes()) {
     if (scope == nullptr || !scope->allows(name)) continue;
     const Description& d = volume->description();
-    page += "<li>" + escaped(name) + ": " + std::to_string(d.grid.dims[0]) + " × " + std::to_string(d.grid.dims[1]) + " × " +
+    page += "<li>" + html_escaped(name) + ": " + std::to_string(d.grid.dims[0]) + " × " + std::to_string(d.grid.dims[1]) + " × " +
             std::to_string(d.grid.dims[2]) + " samples, " + std::to_string(d.updates) + " updates, " + std::to_string(d.full.tets) +
             " tetrahedra in full</li>\n";
   }
-  return page + "</ul>\n<p><a href=\"/api/datasets\">As JSON</a>. There is no viewer here: see <code>--viewer</code>.</p>\n</html>\n";
+  return page + "</ul>\n<p><a href=\"/api/datasets\">As JSON</a>. This server has no viewer: see its option <code>--viewer</code>.</p>\n</html>\n";
 }
 
-HttpResponse with_body(const char* content_type, std::string body) {
+HttpResponse ok(const char* content_type, std::string body) {
   return {.content_type = content_type, .body = std::make_shared<const std::string>(std::move(body))};
 }
 
-// Where a page may open WebSockets. 'self' does not cover them in every browser, so the host that was asked is named; hosts of other characters
-// than a policy can hold (addresses in brackets) leave every host.
-std::string websockets_of(std::string_view host) {
+// The WebSocket sources of the policy. 'self' does not cover them in every browser, so the request's host is named. A
+// host with characters that a policy cannot hold (an IPv6 address in brackets) allows every host.
+std::string websocket_sources(std::string_view host) {
   const bool plain = !host.empty() &&
                      std::all_of(host.begin(), host.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '-' || c == ':'; });
   if (!plain) return "ws: wss:";
@@ -74,13 +74,13 @@ std::string websockets_of(std::string_view host) {
 
 std::string viewer_policy(std::string_view host) {
   return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self' " +
-         websockets_of(host) +
+         websocket_sources(host) +
          "; worker-src 'self'; manifest-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 }
 
 HttpResponse file_response(const HttpRequest& request, const StaticFile& file) {
-  const bool packed = file.gzip && accepts_gzip(request.accept_encoding);
-  const StaticContent& content = packed ? *file.gzip : file.plain;
+  const bool use_gzip = file.gzip && accepts_gzip(request.accept_encoding);
+  const StaticContent& content = use_gzip ? *file.gzip : file.plain;
   HttpResponse response{.content_type = file.content_type, .body = content.bytes, .content_security_policy = viewer_policy(request.host)};
   response.cache_control = file.immutable ? "public, max-age=31536000, immutable" : "no-cache";
   response.headers = {{"ETag", content.etag}};
@@ -88,27 +88,27 @@ HttpResponse file_response(const HttpRequest& request, const StaticFile& file) {
   if (matches_etag(request.if_none_match, content.etag)) {
     response.status = 304;
     response.body = nullptr;
-  } else if (packed) {
+  } else if (use_gzip) {
     response.headers.emplace_back("Content-Encoding", "gzip");
   }
   return response;
 }
 
-// Lets pages of allowed origins read an response.
-HttpResponse shared(const HttpRequest& request, HttpResponse response) {
+// Lets pages of allowed origins read the response (CORS).
+HttpResponse with_cors(const HttpRequest& request, HttpResponse response) {
   response.headers.emplace_back("Vary", "Origin");
   if (!request.allowed_origin.empty()) response.headers.emplace_back("Access-Control-Allow-Origin", request.allowed_origin);
   return response;
 }
 
-// Not an empty list: whoever asks is to ask again.
+// An empty list would be wrong: the client has to try again.
 HttpResponse loading() {
   HttpResponse response = text_response(503, "loading: the data sets are still being read");
   response.headers.emplace_back("Retry-After", "1");
   return response;
 }
 
-// What a browser asks before it sends a token along.
+// A browser's CORS preflight, before it sends a token.
 HttpResponse preflight() {
   return {.status = 204,
           .headers = {
@@ -127,8 +127,8 @@ HttpResponse text_response(unsigned status, std::string line) {
   return {.status = status, .body = std::make_shared<const std::string>(std::move(line) + "\n")};
 }
 
-const char* text_of(ServerStatus server_status) {
-  switch (server_status) {
+const char* text_of(ServerStatus status) {
+  switch (status) {
     case ServerStatus::loading:
       return "loading";
     case ServerStatus::draining:
@@ -140,34 +140,34 @@ const char* text_of(ServerStatus server_status) {
 }
 
 HttpResponse unauthorized() {
-  HttpResponse response = text_response(401, "a token is wanted: Authorization: Bearer TOKEN");
+  HttpResponse response = text_response(401, "a token is required: Authorization: Bearer TOKEN");
   response.headers.emplace_back("WWW-Authenticate", "Bearer");
   return response;
 }
 
 HttpResponse respond(const HttpRequest& request, const HttpState& state) {
   const auto path = decode_path(request.target);
-  if (!path) return text_response(400, "not a target this server can read");
+  if (!path) return text_response(400, "malformed request target");
   const StaticFile* const file = state.role == PortRole::all ? state.viewer.find(*path) : nullptr;
-  if (!is_known(*path, state) && file == nullptr) return text_response(404, "nothing here");
-  if (*path == "/api/datasets" && request.method == "OPTIONS" && !request.allowed_origin.empty()) return shared(request, preflight());
-  if (request.method != "GET" && request.method != "HEAD") return text_response(405, "only GET and HEAD");
+  if (!is_known(*path, state) && file == nullptr) return text_response(404, "not found");
+  if (*path == "/api/datasets" && request.method == "OPTIONS" && !request.allowed_origin.empty()) return with_cors(request, preflight());
+  if (request.method != "GET" && request.method != "HEAD") return text_response(405, "method not allowed: use GET or HEAD");
   if (*path == "/api/datasets") {
-    if (request.scope != nullptr && state.server_status == ServerStatus::loading) return shared(request, loading());
-    return shared(request, request.scope != nullptr ? with_body(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized());
+    if (request.scope != nullptr && state.server_status == ServerStatus::loading) return with_cors(request, loading());
+    return with_cors(request, request.scope != nullptr ? ok(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized());
   }
   if (*path == "/metrics" && state.role == PortRole::all) {
     if (request.scope == nullptr) return unauthorized();
-    if (!request.scope->is_everything()) return text_response(403, "metrics tell of every data set, and this token does not open them all");
+    if (!request.scope->is_everything()) return text_response(403, "metrics cover every data set: a token that grants all of them is required");
   }
-  if (*path == "/metrics")
-    return with_body(
-        kPrometheus,
-        state.metrics.text({.catalogue = state.catalogue, .queued_bytes = state.queued_bytes, .certificate_expires = state.certificate_expires}));
+  if (*path == "/metrics") {
+    return ok(kPrometheus, state.metrics.text(
+                               {.catalogue = state.catalogue, .queued_bytes = state.queued_bytes, .certificate_expires = state.certificate_expires}));
+  }
   if (*path == "/healthz") return text_response(200, "ok");
   if (*path == "/readyz") return text_response(state.server_status == ServerStatus::ready ? 200 : 503, text_of(state.server_status));
   if (file != nullptr) return file_response(request, *file);
-  return with_body(kHtml, front_page(state.catalogue, request.scope));
+  return ok(kHtml, front_page(state.catalogue, request.scope));
 }
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// What the server answers over HTTP: a pure function of the request. No I/O.
+// The HTTP API: a pure function from request and server state to response. No I/O.
 #pragma once
 
 #include <chrono>
@@ -20,34 +20,34 @@ namespace intervale {
 struct HttpRequest {
   std::string_view method;
   std::string_view target;
-  // Headers; empty: not there.
+  // Header fields; empty if absent.
   std::string_view host;
   std::string_view accept_encoding;
   std::string_view if_none_match;
-  std::string_view allowed_origin;  // of a page from elsewhere that may open sessions here; empty: there is none, or it may not
-  const Scope* scope = nullptr;     // what whoever asks may see; nullptr: only what everybody may
+  std::string_view allowed_origin;  // the Origin, if it is another host's and --allow-origin names it; else empty
+  const Scope* scope = nullptr;     // what the token grants; nullptr: no valid token
 };
 
 struct HttpResponse {
   unsigned status = 200;
   std::string content_type = "text/plain; charset=utf-8";
-  std::shared_ptr<const std::string> body = {};  // nullptr: none, in a 304
+  std::shared_ptr<const std::string> body = {};  // nullptr: none, in 204 and 304
   std::string content_security_policy = "default-src 'none'";
   std::string cache_control = "no-store";
-  std::vector<std::pair<std::string, std::string>> headers = {};  // besides those and those of every answer
+  std::vector<std::pair<std::string, std::string>> headers = {};  // besides those above and those of every response
 };
 
-// An answer of one line.
+// A response of one line of text.
 [[nodiscard]] HttpResponse text_response(unsigned status, std::string line);
-// 401: what whoever has no token gets.
+// 401: the request has no valid token.
 [[nodiscard]] HttpResponse unauthorized();
 
-// What a port is for: everything, or nothing but /metrics, /healthz and /readyz.
+// all: the main port. metrics: serves /metrics, /healthz and /readyz only.
 enum class PortRole { all, metrics };
 
-// loading: before there is a catalogue. draining: nobody new is taken.
+// loading: the data sets are being read. draining: no new sessions, the server shuts down.
 enum class ServerStatus { loading, ready, draining };
-[[nodiscard]] const char* text_of(ServerStatus server_status);
+[[nodiscard]] const char* text_of(ServerStatus status);  // for /readyz: "loading", "ok", "draining"
 
 struct HttpState {
   const Catalogue& catalogue;
@@ -55,16 +55,19 @@ struct HttpState {
   const StaticFiles& viewer;
   std::uint64_t queued_bytes = 0;
   PortRole role = PortRole::all;
-  bool has_metrics_port = false;  // then /metrics is answered there only
+  bool has_metrics_port = false;  // then the main port does not serve /metrics
   std::optional<std::chrono::system_clock::time_point> certificate_expires = {};
   ServerStatus server_status = ServerStatus::ready;
 };
 
-// GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and of the viewer's files: / is its index.html, or without a viewer a page that lists
-// the data sets. A query is ignored. Pages of allowed origins may read /api/datasets, with a token (CORS, Fetch standard, 3.2); until it is known
-// what there is, it is 503. With no scope 401 for what tells of data sets; with one that is not everything 403 for /metrics, which tells of all,
-// unless it has a role of its own. 405 for other methods, 404 for other targets, 400 for those that cannot be read. HEAD is answered like GET;
-// whoever sends it leaves the body out.
+// Serves GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and the viewer's files; / is the viewer's
+// index.html, or without a viewer a page that lists the data sets. The query is ignored. HEAD has the body of GET;
+// the caller omits it.
+// - 400: the target cannot be decoded. 404: unknown path. 405: another method.
+// - 401: no valid token, for /api/datasets and /metrics. 403: /metrics, if the token does not grant every data set.
+//   The metrics port requires no token.
+// - 503: /readyz while the server is not ready; /api/datasets while the data sets are being read.
+// Pages of allowed origins may read /api/datasets with a token (CORS: Fetch standard, 3.2).
 [[nodiscard]] HttpResponse respond(const HttpRequest& request, const HttpState& state);
 
 }  // namespace intervale

@@ -43,23 +43,23 @@ bool offers_subprotocol(const Request& request) {
   return false;
 }
 
-// Refers to the answer's body, which must live until the response is sent.
-Response response_to(const Request& request, const HttpResponse& answer, bool keep_alive) {
-  Response response(http::status(answer.status), request.version());
+// Refers to the content's body, which must live until the response is sent.
+Response make_response(const Request& request, const HttpResponse& content, bool keep_alive) {
+  Response response(http::status(content.status), request.version());
   response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
   response.set("X-Content-Type-Options", "nosniff");
   response.set("Referrer-Policy", "no-referrer");
   response.set("Cross-Origin-Opener-Policy", "same-origin");
-  response.set("Content-Security-Policy", answer.content_security_policy);
-  response.set(http::field::cache_control, answer.cache_control);
-  for (const auto& [name, value] : answer.headers) response.set(name, value);
-  if (answer.status == 405) response.set(http::field::allow, "GET, HEAD");
-  if (answer.status == 426) response.set(http::field::upgrade, "websocket");
+  response.set("Content-Security-Policy", content.content_security_policy);
+  response.set(http::field::cache_control, content.cache_control);
+  for (const auto& [name, value] : content.headers) response.set(name, value);
+  if (content.status == 405) response.set(http::field::allow, "GET, HEAD");
+  if (content.status == 426) response.set(http::field::upgrade, "websocket");
   response.keep_alive(keep_alive);
-  if (!answer.body) return response;  // a 304 has no length either
-  response.set(http::field::content_type, answer.content_type);
-  response.content_length(answer.body->size());
-  if (request.method() != http::verb::head) response.body() = {answer.body->data(), answer.body->size()};
+  if (!content.body) return response;  // a 304 has no length either
+  response.set(http::field::content_type, content.content_type);
+  response.content_length(content.body->size());
+  if (request.method() != http::verb::head) response.body() = {content.body->data(), content.body->size()};
   return response;
 }
 
@@ -89,16 +89,16 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void begin_shutdown() override {
     asio::post(strand_, [self = shared_from_this()] {
       self->draining_ = true;
-      if (!self->idle_) return;  // an answer under way is finished
-      if (self->served_) {
-        self->stream_.socket().cancel();
-      } else {
-        self->expire_after(kShutdownTime);  // its request may be on its way
-      }
+      // The first request may be on its way, and gets a response, such as "draining". So does a request that was read.
+      if (self->phase_ == Phase::first_request) self->expire_after(kShutdownTime);
+      if (self->phase_ == Phase::next_request) self->stream_.socket().cancel();
     });
   }
 
  private:
+  // What the connection does, or waits for.
+  enum class Phase { handshake, first_request, response, next_request };
+
   static void report(const std::exception_ptr& failure) {
     if (!failure) return;
     try {
@@ -108,41 +108,41 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     }
   }
 
-  // Whatever ends this coroutine ends the connection, but for an upgrade, which takes the socket along. `self` keeps the object.
+  // The connection closes when this coroutine ends, unless an upgrade has moved the socket away. `self` keeps the
+  // object alive.
   asio::awaitable<void> run([[maybe_unused]] std::shared_ptr<HttpSession> self) {
     if (!co_await begin_tls()) co_return;
-    std::chrono::milliseconds header_time = context_.options.handshake_time;
-    for (; !draining_ || !served_; header_time = kKeepAliveTime) {
+    do {
       http::request_parser<http::empty_body> parser;
       parser.header_limit(kMaxHeader);
+      const bool first = phase_ == Phase::handshake;
+      const std::chrono::milliseconds header_time = first ? context_.options.handshake_time : kKeepAliveTime;
       expire_after(draining_ ? kShutdownTime : header_time);
-      idle_ = true;
+      phase_ = first ? Phase::first_request : Phase::next_request;
       const auto [error, size] = co_await http::async_read_header(stream_, buffer_, parser, kAwait);
-      idle_ = false;
+      phase_ = Phase::response;
       if (error) {
         co_await reject_malformed(error);
         break;
       }
       const Request request = parser.get();
       if (beast::websocket::is_upgrade(request) && role_ == PortRole::all && request.target() == protocol::kPath) {
-        if (auto complaint = check_upgrade(request)) {
-          Response response = response_to(request, *complaint, false);
-          co_await send(response);
+        if (const auto refusal = check_upgrade(request)) {
+          co_await send(request, *refusal, false);
           break;
         }
-        deadline_.cancel();  // from here on the WebSocket's own deadlines hold
+        deadline_.cancel();  // the WebSocket session has its own deadlines
         start_websocket_session(std::move(stream_), request, context_, {scope_for(request), std::move(address_lease_)});
         co_return;
       }
-      // A body is not read, so what follows it cannot be told from it: the connection ends with this answer.
+      // Bodies are not read, so the next request's start is unknown after one: the connection closes after this
+      // response.
       const bool has_body = parser.content_length().value_or(0) > 0 || request.count(http::field::transfer_encoding) > 0;
       const bool keep_alive = request.keep_alive() && !has_body && !draining_;
-      const HttpResponse answer = route(request);
-      Response response = response_to(request, answer, keep_alive);
-      served_ = true;
-      if (answer.status == 401) context_.metrics.count_refusal(Refusal::token);
-      if (!co_await send(response) || !keep_alive) break;
-    }
+      const HttpResponse content = route(request);
+      if (content.status == 401) context_.metrics.count_refusal(Refusal::token);
+      if (!co_await send(request, content, keep_alive) || !keep_alive) break;
+    } while (!draining_);
     expire_after(kShutdownTime);
     beast::error_code ignored;
     if (stream_.tls() != nullptr) co_await stream_.async_shutdown(kAwait);
@@ -150,18 +150,18 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     if (stream_.socket().is_open()) stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
   }
 
-  // Whether there is none, or its handshake is done. A role for metrics has none.
+  // False if the handshake failed. The metrics port speaks plain HTTP.
   asio::awaitable<bool> begin_tls() {
     auto tls = context_.tls.load();
     if (!tls || role_ != PortRole::all) co_return true;
     stream_.use_tls(std::move(tls));
     expire_after(context_.options.handshake_time);
     const auto [error] = co_await stream_.async_handshake(kAwait);
-    if (error) spdlog::debug("no TLS handshake: {}", error.message());
+    if (error) spdlog::debug("TLS handshake failed: {}", error.message());
     co_return !error;
   }
 
-  // Cuts the connection unless this or cancelling the deadline is called again by then.
+  // Closes the connection after that time, unless the deadline is set again or cancelled before.
   void expire_after(std::chrono::milliseconds time) {
     deadline_.expires_after(time);
     deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
@@ -170,43 +170,45 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   }
 
   HttpResponse route(const Request& request) const {
-    if (role_ == PortRole::all && request.target() == protocol::kPath) return text_response(426, "this is where WebSocket sessions are opened");
+    if (role_ == PortRole::all && request.target() == protocol::kPath)
+      return text_response(426, "upgrade required: this path accepts WebSocket connections only");
     const auto scope = scope_for(request);
     const auto catalogue = context_.catalogue.load();
     const auto tls = context_.tls.load();
-    static const Catalogue kNothingYet;
+    static const Catalogue kEmpty;
     const auto& allowed = context_.options.allowed_origins;
     const std::string_view origin = request[http::field::origin], host = request[http::field::host];
-    const HttpRequest asked{.method = request.method_string(),
-                            .target = request.target(),
-                            .host = host,
-                            .accept_encoding = request[http::field::accept_encoding],
-                            .if_none_match = request[http::field::if_none_match],
-                            .allowed_origin = !allowed.empty() && is_allowed_origin(origin, host, allowed) ? origin : std::string_view(),
-                            .scope = scope.get()};
-    return respond(asked, {.catalogue = catalogue ? *catalogue : kNothingYet,
-                           .metrics = context_.metrics,
-                           .viewer = context_.viewer,
-                           .queued_bytes = context_.write_budget.bytes(),
-                           .role = role_,
-                           .has_metrics_port = context_.options.metrics_listen.has_value(),
-                           .certificate_expires = tls ? std::optional(tls->expires()) : std::nullopt,
-                           .server_status = server_status()});
+    const HttpRequest parsed{.method = request.method_string(),
+                             .target = request.target(),
+                             .host = host,
+                             .accept_encoding = request[http::field::accept_encoding],
+                             .if_none_match = request[http::field::if_none_match],
+                             .allowed_origin = !allowed.empty() && is_allowed_origin(origin, host, allowed) ? origin : std::string_view(),
+                             .scope = scope.get()};
+    return respond(parsed, {.catalogue = catalogue ? *catalogue : kEmpty,
+                            .metrics = context_.metrics,
+                            .viewer = context_.viewer,
+                            .queued_bytes = context_.write_budget.bytes(),
+                            .role = role_,
+                            .has_metrics_port = context_.options.metrics_listen.has_value(),
+                            .certificate_expires = tls ? std::optional(tls->expires()) : std::nullopt,
+                            .server_status = server_status()});
   }
 
+  // The response that refuses the upgrade; nullopt if a session may be opened.
   std::optional<HttpResponse> check_upgrade(const Request& request) const {
-    if (const auto state = server_status(); state != ServerStatus::ready) return text_response(503, text_of(state));
-    if (!offers_subprotocol(request)) return text_response(400, "the subprotocol intervale.v1 is not offered");
+    if (const auto status = server_status(); status != ServerStatus::ready) return text_response(503, text_of(status));
+    if (!offers_subprotocol(request)) return text_response(400, "the request does not offer the subprotocol intervale.v1");
     const std::string_view origin = request[http::field::origin], host = request[http::field::host];
     if (!is_allowed_origin(origin, host, context_.options.allowed_origins)) {
-      return refused(Refusal::origin, text_response(403, "pages of this origin may not open sessions here"));
+      return refused(Refusal::origin, text_response(403, "pages of this origin may not open sessions"));
     }
-    // A page is not shown the answer to its upgrade: it is let in, to be told with a close code.
+    // A page cannot read the response to its upgrade: its session is opened, and then closed with a code.
     if (origin.empty() && scope_for(request) == nullptr) return refused(Refusal::token, unauthorized());
-    const auto& most = context_.options.max_sessions;
-    if (most && context_.metrics.sessions.Value() >= double(*most)) return refused(Refusal::sessions, full());
-    const auto& memory = context_.options.max_memory;
-    if (memory && resident_bytes() > *memory) return refused(Refusal::memory, full());
+    const auto& max_sessions = context_.options.max_sessions;
+    if (max_sessions && context_.metrics.sessions.Value() >= double(*max_sessions)) return refused(Refusal::sessions, full());
+    const auto& max_memory = context_.options.max_memory;
+    if (max_memory && resident_bytes() > *max_memory) return refused(Refusal::memory, full());
     return {};
   }
 
@@ -215,18 +217,18 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     return context_.catalogue.load() ? ServerStatus::ready : ServerStatus::loading;
   }
 
-  [[nodiscard]] HttpResponse refused(Refusal reason, HttpResponse answer) const {
+  [[nodiscard]] HttpResponse refused(Refusal reason, HttpResponse response) const {
     context_.metrics.count_refusal(reason);
-    return answer;
+    return response;
   }
 
   static HttpResponse full() {
-    HttpResponse answer = text_response(503, "no room for another session now");
-    answer.headers.emplace_back("Retry-After", "5");
-    return answer;
+    HttpResponse response = text_response(503, "the server has no capacity for another session");
+    response.headers.emplace_back("Retry-After", "5");
+    return response;
   }
 
-  // What whoever sends this may see; nullptr: nothing.
+  // What the request's token grants; nullptr: nothing.
   [[nodiscard]] std::shared_ptr<const Scope> scope_for(const Request& request) const {
     const auto tokens = context_.tokens.load();
     if (!tokens) return Scope::everything();
@@ -234,18 +236,19 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     return token ? tokens->find(*token) : nullptr;
   }
 
-  // What did not read as a request is told so, if it was bytes at all that came.
+  // Answers bytes that are no request. Other errors, such as a closed connection, have no answer.
   asio::awaitable<void> reject_malformed(beast::error_code error) {
     if (error.category() != http::make_error_code(http::error::bad_target).category()) co_return;
     if (error == http::error::end_of_stream || error == http::error::partial_message) co_return;
     const bool too_long = error == http::error::header_limit || error == http::error::buffer_overflow;
-    const HttpResponse answer = text_response(too_long ? 431 : 400, "not a request this server can read");
-    Response response = response_to(Request(http::verb::get, "/", 11), answer, false);
-    co_await send(response);
+    const HttpResponse content = too_long ? text_response(431, "request header too large") : text_response(400, "malformed request");
+    const Request request(http::verb::get, "/", 11);
+    co_await send(request, content, false);
   }
 
-  // By reference, and never from a temporary: g++ 12 destroys some temporaries of a co_await expression twice.
-  asio::awaitable<bool> send(Response& response) {
+  // Pass no temporaries: g++ 12 destroys some temporaries of a co_await expression twice.
+  asio::awaitable<bool> send(const Request& request, const HttpResponse& content, bool keep_alive) {
+    Response response = make_response(request, content, keep_alive);
     expire_after(kWriteTime);
     const auto [error, size] = co_await http::async_write(stream_, response, kAwait);
     co_return !error;
@@ -253,14 +256,13 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   Stream stream_;
   asio::steady_timer deadline_;
-  asio::any_io_executor strand_;  // apart, for begin_shutdown comes from other threads and an upgrade moves the stream away
+  asio::any_io_executor strand_;  // a copy: other threads use it, and an upgrade moves the stream away
   ServerContext& context_;
   PortRole role_;
   AddressCounts::Lease address_lease_;
   beast::flat_buffer buffer_{2 * kMaxHeader};
-  bool idle_ = false;  // for a request
+  Phase phase_ = Phase::handshake;
   bool draining_ = false;
-  bool served_ = false;  // a request; whoever asks while the server drains is told so, once
   Connections::Registration registration_;
 };
 

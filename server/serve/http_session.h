@@ -1,4 +1,4 @@
-// One HTTP connection, until it closes or becomes a WebSocket. Internal to server/serve: brings in Asio.
+// One HTTP connection, until it closes or is upgraded to a WebSocket. Internal to server/serve: brings in Asio.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -8,7 +8,7 @@
 
 namespace intervale {
 
-// Serves requests on a socket whose executor is a strand of its own. Returns at once; the connection keeps itself alive.
+// Serves requests on a socket whose executor is a strand of its own. Does not block; the connection keeps itself alive.
 void start_http_session(boost::asio::ip::tcp::socket socket, ServerContext& context, PortRole role, AddressCounts::Lease address_lease);
 
 }  // namespace intervale

@@ -28,7 +28,8 @@ class Listener {
  private:
   Listener(boost::asio::io_context& io, ServerContext& context, PortRole role);
   boost::asio::awaitable<void> accept_all();
-  std::optional<AddressCounts::Lease> lease_for(const boost::asio::ip::tcp::socket& socket);  // nullopt: too many from that address
+  // Nullopt: too many from that address.
+  std::optional<AddressCounts::Lease> lease_for(const boost::asio::ip::tcp::socket& socket);
 
   boost::asio::io_context& io_;
   boost::asio::ip::tcp::acceptor acceptor_;  // on a strand of its own

@@ -18,13 +18,13 @@ constexpr std::array<std::string_view, 6> kLevels{"trace", "debug", "info", "war
 
 void append(spdlog::memory_buf_t& line, std::string_view text) { line.append(text.data(), text.data() + text.size()); }
 
-std::string_view said_by(const spdlog::details::log_msg& message) { return {message.payload.data(), message.payload.size()}; }
+std::string_view payload_of(const spdlog::details::log_msg& message) { return {message.payload.data(), message.payload.size()}; }
 
 class TextMessage : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm& /*time*/, spdlog::memory_buf_t& line) override {
     if (log_detail::session) append(line, "session " + std::to_string(*log_detail::session) + " ");
-    append(line, printable(said_by(message)));
+    append(line, printable(payload_of(message)));
   }
   [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<TextMessage>(); }
 };
@@ -33,8 +33,8 @@ class JsonMessage : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm& /*time*/, spdlog::memory_buf_t& line) override {
     if (log_detail::session) append(line, "\"session\":" + std::to_string(*log_detail::session) + ",");
-    // A name may be no UTF-8, which JSON has to be.
-    const nlohmann::json text = std::string(said_by(message));
+    // JSON must be UTF-8; a file name in a message may not be.
+    const nlohmann::json text = std::string(payload_of(message));
     append(line, "\"message\":" + text.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   }
   [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<JsonMessage>(); }
@@ -57,11 +57,12 @@ bool is_log_level(const std::string& name) { return std::find(kLevels.begin(), k
 void set_log_level(const std::string& name) { spdlog::set_level(spdlog::level::from_str(name)); }
 
 void start_log(const LogOptions& options) {
-  if (!spdlog::get("intervale")) spdlog::set_default_logger(spdlog::stderr_color_mt("intervale"));  // stdout is for results
-  shape_log(options);
+  // Stdout is for results.
+  if (!spdlog::get("intervale")) spdlog::set_default_logger(spdlog::stderr_color_mt("intervale"));
+  configure_log(options);
 }
 
-void shape_log(const LogOptions& options) {
+void configure_log(const LogOptions& options) {
   spdlog::set_formatter(formatter_of(options.format));
   set_log_level(options.level);
 }

@@ -1,4 +1,4 @@
-// What the server says while it runs: lines on stderr, as text or as JSON. Any thread, through spdlog's default logger.
+// The server's log: lines of text or JSON on stderr. Any thread, through spdlog's default logger.
 #pragma once
 
 #include <spdlog/spdlog.h>
@@ -15,8 +15,8 @@ enum class LogFormat { text, json };
 
 struct LogOptions {
   LogFormat format = LogFormat::text;
-  std::string level = "info";  // one that is_log_level
-  // What the configuration file says of the level now, for SIGHUP; nothing if it says nothing.
+  std::string level = "info";  // see is_log_level()
+  // The level that the configuration file has now, for SIGHUP; nullopt if it has none.
   std::function<std::optional<std::string>()> configured_level = [] { return std::nullopt; };
 };
 
@@ -24,13 +24,14 @@ struct LogOptions {
 [[nodiscard]] bool is_log_level(const std::string& name);
 void set_log_level(const std::string& name);
 
-// Text: "2026-01-31T12:00:00.000+00:00 info session 7 closed: …". JSON: one object a line, with time, level, session (where there is one) and
-// message. What is said stays on its line: control characters are escaped, or in text shown as '?'.
+// Text: "2026-01-31T12:00:00.000+00:00 info session 7 closed: …". JSON: one object on each line, with time, level,
+// session (in lines about a session) and message. A message is one line: control characters are escaped, or in text
+// replaced by '?'.
 void start_log(const LogOptions& options);
-void shape_log(const LogOptions& options);  // the part of it that makes no new logger but changes the one there is
+void configure_log(const LogOptions& options);  // sets format and level of the existing default logger
 
 namespace log_detail {
-inline thread_local std::optional<std::uint64_t> session;  // which the line that is being said is about
+inline thread_local std::optional<std::uint64_t> session;  // that the current line is about
 }
 
 // A line about a session.

@@ -18,7 +18,7 @@ using prometheus::MetricFamily;
 using prometheus::MetricType;
 using prometheus::Registry;
 
-// Of all that a client may send, so that there are never more series than these.
+// The codes with a series of their own. A client may send any code, and must not create series without limit.
 constexpr std::array<unsigned, 13> kCodes{1000, 1001, 1002, 1003, 1005, 1011, 4400, 4401, 4403, 4404, 4408, 4409, 4413};
 
 // In Refusal's order.
@@ -66,21 +66,19 @@ Metrics::Metrics()
                   .Name("intervale_session_closes_total")
                   .Help("Sessions that ended, by close code; none: the connection broke.")
                   .Register(registry_)),
-      refusals_(prometheus::BuildCounter()
-                    .Name("intervale_refused_total")
-                    .Help("Connections and sessions that were turned away, by reason.")
-                    .Register(registry_)),
+      refusals_(prometheus::BuildCounter().Name("intervale_refused_total").Help("Connections and sessions refused, by reason.").Register(registry_)),
       connections(gauge(registry_, "intervale_connections", "Open connections.")),
       sessions(gauge(registry_, "intervale_sessions", "Open streaming sessions.")),
       sessions_total(counter(registry_, "intervale_sessions_total", "Streaming sessions so far.")),
       updates_sent_total(counter(registry_, "intervale_updates_sent_total", "Updates sent.")),
       bytes_sent_total(counter(registry_, "intervale_bytes_sent_total", "Bytes of streaming messages sent.")),
-      faults_total(counter(registry_, "intervale_session_faults_total", "Sessions closed for what their client did.")),
-      selection_(histogram(registry_, "intervale_selection_seconds", "Time to choose and pack one message.", kSelectionSeconds)),
-      first_mesh_(
-          histogram(registry_, "intervale_first_mesh_seconds", "From a session's first view to the first message for it, sent.", kAnswerSeconds)),
-      view_change_(histogram(registry_, "intervale_view_change_seconds", "From a later view to the first message for it, sent.", kAnswerSeconds)) {
-  // Counters that are there from the start: rates begin at 0.
+      faults_total(counter(registry_, "intervale_session_faults_total", "Sessions closed because of a fault of the client.")),
+      selection_(histogram(registry_, "intervale_selection_seconds", "Time to select and encode one message.", kSelectionSeconds)),
+      first_mesh_(histogram(registry_, "intervale_first_mesh_seconds", "From a session's first view until the first message for it is sent.",
+                            kAnswerSeconds)),
+      view_change_(
+          histogram(registry_, "intervale_view_change_seconds", "From a later view until the first message for it is sent.", kAnswerSeconds)) {
+  // All series exist from the start, so that rates begin at 0.
   for (const unsigned code : kCodes) closes_.Add({{"code", std::to_string(code)}});
   for (const char* reason : kReasons) refusals_.Add({{"reason", reason}});
 }
@@ -92,20 +90,20 @@ void Metrics::count_close(unsigned code) {
   closes_.Add({{"code", code == 0 ? "none" : known ? std::to_string(code) : "other"}}).Increment();
 }
 
-std::string Metrics::text(const Now& now) const {
+std::string Metrics::text(const Gauges& now) const {
   std::vector<MetricFamily> families = registry_.Collect();
   std::vector<prometheus::ClientMetric> memory;
   for (const auto& [name, volume] : now.catalogue.volumes()) memory.push_back(value(double(volume->memory_bytes()), {{"dataset", name}}));
-  families.push_back(gauges("intervale_queued_bytes", "Bytes of streaming messages that are leaving.", {value(double(now.queued_bytes))}));
-  families.push_back(gauges("intervale_datasets", "Data sets that are served.", {value(double(now.catalogue.volumes().size()))}));
-  families.push_back(gauges("intervale_dataset_memory_bytes", "Memory that a data set takes.", std::move(memory)));
+  families.push_back(gauges("intervale_queued_bytes", "Unsent bytes of streaming messages.", {value(double(now.queued_bytes))}));
+  families.push_back(gauges("intervale_datasets", "Data sets served.", {value(double(now.catalogue.volumes().size()))}));
+  families.push_back(gauges("intervale_dataset_memory_bytes", "Memory of a data set.", std::move(memory)));
   if (now.certificate_expires) {
     const std::chrono::duration<double> time = now.certificate_expires->time_since_epoch();
     families.push_back(
         gauges("intervale_certificate_expiry_timestamp_seconds", "When the certificate expires, in Unix time.", {value(time.count())}));
   }
-  families.push_back(gauges("intervale_resident_memory_bytes", "Memory that the server takes in all.", {value(double(resident_bytes()))}));
-  families.push_back({"intervale_cpu_seconds_total", "Processor time that the server took.", MetricType::Counter, {cpu_seconds()}});
+  families.push_back(gauges("intervale_resident_memory_bytes", "Resident memory of the process.", {value(double(resident_bytes()))}));
+  families.push_back({"intervale_cpu_seconds_total", "Processor time of the process.", MetricType::Counter, {cpu_seconds()}});
   return prometheus::TextSerializer().Serialize(families);
 }
 

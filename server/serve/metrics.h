@@ -1,4 +1,4 @@
-// What a server counts and measures, for Prometheus. Any thread.
+// The server's metrics, for Prometheus. Any thread.
 #pragma once
 
 #include <prometheus/counter.h>
@@ -16,12 +16,12 @@
 
 namespace intervale {
 
-// Why somebody was turned away: too many connections, or from one address, too many sessions, too much memory; a page's origin; no token that opens
-// what is asked for.
+// Why a connection or session was refused: a limit (connections in all or by address, sessions, memory), the origin
+// of a page, no valid token. The label of intervale_refused_total.
 enum class Refusal { connections, address, sessions, memory, origin, token };
 
 class Metrics {
-  // Before the references below, which are made of it.
+  // First: the references below are initialised from it.
   prometheus::Registry registry_;
   prometheus::Family<prometheus::Counter>& closes_;
   prometheus::Family<prometheus::Counter>& refusals_;
@@ -38,22 +38,23 @@ class Metrics {
   prometheus::Counter& sessions_total;
   prometheus::Counter& updates_sent_total;
   prometheus::Counter& bytes_sent_total;  // of WebSocket messages
-  prometheus::Counter& faults_total;      // sessions ended for what the client did
+  prometheus::Counter& faults_total;      // sessions that were closed because of a client's fault
 
-  void observe_selection(Duration time) { observe(selection_, time); }      // choosing and packing one message
-  void observe_first_mesh(Duration time) { observe(first_mesh_, time); }    // from a session's first View to its first message, sent
-  void observe_view_change(Duration time) { observe(view_change_, time); }  // the same of a later View
+  void observe_selection(Duration time) { observe(selection_, time); }  // of one message: selecting and encoding
+  // From the first View until a message is sent.
+  void observe_first_mesh(Duration time) { observe(first_mesh_, time); }
+  void observe_view_change(Duration time) { observe(view_change_, time); }  // the same for later Views
   void count_refusal(Refusal reason);
-  void count_close(unsigned code);  // a session has ended so; 0: its connection broke
+  void count_close(unsigned code);  // a session's close code; 0: its connection broke
 
-  // What others know, as of now.
-  struct Now {
+  // Values that are not counted here.
+  struct Gauges {
     const Catalogue& catalogue;
-    std::uint64_t queued_bytes = 0;  // of WebSocket messages that are leaving
+    std::uint64_t queued_bytes = 0;  // unsent, see WriteBudget
     std::optional<std::chrono::system_clock::time_point> certificate_expires = {};
   };
   // In Prometheus' text format, version 0.0.4.
-  [[nodiscard]] std::string text(const Now& now) const;
+  [[nodiscard]] std::string text(const Gauges& gauges) const;
 
  private:
   static void observe(prometheus::Histogram& histogram, Duration time) { histogram.Observe(std::chrono::duration<double>(time).count()); }

@@ -1,4 +1,4 @@
-// What a server can be told.
+// The options of a server.
 #pragma once
 
 #include <chrono>
@@ -13,31 +13,32 @@
 
 namespace intervale {
 
-// PEM: the server's certificate and those that vouch for it, and its key.
+// PEM files.
 struct TlsFiles {
-  std::filesystem::path certificate, key;
+  std::filesystem::path certificate, key;  // the certificate with its chain, and its private key
 };
 
 struct ServeOptions {
-  std::string listen = "127.0.0.1:8080";                                // address:port, an IPv6 address in brackets; port 0 takes any free one
-  std::optional<std::string> metrics_listen;                            // where /metrics is answered instead, for those who watch
-  std::optional<std::filesystem::path> viewer;                          // folder of the browser's viewer, see StaticFiles; off: none
-  unsigned threads = 0;                                                 // 0: one for each core
-  std::optional<std::filesystem::path> tokens;                          // file of those who may come in, see Tokens; off: everybody
-  std::vector<std::string> allowed_origins;                             // of pages that may open sessions; none: those of the host they are sent to
-  std::optional<TlsFiles> tls;                                          // off: plain HTTP and WebSocket
-  std::size_t max_connections = 4096;                                   // more than these are turned away at once; keep below the limit on open files
-  std::optional<std::size_t> max_connections_per_address;               // at least 1; the same
-  std::optional<std::size_t> max_sessions;                              // more than these are answered 503
-  std::optional<std::uint64_t> max_memory;                              // no new sessions while the process has more bytes resident: 503
-  std::size_t max_queued_bytes = 512 << 20;                             // of messages that are leaving, see WriteBudget
-  double messages_per_second = 2000;                                    // of each session; faster ones are read as slowly
-  double views_per_second = 200;                                        // of those
-  std::chrono::milliseconds handshake_time = protocol::kHandshakeTime;  // for a request, and from a WebSocket's start to its Open: each
-  std::chrono::milliseconds stall_time = protocol::kStallTime;          // how long updates wait for credit
-  std::chrono::milliseconds write_time = protocol::kWriteTime;          // how long one message may take to leave
-  std::chrono::milliseconds idle_time = protocol::kIdleTime;            // silence, pings unanswered
-  std::chrono::milliseconds drain_time{5000};                           // how long stop() waits for clients to take their leave
+  std::string listen = "127.0.0.1:8080";                   // IPv6 addresses in brackets; port 0: any free port
+  std::optional<std::string> metrics_listen;               // a port of its own for /metrics; nullopt: on the main port
+  std::optional<std::filesystem::path> viewer;             // folder of the viewer, see StaticFiles; nullopt: none
+  unsigned threads = 0;                                    // 0: one for each core
+  std::optional<std::filesystem::path> tokens;             // file, see Tokens; nullopt: no token is required
+  std::vector<std::string> allowed_origins;                // that may open sessions; empty: the request's host
+  std::optional<TlsFiles> tls;                             // nullopt: plain HTTP and WebSocket
+  std::size_t max_connections = 4096;                      // further ones are closed at once
+  std::optional<std::size_t> max_connections_per_address;  // at least 1; further ones are closed at once
+  std::optional<std::size_t> max_sessions;                 // further ones are answered 503
+  std::optional<std::uint64_t> max_memory;                 // bytes resident; no new sessions above: 503
+  std::size_t max_queued_bytes = 512 << 20;                // unsent bytes of all sessions, see WriteBudget
+  double messages_per_second = 2000;                       // of each session; further ones are delayed
+  double views_per_second = 200;                           // views among those messages: the same
+
+  std::chrono::milliseconds handshake_time = protocol::kHandshakeTime;  // for a request; for Open after the upgrade
+  std::chrono::milliseconds stall_time = protocol::kStallTime;          // for credit, while there are updates to send
+  std::chrono::milliseconds write_time = protocol::kWriteTime;          // for sending one message
+  std::chrono::milliseconds idle_time = protocol::kIdleTime;            // without any frame or pong
+  std::chrono::milliseconds drain_time{5000};                           // for clients to disconnect in stop()
 };
 
 }  // namespace intervale

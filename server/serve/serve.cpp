@@ -22,10 +22,10 @@
 namespace intervale {
 namespace {
 
-constexpr std::chrono::seconds kLook{2};  // at files that may have changed
+constexpr std::chrono::seconds kPollTime{2};  // between looks at files that may have changed
 
-// Where a build and an installation alike put the viewer.
-std::optional<std::filesystem::path> viewer_beside_the_program() {
+// Both a build and an installation have the viewer there.
+std::optional<std::filesystem::path> default_viewer() {
   std::error_code error;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
   if (error) return {};
@@ -34,8 +34,8 @@ std::optional<std::filesystem::path> viewer_beside_the_program() {
   return folder;
 }
 
-// Descriptors: as many as connections may take, if that is allowed.
-void make_room_for(std::size_t connections) {
+// Raises the limit on open files to what the connections may need, as far as the system permits.
+void raise_file_limit(std::size_t connections) {
   constexpr rlim_t kOthers = 64;  // files, listeners, threads
   rlimit limit{};
   const rlim_t wanted = connections + kOthers;
@@ -43,20 +43,22 @@ void make_room_for(std::size_t connections) {
   limit.rlim_cur = std::min(wanted, limit.rlim_max);
   const bool raised = ::setrlimit(RLIMIT_NOFILE, &limit) == 0;
   if (raised && limit.rlim_cur >= wanted) return;
-  spdlog::warn("the process may open {} files, and --max-connections is {}: see ulimit -n", limit.rlim_cur, connections);
+  spdlog::warn("the limit on open files is {}, too low for --max-connections {}: see ulimit -n", limit.rlim_cur, connections);
 }
 
+// The log level, and what SIGHUP makes of it.
 class LevelSwitch {
  public:
   explicit LevelSwitch(const LogOptions& log) : log_(log), level_(log.level) {}
   void next() {
     if (const auto configured = log_.configured_level()) {
-      if (!is_log_level(*configured)) return spdlog::warn("the log level '{}' of the configuration is none; it stays at {}", *configured, level_);
+      if (!is_log_level(*configured))
+        return spdlog::warn("the configuration has an invalid log level '{}'; the level stays at {}", *configured, level_);
       level_ = *configured;
     } else {
       level_ = level_ == "debug" ? (log_.level == "debug" ? "info" : log_.level) : "debug";
     }
-    set_log_level("info");  // for the next line
+    set_log_level("info");  // so that the next line is logged
     spdlog::info("SIGHUP: the log level is {}", level_);
     set_log_level(level_);
   }
@@ -66,18 +68,18 @@ class LevelSwitch {
   std::string level_;
 };
 
-// As long as the io_context runs.
-void await_each(boost::asio::signal_set& signals, const std::function<void()>& act) {
+// Calls act for every signal, while the io_context runs.
+void on_each_signal(boost::asio::signal_set& signals, const std::function<void()>& act) {
   signals.async_wait([&signals, act](const boost::system::error_code& error, int) {
     if (error) return;
     act();
-    await_each(signals, act);
+    on_each_signal(signals, act);
   });
 }
 
-// Now and then, and whenever the timer is cancelled, as long as the io_context runs.
+// Calls act every kPollTime, and whenever the timer is cancelled, while the io_context runs.
 void repeat(boost::asio::steady_timer& timer, const std::function<void()>& act) {
-  timer.expires_after(kLook);
+  timer.expires_after(kPollTime);
   timer.async_wait([&timer, act](const boost::system::error_code&) {
     act();
     repeat(timer, act);
@@ -86,11 +88,11 @@ void repeat(boost::asio::steady_timer& timer, const std::function<void()>& act) 
 
 }  // namespace
 
-Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std::vector<std::filesystem::path>& inputs) {
+Result<void> serve(const ServeOptions& requested, const LogOptions& log, const std::vector<std::filesystem::path>& inputs) {
   start_log(log);
-  std::signal(SIGPIPE, SIG_IGN);  // a client that left is an error code, not an end
+  std::signal(SIGPIPE, SIG_IGN);  // writing to a closed connection is an error code, not a signal
 
-  // Taken over before anything else, so that a signal during the start is not lost.
+  // Handled from the beginning, so that a signal during the start is not lost.
   boost::asio::io_context signals;
   boost::asio::signal_set ending(signals, SIGINT, SIGTERM);
   int signal = 0;
@@ -101,14 +103,14 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
   boost::asio::signal_set hang_up(signals, SIGHUP);
   boost::asio::steady_timer timer(signals);
   LevelSwitch level(log);
-  await_each(hang_up, [&] {
+  on_each_signal(hang_up, [&] {
     level.next();
-    timer.cancel();  // and looks at once
+    timer.cancel();  // polls at once
   });
 
-  make_room_for(wanted.max_connections);
-  ServeOptions options = wanted;
-  if (!options.viewer) options.viewer = viewer_beside_the_program();
+  raise_file_limit(requested.max_connections);
+  ServeOptions options = requested;
+  if (!options.viewer) options.viewer = default_viewer();
   auto server = Server::start(options);
   if (!server) return tl::unexpected(server.error());
   CatalogueWatcher watcher(inputs, options.max_memory);
@@ -122,11 +124,11 @@ Result<void> serve(const ServeOptions& wanted, const LogOptions& log, const std:
   spdlog::info("serving {} data set{}{}{}", count, count == 1 ? "" : "s", options.viewer ? "; the viewer is at " : " at ", (*server)->url());
 
   repeat(timer, [&] {
-    (*server)->refresh();
+    (*server)->reload();
     if (auto changed = watcher.poll()) (*server)->offer(std::move(*changed));
   });
   signals.run();
-  ending.clear();  // a second signal ends it at once
+  ending.clear();  // from now on a second signal ends the process at once
   spdlog::info("{}: draining", signal == SIGINT ? "SIGINT" : "SIGTERM");
   (*server)->stop();
   spdlog::info("stopped");

@@ -1,4 +1,4 @@
-// `intervale serve`: from files and options to a server that runs until it is told to stop.
+// `intervale serve`: runs a server with the given files and options until a signal ends it.
 #pragma once
 
 #include <filesystem>
@@ -10,12 +10,11 @@
 
 namespace intervale {
 
-// Serves the .ivm files given, and those in the folders given (a damaged file in a folder is logged and left out; one that is named is an
-// error, like two data sets of one name), and takes up what appears in these folders, changes and goes. Blocks until SIGTERM or SIGINT, then drains
-// and returns. Logs on stderr. SIGHUP changes the log's level: to what the configuration file says now, or if that says nothing, to debug and back.
-// Failures: an address that cannot be read or had, a file that cannot be served. Where the options name no viewer, the one beside the program is
-// served, if there is one:
-// ../share/intervale/viewer from its folder.
+// Serves the given .ivm files and the .ivm files in the given folders, as CatalogueWatcher loads them, and follows
+// changes in the folders. Blocks until SIGTERM or SIGINT, then drains and returns. Logs to stderr. SIGHUP sets the
+// log level that the configuration file has now; if it has none, SIGHUP switches between debug and the level of the
+// start. Failures: an address that is malformed or cannot be bound, a file that cannot be served. If the options name
+// no viewer, the server uses ../share/intervale/viewer, seen from the program's folder, if that exists.
 Result<void> serve(const ServeOptions& options, const LogOptions& log, const std::vector<std::filesystem::path>& inputs);
 
 }  // namespace intervale

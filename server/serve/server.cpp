@@ -18,10 +18,11 @@ namespace intervale {
 
 namespace asio = boost::asio;
 
-// Destroyed from the bottom up: threads are joined in stop(), then sessions go with the io_context that holds them, the context last.
+// Members are destroyed from last to first: stop() has joined the threads; the io_context destroys the sessions,
+// which use the context.
 struct Server::Running {
   explicit Running(const ServeOptions& options) : context(options) {}
-  // Whether they had changed.
+  // True if the files had changed and were read.
   Result<bool> load_tokens();
   Result<bool> load_certificate();
   ServerContext context;
@@ -29,12 +30,13 @@ struct Server::Running {
   std::unique_ptr<Listener> listener, metrics_listener;
   std::vector<std::thread> threads;
   FileChanges tokens_changes, certificate_changes;
-  std::string tokens_warning, certificate_warning;  // as last said, not to be said again
+  std::string tokens_warning, certificate_warning;  // last logged, not to be repeated
   bool stopped = false;
 };
 
-// The stamps are taken before reading: what is written meanwhile is then seen as a change. What failed is tried again, for it need not be the files'
-// fault: a token that was taken out must not stay for want of a descriptor.
+// The stamps are taken before reading, so that a write during the read counts as a change. After a failure the next
+// call tries again even if the files stay as they are: a revoked token must not remain valid because there was no
+// file descriptor.
 Result<bool> Server::Running::load_tokens() {
   const auto& path = context.options.tokens;
   if (!path || !tokens_changes.check({*path})) return false;
@@ -63,13 +65,13 @@ Server::Server(std::unique_ptr<Running> running) : running_(std::move(running)) 
 
 Server::~Server() { stop(); }
 
-Result<std::unique_ptr<Server>> Server::start(const ServeOptions& wanted) {
-  ServeOptions options = wanted;
+Result<std::unique_ptr<Server>> Server::start(const ServeOptions& requested) {
+  ServeOptions options = requested;
   if (options.threads == 0) options.threads = std::max(1U, std::thread::hardware_concurrency());
   auto running = std::make_unique<Running>(options);
   if (options.viewer) {
     auto viewer = StaticFiles::load(*options.viewer);
-    if (!viewer) return fail("no viewer: " + viewer.error().message);
+    if (!viewer) return fail("cannot load the viewer: " + viewer.error().message);
     running->context.viewer = std::move(*viewer);
   }
   if (auto loaded = running->load_tokens(); !loaded) return tl::unexpected(loaded.error());
@@ -98,15 +100,15 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catal
 
 void Server::offer(Catalogue catalogue) { running_->context.catalogue.store(std::make_shared<const Catalogue>(std::move(catalogue))); }
 
-void Server::refresh() {
-  const auto tell = [](const Result<bool>& loaded, const char* what, std::string& complaint) {
-    const std::string now = loaded ? std::string() : loaded.error().message;
-    if (!now.empty() && now != complaint) spdlog::error("{}; what was read before holds", now);
-    if (loaded && *loaded) spdlog::info("read the {} again", what);
-    complaint = now;
+void Server::reload() {
+  const auto log_result = [](const Result<bool>& loaded, const char* what, std::string& last_warning) {
+    const std::string warning = loaded ? std::string() : loaded.error().message;
+    if (!warning.empty() && warning != last_warning) spdlog::error("{}; the data read before stays in use", warning);
+    if (loaded && *loaded) spdlog::info("reloaded the {}", what);
+    last_warning = warning;
   };
-  tell(running_->load_tokens(), "tokens", running_->tokens_warning);
-  tell(running_->load_certificate(), "certificate", running_->certificate_warning);
+  log_result(running_->load_tokens(), "tokens", running_->tokens_warning);
+  log_result(running_->load_certificate(), "certificate", running_->certificate_warning);
 }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
@@ -125,7 +127,7 @@ void Server::stop() {
   if (std::exchange(running_->stopped, true)) return;
   running_->context.connections.begin_shutdown();
   if (!running_->context.connections.wait_until_empty(running_->context.options.drain_time)) {
-    spdlog::warn("{} connections did not take their leave in time and are cut off", running_->context.connections.size());
+    spdlog::warn("closing {} connections that did not close within the drain time", running_->context.connections.size());
   }
   running_->io.stop();
   for (std::thread& thread : running_->threads) thread.join();

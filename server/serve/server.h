@@ -1,4 +1,4 @@
-// A running server: a port, threads, and the sessions on it.
+// A running server: its ports, threads and sessions.
 #pragma once
 
 #include <cstdint>
@@ -13,26 +13,27 @@ namespace intervale {
 
 class Server {
  public:
-  // Listens, and answers on threads of its own from then on: that it is not ready, until there is something to offer. Failures: an address that
-  // cannot be read, or cannot be had; a viewer, tokens or a certificate that cannot be read.
+  // Listens, and serves on its own threads. Not ready (503) until offer() is called. Failures: an address that is
+  // malformed or cannot be bound; a viewer, tokens or a certificate that cannot be read.
   static Result<std::unique_ptr<Server>> start(const ServeOptions& options);
-  static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);  // and offers that
+  static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);  // and offers it
 
-  void offer(Catalogue catalogue);  // from now on; sessions keep what they opened. Any thread.
-  ~Server();                        // stops
+  void offer(Catalogue catalogue);  // for new sessions; running sessions keep the data set they opened. Any thread.
+  ~Server();                        // calls stop()
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  // Reads the tokens and the certificate again if their files have changed. What cannot be read is logged, and what was read before holds. One thread
-  // at a time.
-  void refresh();
+  // Reloads the tokens and the certificate if their files have changed. If that fails, it is logged, and the previous
+  // ones stay in use. One thread at a time.
+  void reload();
 
   [[nodiscard]] std::uint16_t port() const;
-  [[nodiscard]] std::uint16_t metrics_port() const;  // port() if it has none of its own
+  [[nodiscard]] std::uint16_t metrics_port() const;  // port() if /metrics has no port of its own
   [[nodiscard]] std::string url() const;             // "http://127.0.0.1:8080/"
 
-  // Drains: not ready, which those who ask are told, no new sessions, running ones closed with 1001; returns once all are gone, after
-  // options.drain_time at the latest, when what is left is cut off. A second call does nothing. Not from a thread of the server's own.
+  // Drains: /readyz answers 503, new sessions are refused, running sessions are closed with 1001. Returns once all
+  // connections are closed, after options.drain_time at the latest; connections that are left then are closed at
+  // once. A second call does nothing. Not from one of the server's own threads.
   void stop();
 
  private:

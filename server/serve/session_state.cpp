@@ -18,9 +18,9 @@ std::optional<Fault> SessionState::receive(const protocol::ClientMessage& messag
 }
 
 std::optional<Fault> SessionState::on(const protocol::Open& open) {
-  if (opened()) return fault(CloseCode::out_of_order, "Open came twice");
-  // Before it is looked for: what is there is no one's business who may not see it.
-  if (!scope_ || !scope_->allows(open.dataset)) return fault(CloseCode::forbidden, "this token does not open that data set");
+  if (opened()) return fault(CloseCode::out_of_order, "a second Open");
+  // Before the lookup: the client must not learn whether a data set exists that its token does not grant.
+  if (!scope_ || !scope_->allows(open.dataset)) return fault(CloseCode::forbidden, "the token does not grant this data set");
   const auto catalogue = catalogue_.load();
   if (catalogue) volume_ = catalogue->find(open.dataset);
   if (!volume_) return fault(CloseCode::no_such_dataset, "no such data set; see /api/datasets");
@@ -31,23 +31,23 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
 }
 
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
-  if (!opened() || viewing_) return fault(CloseCode::out_of_order, "Have comes after Open and before the first View");
+  if (!opened() || view_ != ViewState::none) return fault(CloseCode::out_of_order, "Have is allowed between Open and the first View only");
   if (!resumed_) return {};
   for (const SlotGroup& g : have.splits) {
-    if (!plan_->resume(g.key, g.slots)) return fault(CloseCode::malformed, "the client has what the data set has not");
+    if (!plan_->resume(g.key, g.slots)) return fault(CloseCode::malformed, "Have names updates that the data set does not contain");
   }
   return {};
 }
 
 std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (!opened()) return fault(CloseCode::out_of_order, "View before Open");
-  if (viewing_ && view.epoch <= epoch_) return fault(CloseCode::out_of_order, "a View's epoch must be greater than the last one's");
-  if (!plan_->forget(view.forget)) return fault(CloseCode::malformed, "the client gives up what the data set has not");
+  if (view_ != ViewState::none && view.epoch <= epoch_)
+    return fault(CloseCode::out_of_order, "the epoch of a View must be greater than the last one");
+  if (!plan_->forget(view.forget)) return fault(CloseCode::malformed, "View forgets updates that the data set does not contain");
   plan_->set_room(view.room.value_or(UINT64_MAX));
   epoch_ = view.epoch;
-  asked_ = view.lod;
-  viewing_ = fresh_ = true;
-  done_ = false;
+  new_lod_ = view.lod;
+  view_ = ViewState::unanswered;
   target_ = kFirstPayload;
   return {};
 }
@@ -58,7 +58,7 @@ std::optional<Fault> SessionState::on(const protocol::Credit& credit) {
 }
 
 std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
-  if (bytes > protocol::kMaxWindow - credit_) return fault(CloseCode::too_large, "more credit than the largest window");
+  if (bytes > protocol::kMaxWindow - credit_) return fault(CloseCode::too_large, "the credit exceeds the largest window");
   credit_ += bytes;
   last_grant_ = bytes;
   return {};
@@ -66,30 +66,29 @@ std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
 
 std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
-  if (!std::exchange(announced_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
+  if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
   if (!has_work()) return {};
-  if (asked_) plan_->set_lod(*std::exchange(asked_, std::nullopt));
-  auto message = next_batch_or_done(max_payload);
-  if (message) fresh_ = false;
-  return message;
+  if (new_lod_) plan_->set_lod(*std::exchange(new_lod_, std::nullopt));
+  return next_batch_or_done(max_payload);
 }
 
 std::optional<protocol::ServerMessage> SessionState::next_batch_or_done(std::size_t max_payload) {
-  // Not all the credit at once: a line would run dry while the client's next grant is under way. Clients grant a quarter of their window or more, and
-  // a batch takes half of its bound.
+  // A batch does not use all the credit: the connection would be idle until the client's next grant arrives. Clients
+  // grant a quarter of their window or more, and a batch takes about half of its bound.
   const std::uint64_t bound =
       std::min({std::uint64_t(target_), std::uint64_t(max_payload), std::max<std::uint64_t>(protocol::kMinPayload, 2 * last_grant_)});
   const std::uint64_t size = std::min(bound, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
   auto batch = plan_->next(size);
   if (!batch) {
     if (!plan_->done()) return {};
-    done_ = true;
+    view_ = ViewState::done;
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }
+  view_ = ViewState::streaming;
   target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
   const StreamPlan::Remaining remaining = plan_->remaining();
   protocol::Batch message{epoch_, sequence_++, batch->updates, remaining.error, remaining.pixels, remaining.updates, std::move(batch->payload)};
-  credit_ -= protocol::cost_of(message);  // at most what there was: next() keeps to size
+  credit_ -= protocol::cost_of(message);  // does not underflow: the payload is at most `size`
   return message;
 }
 

@@ -1,4 +1,4 @@
-// A streaming session without its socket: messages in, messages out, by PROTOCOL.md. No I/O.
+// The state of a streaming session: messages in, messages out, as PROTOCOL.md says. No I/O.
 #pragma once
 
 #include <cstdint>
@@ -16,29 +16,36 @@
 
 namespace intervale {
 
-// One thread at a time. `catalogue` must outlive it; what was opened stays, whatever becomes of that.
+// One thread at a time. `catalogue` must outlive the session, which keeps the data set that it opened when the
+// catalogue changes.
 class SessionState {
  public:
-  // scope: what may be opened; nullptr: nothing.
+  // scope: the data sets that may be opened; nullptr: none.
   SessionState(const AtomicSharedPtr<Catalogue>& catalogue, std::shared_ptr<const Scope> scope) : catalogue_(catalogue), scope_(std::move(scope)) {}
 
-  // Takes a client's message. A fault ends the session: nothing else may be called after.
+  // Handles a client's message. A fault ends the session: call nothing afterwards.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
-  // The next message to send, or nothing for now; has_work() tells whether to ask again. While it does, this takes a few milliseconds: about one for
-  // each 16 KiB of max_payload, which bounds the size of a batch. A view with a budget of updates takes time linear in the data set's updates first.
+  // The next message to send. nullopt: none now; call again if has_work(). max_payload bounds a batch's payload. With
+  // has_work() a call takes about a millisecond for each 16 KiB of max_payload, and the first call for a view with
+  // max_updates O(updates of the data set) in addition.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
-  // There is a batch to choose and pack, or to be looked for further.
-  [[nodiscard]] bool has_work() const { return announced_ && viewing_ && !done_ && !needs_credit(); }
-  // Nothing was sent yet in answer to the last view.
-  [[nodiscard]] bool view_is_unanswered() const { return fresh_; }
+  // There may be a batch to select and encode.
+  [[nodiscard]] bool has_work() const { return opened_was_sent_ && is_streaming() && !needs_credit(); }
+  // Nothing was sent yet for the last view.
+  [[nodiscard]] bool view_is_unanswered() const { return view_ == ViewState::unanswered; }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
-  [[nodiscard]] bool needs_credit() const { return viewing_ && !done_ && credit_ < protocol::kMinCredit; }  // sends only once there is more credit
+  // Sends nothing until the client grants more credit.
+  [[nodiscard]] bool needs_credit() const { return is_streaming() && credit_ < protocol::kMinCredit; }
   [[nodiscard]] const std::string& dataset() const { return dataset_; }
   [[nodiscard]] std::uint64_t updates_sent() const { return plan_ ? plan_->sent() : 0; }
 
  private:
+  // Of the last view: there is none yet; nothing, or something, was sent for it; Done was sent.
+  enum class ViewState { none, unanswered, streaming, done };
+
+  [[nodiscard]] bool is_streaming() const { return view_ == ViewState::unanswered || view_ == ViewState::streaming; }
   std::optional<protocol::Fault> on(const protocol::Open& open);
   std::optional<protocol::Fault> on(const protocol::View& view);
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
@@ -51,17 +58,15 @@ class SessionState {
   Catalogue::Volume volume_;
   std::string dataset_;
   std::optional<StreamPlan> plan_;
-  std::optional<Lod> asked_;  // a view that the plan has not taken up yet
+  std::optional<Lod> new_lod_;  // the last view, until the plan has it
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding
   std::uint64_t last_grant_ = 0;
   std::uint64_t sequence_ = 0;  // of the next batch
   std::size_t target_ = 0;      // payload of the next batch, if credit allows
-  bool resumed_ = false;        // the client has updates of this very data
-  bool announced_ = false;      // Opened was sent
-  bool viewing_ = false;        // a View came
-  bool fresh_ = false;          // nothing was sent yet for epoch_
-  bool done_ = false;           // Done was sent for epoch_
+  bool resumed_ = false;        // the client has updates of this data set, with the same contents
+  bool opened_was_sent_ = false;
+  ViewState view_ = ViewState::none;
 };
 
 }  // namespace intervale

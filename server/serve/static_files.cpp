@@ -42,8 +42,8 @@ std::string type_of(const fs::path& path) {
   return std::string(found == kTypes.end() ? "application/octet-stream" : found->second);
 }
 
-// As Vite names what it bundles: assets/index-BVx3_a9Z.js. Words of eight letters have no digits and no capitals; a hash that has none either is
-// merely asked for again.
+// Vite names bundled files like assets/index-BVx3_a9Z.js. An ordinary word of eight letters has no digit and no
+// capital; a hash without either is taken for a word, and the file is only revalidated more often than needed.
 bool has_hash_in_name(std::string_view path) {
   constexpr std::size_t kHash = 8;
   if (!path.starts_with("/assets/")) return false;
@@ -52,8 +52,8 @@ bool has_hash_in_name(std::string_view path) {
   if (stem.size() < kHash + 2 || stem[stem.size() - kHash - 1] != '-') return false;
   const std::string_view hash = stem.substr(stem.size() - kHash);
   const auto is_base64 = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
-  const auto is_no_word = [](unsigned char c) { return std::isdigit(c) != 0 || std::isupper(c) != 0; };
-  return std::all_of(hash.begin(), hash.end(), is_base64) && std::any_of(hash.begin(), hash.end(), is_no_word);
+  const auto is_digit_or_upper = [](unsigned char c) { return std::isdigit(c) != 0 || std::isupper(c) != 0; };
+  return std::all_of(hash.begin(), hash.end(), is_base64) && std::any_of(hash.begin(), hash.end(), is_digit_or_upper);
 }
 
 bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
@@ -62,7 +62,7 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
   return std::mismatch(path.begin(), path.end(), folder.begin(), folder.end()).second == folder.end();
 }
 
-// In order, so that what is told first of several troubles does not depend on the file system. `root` is canonical.
+// Sorted, so that the first error does not depend on the file system. `root` is canonical.
 Result<std::vector<fs::path>> files_below(const fs::path& root) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -83,7 +83,7 @@ Result<std::vector<fs::path>> files_below(const fs::path& root) {
   return files;
 }
 
-// At most `room` bytes, even if the file grows meanwhile.
+// Fails at more than `room` bytes, even if the file grows while it is read.
 Result<std::string> read_file(const fs::path& path, std::size_t room) {
   std::ifstream in(path, std::ios::binary);
   std::string bytes;
@@ -103,7 +103,7 @@ StaticContent content_of(std::string bytes) {
   return {std::make_shared<const std::string>(std::move(bytes)), tag.data()};
 }
 
-// "gzip;q=0.5" without the name. What cannot be read is a no.
+// parameters: those of "gzip;q=0.5". A malformed weight counts as 0.
 bool has_weight(std::string_view parameters) {
   while (!parameters.empty()) {
     const std::string_view parameter = split_off(parameters, ';');
@@ -142,7 +142,7 @@ Result<StaticFiles> StaticFiles::load(const fs::path& folder) {
   for (auto& [path, bytes] : contents) {
     if (path.ends_with(".gz") && contents.contains(path.substr(0, path.size() - 3))) continue;
     StaticFile file{type_of(path), has_hash_in_name(path), content_of(std::move(bytes)), {}};
-    if (const auto packed = contents.find(path + ".gz"); packed != contents.end()) file.gzip = content_of(std::move(packed->second));
+    if (const auto gzip = contents.find(path + ".gz"); gzip != contents.end()) file.gzip = content_of(std::move(gzip->second));
     files.files_.emplace(path, std::move(file));
   }
   if (files.find("/") == nullptr) return fail("no index.html in " + folder.string());

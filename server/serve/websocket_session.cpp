@@ -1,5 +1,6 @@
-// Two coroutines on one strand: the reader takes messages to the state, the writer sends what the state has next and alone ends the session.
-// A message is selected only once the one before has left, so a slow client costs one message of memory and no one else's time.
+// Two coroutines on one strand. The reader passes messages to the session state; the writer sends the messages that
+// the state has next, and is the only one to close the WebSocket. A batch is selected only when the message before is
+// sent, so a slow client costs the memory of one message, and no time of other sessions.
 #include "server/serve/websocket_session.h"
 
 #include <boost/asio/as_tuple.hpp>
@@ -31,20 +32,21 @@ using protocol::Fault;
 using Clock = std::chrono::steady_clock;
 using Request = http::request<http::empty_body>;
 
-constexpr std::chrono::seconds kMaxPingBacklog{1};  // ahead of the pace that messages may have
+constexpr std::chrono::seconds kMaxPingBacklog{1};  // how far pings may exceed the message rate
+// Payloads while other sessions wait for a worker: the first of a view, and the others.
 constexpr std::size_t kContendedFirstPayload = 4 << 10, kContendedPayload = 16 << 10;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
  public:
-  WebSocketSession(Stream stream, ServerContext& context, Peer guest)
+  WebSocketSession(Stream stream, ServerContext& context, Peer peer)
       : ws_(std::move(stream)),
         writer_wakeup_(ws_.get_executor()),
         write_deadline_(ws_.get_executor()),
         read_delay_(ws_.get_executor()),
         context_(context),
-        peer_(std::move(guest)),
+        peer_(std::move(peer)),
         state_(context.catalogue, peer_.scope),
         messages_(context.options.messages_per_second),
         views_(context.options.views_per_second),
@@ -62,11 +64,12 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   void start(const Request& request) {
     context_.metrics.connections.Increment();
-    if (peer_.scope) context_.metrics.sessions.Increment();  // who is only to be told takes no one's place
+    // A session that is only opened to be closed with 4401 does not count.
+    if (peer_.scope) context_.metrics.sessions.Increment();
     context_.metrics.sessions_total.Increment();
     beast::error_code ignored;
-    const auto peer = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
-    log_session(id_, spdlog::level::info, "from {}:{}", peer.address().to_string(), peer.port());
+    const auto endpoint = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
+    log_session(id_, spdlog::level::info, "from {}:{}", endpoint.address().to_string(), endpoint.port());
     registration_ = context_.connections.add(shared_from_this());
     spawn(run(shared_from_this(), request));
   }
@@ -77,7 +80,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   void abort() override {
     asio::post(ws_.get_executor(), [self = shared_from_this()] {
-      if (self->close_note_.empty()) self->close_note_ = "the client does not take what it asked for, and memory is short";
+      if (self->close_note_.empty()) self->close_note_ = "the limit of unsent bytes is reached, and this client is the slowest reader";
       self->abort_connection();
     });
   }
@@ -99,14 +102,14 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     abort_connection();
   }
 
-  // Ends the session in order: the writer says why, and closes. The first reason holds.
-  void close(Fault why) {
-    if (!fault_ && !closed_) fault_ = std::move(why);
+  // Ends the session in order: the writer sends the fault and closes. The first fault counts.
+  void close(Fault fault) {
+    if (!fault_ && !closed_) fault_ = std::move(fault);
     writer_wakeup_.cancel();
     read_delay_.cancel();
   }
 
-  // Ends it at once.
+  // Ends the session at once.
   void abort_connection() {
     closed_ = true;
     beast::get_lowest_layer(ws_).close();
@@ -122,7 +125,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }
     if (peer_.scope == nullptr) {
       context_.metrics.count_refusal(Refusal::token);
-      close({CloseCode::unauthorized, "a token is wanted, and none that opens anything came"});
+      close({CloseCode::unauthorized, "a valid token is required"});
     }
     open_deadline_ = Clock::now() + context_.options.handshake_time;
     spawn(write_messages(self));
@@ -137,13 +140,14 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       response.set(http::field::server, std::string(protocol::kServerName) + "/" INTERVALE_VERSION);
       response.set(http::field::sec_websocket_protocol, protocol::kSubprotocol);
     }));
-    // Pings are answered beneath async_read_some, where no one can be kept waiting. The socket goes with its session, and this with the socket.
+    // Beast answers pings within async_read_some, so a flood of them cannot be slowed down. The callback does not
+    // outlive the session: the session owns the stream.
     ws_.control_callback([this](websocket::frame_type kind, beast::string_view) {
       if (kind == websocket::frame_type::ping && messages_.take(Clock::now()) > kMaxPingBacklog) {
-        close({CloseCode::too_large, "more pings than messages may come"});
+        close({CloseCode::too_large, "too many pings"});
       }
     });
-    ws_.read_message_max(0);  // read_messages counts, so that it can close with a code of ours
+    ws_.read_message_max(0);  // read_messages has its own limit, with its own close code
     ws_.auto_fragment(false);
     ws_.binary(true);
   }
@@ -159,8 +163,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
           on_read_error(error);
           co_return;
         }
-        if (ws_.got_text()) co_return close({CloseCode::text_frame, "text frames are not spoken here"});
-        if (buffer.size() > protocol::kMaxClientMessage) co_return close({CloseCode::too_large, "the message is too large"});
+        if (ws_.got_text()) co_return close({CloseCode::text_frame, "text frames are not supported"});
+        if (buffer.size() > protocol::kMaxClientMessage) co_return close({CloseCode::too_large, "message too large"});
       } while (!ws_.is_message_done());
       if (fault_) co_return;
       co_await throttle(messages_);
@@ -169,8 +173,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       if (!message) co_return close({CloseCode::malformed, message.error().message});
       const auto* const view = std::get_if<protocol::View>(&*message);
       if (view != nullptr) co_await throttle(views_);
-      if (view != nullptr && !view->forget.empty()) {
-        // That takes time, like a batch.
+      if (view != nullptr && !view->forget.empty()) {  // forgetting takes as long as selecting a batch
         co_await context_.scheduler.async_acquire(flow_, FairScheduler::Priority::interactive, asio::use_awaitable);
         const ScheduledWork work{context_.scheduler, flow_, FairScheduler::Priority::interactive};
         receive(*message);
@@ -180,7 +183,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }
   }
 
-  // A client that sends faster than it may is read more slowly, and its line fills up.
+  // Delays the reader of a client that exceeds the rate: TCP then slows the client down.
   asio::awaitable<void> throttle(RateLimit& limit) {
     const auto time = limit.take(Clock::now());
     if (time == Clock::duration(0) || fault_ || closed_) co_return;
@@ -188,7 +191,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     co_await read_delay_.async_wait(kAwait);
   }
 
-  // Between enter() and leave().
+  // Releases the worker that async_acquire() assigned.
   struct ScheduledWork {
     FairScheduler& scheduler;
     FairScheduler::Flow& flow;
@@ -199,11 +202,11 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   void receive(const protocol::ClientMessage& message) {
     if (fault_ || closed_) return;
-    if (!state_.needs_credit()) stalled_since_ = Clock::now();  // in case this message makes it so
+    if (!state_.needs_credit()) stalled_since_ = Clock::now();  // this message may change that
     log_message(message);
     if (std::holds_alternative<protocol::Open>(message) && lacks_memory()) {
       context_.metrics.count_refusal(Refusal::memory);
-      return close({CloseCode::going_away, "no room for another session now"});
+      return close({CloseCode::going_away, "the server has no capacity for another session"});
     }
     if (auto fault = state_.receive(message)) return close(std::move(*fault));
     if (const auto* view = std::get_if<protocol::View>(&message)) on_view(view->epoch);
@@ -211,17 +214,17 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     writer_wakeup_.cancel();
   }
 
-  // A data set takes memory once it is opened: many upgrades may have passed when there still was some.
+  // Checked again at Open, which is when a session takes memory: many upgrades may have passed the check before.
   [[nodiscard]] bool lacks_memory() const {
-    const auto& most = context_.options.max_memory;
-    return most && resident_bytes() > *most;
+    const auto& max_memory = context_.options.max_memory;
+    return max_memory && resident_bytes() > *max_memory;
   }
 
   void log_message(const protocol::ClientMessage& message) const {
     if (const auto* open = std::get_if<protocol::Open>(&message)) {
-      log_session(id_, spdlog::level::debug, "opens '{}'{}, for '{}'", open->dataset, open->resume ? " again" : "", open->client);
+      log_session(id_, spdlog::level::debug, "opens '{}'{}, client '{}'", open->dataset, open->resume ? " to resume" : "", open->client);
     } else if (const auto* view = std::get_if<protocol::View>(&message)) {
-      log_session(id_, spdlog::level::debug, "asks for view {}", view->epoch);
+      log_session(id_, spdlog::level::debug, "view {}", view->epoch);
     }
   }
 
@@ -230,7 +233,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (!oldest_view_) oldest_view_ = newest_view_;
   }
 
-  // A message that serves the view of that epoch has left.
+  // A message for the view of that epoch was sent.
   void on_sent(std::uint64_t epoch) {
     if (!oldest_view_ || epoch < oldest_view_->epoch) return;
     const auto time = Clock::now() - oldest_view_->since;
@@ -239,7 +242,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (newest_view_.epoch > epoch) oldest_view_ = newest_view_;
   }
 
-  // The connection is over, by the client's close or by what happened to it.
+  // The client closed the WebSocket, or the connection broke.
   void on_read_error(beast::error_code error) {
     if (error == websocket::error::closed) {
       if (close_code_ == 0) close_code_ = ws_.reason().code;
@@ -279,7 +282,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return state_.view_is_unanswered() ? FairScheduler::Priority::interactive : FairScheduler::Priority::bulk;
   }
 
-  // What the session has next. Leaves the scheduler.
+  // Selects the next message, and releases the worker.
   std::optional<protocol::ServerMessage> compute() {
     const ScheduledWork work{context_.scheduler, flow_, priority()};
     if (closed_ || fault_) return {};
@@ -289,14 +292,15 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return message;
   }
 
-  // Until something changes, or the client has kept us waiting too long.
+  // Until a message arrives, or the client's time to send Open or Credit is over.
   asio::awaitable<void> wait() {
     auto deadline = Clock::time_point::max();
     if (!state_.opened()) deadline = open_deadline_;
     if (state_.needs_credit()) deadline = stalled_since_ + context_.options.stall_time;
     writer_wakeup_.expires_at(deadline);
     const auto [error] = co_await writer_wakeup_.async_wait(kAwait);
-    if (!error && Clock::now() >= deadline) close({CloseCode::timed_out, state_.opened() ? "no credit came in time" : "no Open came in time"});
+    if (!error && Clock::now() >= deadline)
+      close({CloseCode::timed_out, state_.opened() ? "no credit was granted in time" : "no Open was received in time"});
   }
 
   asio::awaitable<bool> send(const protocol::ServerMessage& message) {
@@ -325,25 +329,25 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (!co_await send(fault)) co_return abort_connection();
     const auto code = static_cast<websocket::close_code>(fault_->code);
     const websocket::close_reason reason(code, fault_->text);
-    co_await ws_.async_close(reason, kAwait);  // within kHandshakeTime; an error is a client that left first
+    co_await ws_.async_close(reason, kAwait);  // takes at most kHandshakeTime; fails if the client closed first
     abort_connection();
   }
 
   websocket::stream<Stream> ws_;
-  asio::steady_timer writer_wakeup_;  // the writer sleeps on it
+  asio::steady_timer writer_wakeup_;  // the writer waits on it
   asio::steady_timer write_deadline_;
-  asio::steady_timer read_delay_;  // the reader sleeps on it
+  asio::steady_timer read_delay_;  // the reader waits on it
   ServerContext& context_;
   Peer peer_;
   SessionState state_;
   FairScheduler::Flow flow_;
   RateLimit messages_, views_;
   std::uint64_t id_;
-  std::optional<Fault> fault_;  // set once the session is to end
-  bool closed_ = false;         // nothing can be sent any more
+  std::optional<Fault> fault_;  // why the session ends, once it does
+  bool closed_ = false;         // the connection is gone: nothing can be sent
   Clock::time_point open_deadline_{};
-  Clock::time_point stalled_since_{};  // when credit was last enough
-  // Views that nothing was sent for yet: the first of them, and the last.
+  Clock::time_point stalled_since_{};  // when the client last had enough credit, or was sent a message
+  // The oldest and the newest view that nothing was sent for yet.
   struct PendingView {
     std::uint64_t epoch = 0;
     Clock::time_point since;
@@ -359,8 +363,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
 }  // namespace
 
-void start_websocket_session(Stream stream, const Request& request, ServerContext& context, Peer guest) {
-  std::make_shared<WebSocketSession>(std::move(stream), context, std::move(guest))->start(request);
+void start_websocket_session(Stream stream, const Request& request, ServerContext& context, Peer peer) {
+  std::make_shared<WebSocketSession>(std::move(stream), context, std::move(peer))->start(request);
 }
 
 }  // namespace intervale

@@ -11,14 +11,16 @@
 
 namespace intervale {
 
-// Who the session is for.
+// The client of a session.
 struct Peer {
-  std::shared_ptr<const Scope> scope;  // nullptr: it has no right to be here, and is told so with close code 4401
+  // What its token grants; nullptr: no valid token, and the session is closed with 4401.
+  std::shared_ptr<const Scope> scope;
   AddressCounts::Lease address_lease;
 };
 
-// Answers an upgrade request that offers our subprotocol and streams from then on. Returns at once; the session keeps itself alive.
+// Accepts an upgrade request that offers the subprotocol, and runs the session. Does not block; the session keeps
+// itself alive.
 void start_websocket_session(Stream stream, const boost::beast::http::request<boost::beast::http::empty_body>& request, ServerContext& context,
-                             Peer guest);
+                             Peer peer);
 
 }  // namespace intervale

@@ -50,7 +50,7 @@ TEST(Access, ATokenOpensItsDataSetsOnly) {
     client.send(Open{name, "", 0});
     const auto end = client.end();
     EXPECT_EQ(end.code, static_cast<unsigned>(CloseCode::forbidden)) << name;
-    EXPECT_EQ(end.fault.value().text, "this token does not open that data set");
+    EXPECT_EQ(end.fault.value().text, "the token does not grant this data set");
   }
   RawClient client(guarded.port(), {.authorization = "Bearer all-of-it"});
   client.send(Open{"nothing", "", 0});
@@ -92,17 +92,17 @@ TEST(Access, TokensAreReadAgainWhenTheirFileChanges) {
   const RawClient::Hello old{.authorization = "Bearer all-of-it"}, late{.authorization = "Bearer another-one"};
   RawClient running(guarded.port(), old);
   guarded.folder.file("tokens", "another-one\n");
-  guarded.server->refresh();
+  guarded.server->reload();
   EXPECT_EQ(upgrade_status(guarded.port(), old), 401u);
   EXPECT_EQ(upgrade_status(guarded.port(), late), 101u);
   running.send(kOpen);
   running.send(kEverything);
   EXPECT_GT(running.stream_to_end(), 0u) << "a session keeps what it was let in with";
   guarded.folder.file("tokens", "n o ! t o k e n s\n!\n");
-  guarded.server->refresh();
+  guarded.server->reload();
   EXPECT_EQ(upgrade_status(guarded.port(), late), 101u) << "what cannot be read changes nothing";
   std::filesystem::remove(guarded.folder / "tokens");
-  guarded.server->refresh();
+  guarded.server->reload();
   EXPECT_EQ(upgrade_status(guarded.port(), late), 101u);
 }
 

@@ -65,9 +65,10 @@ TEST(Faults, WithoutDescriptorsFilesAreReadLater) {
   const auto all_of = [&server](const std::vector<std::string>& said) {
     return std::all_of(said.begin(), said.end(), [&server](const std::string& text) { return server.process().wait_for(text).has_value(); });
   };
-  EXPECT_TRUE(all_of({"data: Too many open files; what was read before stays", "tokens: Too many open files; what was read before holds"}));
+  EXPECT_TRUE(
+      all_of({"data: Too many open files; the data read before stays in use", "tokens: Too many open files; the data read before stays in use"}));
   limit_descriptors(server.process(), 1024);
-  EXPECT_TRUE(all_of({"read the tokens again", "b.ivm was read"}));
+  EXPECT_TRUE(all_of({"reloaded the tokens", "b.ivm was loaded"}));
   EXPECT_EQ(run({program("intervale-client"), "list", server.url(), "--token", "old"}).status, 1);
   const auto listed = run({program("intervale-client"), "list", server.url(), "--token", "replaced"});
   EXPECT_THAT(listed.out, testing::AllOf(HasSubstr("a"), HasSubstr("b")));
@@ -119,7 +120,7 @@ TEST(Faults, AClockThatIsSetMattersToNobody) {
   }
   EXPECT_EQ(inside.finish(), all);
   std::filesystem::copy_file(buckyball(), data / "later.ivm");
-  const auto said = server.process().wait_for("later.ivm was read");
+  const auto said = server.process().wait_for("later.ivm was loaded");
   ASSERT_TRUE(said);
   std::set<std::string> days;
   std::istringstream lines(*said);

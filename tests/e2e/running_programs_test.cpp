@@ -81,7 +81,7 @@ TEST(Programs, TokensLetInAndAreNeverTold) {
   EXPECT_EQ(fetch({"--token", secret}).status, 0);
   expect_complaint(run({client(), "list", server.url()}), 1, "wants a token");
   folder.file("tokens", secret + "\n" + secret + "3 buckyball\n");
-  EXPECT_TRUE(server.process().wait_for("read the tokens again"));
+  EXPECT_TRUE(server.process().wait_for("reloaded the tokens"));
   EXPECT_EQ(fetch({"--token", secret + "3"}).status, 0);
   expect_complaint(run({client(), "fetch", server.url("buckyball"), "--token", "a b"}), 2, "--token");
   ::setenv("INTERVALE_TOKEN", secret.c_str(), 1);
@@ -103,13 +103,13 @@ TEST(Programs, AServedFolderIsLookedAtAgain) {
   const auto names = [&server] { return run({client(), "list", server.url()}).out; };
   EXPECT_THAT(names(), StartsWith("one: "));
   std::filesystem::copy_file(buckyball(), folder / "two.ivm");
-  EXPECT_TRUE(server.process().wait_for("two.ivm was read"));
+  EXPECT_TRUE(server.process().wait_for("two.ivm was loaded"));
   EXPECT_EQ(run({client(), "fetch", server.url("two"), "--error-percent", "50"}).status, 0);
   folder.file("one.ivm", "damaged");
-  EXPECT_TRUE(server.process().wait_for("what was read before stays"));
+  EXPECT_TRUE(server.process().wait_for("the data read before stays in use"));
   EXPECT_EQ(run({client(), "fetch", server.url("one"), "--error-percent", "50"}).status, 0);
   std::filesystem::remove(folder / "one.ivm");
-  EXPECT_TRUE(server.process().wait_for("one.ivm has gone"));
+  EXPECT_TRUE(server.process().wait_for("one.ivm was removed"));
   EXPECT_THAT(names(), StartsWith("two: "));
 }
 
@@ -134,7 +134,7 @@ TEST(Programs, SighupReadsTheLogLevelOfTheConfigurationAgain) {
   EXPECT_TRUE(server.process().wait_for("SIGHUP: the log level is warn"));
   folder.file("intervale.toml", "[serve]\nlog-level = \"loud\"\n");
   server.process().signal(SIGHUP);
-  EXPECT_TRUE(server.process().wait_for("the log level 'loud' of the configuration is none; it stays at warn"));
+  EXPECT_TRUE(server.process().wait_for("the configuration has an invalid log level 'loud'; the level stays at warn"));
 }
 
 TEST(Programs, SigtermEndsTheServerInOrderWhileAClientStreams) {

@@ -126,11 +126,11 @@ TEST(Tls, TheCertificateMayChangeWhileSessionsRun) {
   ServerUrl trusts_old = secured.url(), trusts_new = secured.url();
   trusts_old.access.authorities = before;
   EXPECT_TRUE(fetch_coarse(trusts_old)) << "nobody looked yet";
-  secured.server->refresh();
+  secured.server->reload();
   EXPECT_FALSE(fetch_coarse(trusts_old));
   EXPECT_TRUE(fetch_coarse(trusts_new));
   secured.folder.file("server.key", "half a key");
-  secured.server->refresh();
+  secured.server->reload();
   EXPECT_TRUE(fetch_coarse(trusts_new)) << "what cannot be read changes nothing";
 }
 

@@ -57,7 +57,7 @@ void check_tokens(const std::string& text) {
   require(tokens.has_value() == (sound && !expected.empty()), "a file is read if each line is right, and one is there");
   if (!tokens) {
     const std::string& message = tokens.error().message;
-    const bool told = message.starts_with("no tokens") || message.ends_with("+ / = are wanted") || message.ends_with("is there already");
+    const bool told = message.starts_with("no tokens") || message.ends_with("- . _ ~ + / =") || message.ends_with("duplicate token");
     require(told && message.size() < 100, "an error tells the line, and nothing of what is in it");
     return;
   }

@@ -20,7 +20,7 @@ class Said {
  public:
   explicit Said(LogFormat format, const std::string& level = "info") : before_(spdlog::default_logger()), level_(before_->level()) {
     spdlog::set_default_logger(std::make_shared<spdlog::logger>("said", std::make_shared<spdlog::sinks::ostream_sink_mt>(lines_)));
-    shape_log({.format = format, .level = level});
+    configure_log({.format = format, .level = level});
   }
   ~Said() {
     spdlog::set_default_logger(before_);
