@@ -13,27 +13,27 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kBrickBytes = 18;         // naming one takes at most: a step and a mask
-constexpr std::size_t kSupercubeBytes = 7;      // a word of slots
-constexpr std::size_t kPlaneBytes = 64;         // lengths of all planes
-constexpr std::size_t kSmallBatch = 8 << 10;    // a band's end closes a builder no smaller than this
-constexpr std::uint32_t kMaxVisited = 1 << 16;  // updates looked at before others get their turn
+constexpr std::size_t kBrickBytes = 18;         // most bytes that name a brick: a step and a mask
+constexpr std::size_t kSupercubeBytes = 7;      // a mask of slots
+constexpr std::size_t kPlaneBytes = 64;         // the lengths of all byte planes
+constexpr std::size_t kSmallBatch = 8 << 10;    // the end of a band closes a batch of this size or more
+constexpr std::uint32_t kMaxVisited = 1 << 16;  // supercubes and updates visited in one call of next()
 
 }  // namespace
 
-// The builder being put together.
+// The batch under construction.
 struct StreamPlan::BatchBuilder {
-  Surroundings around;              // of the supercube looked into
+  Surroundings around;              // of the supercube visited
   std::vector<Surroundings> above;  // of ancestors, by scale
   std::vector<SlotGroup> groups;
   boost::unordered_flat_map<std::uint32_t, std::uint32_t> group_of;  // by supercube
   boost::unordered_flat_set<std::uint32_t> bricks;
   std::size_t max_bytes = 0, bytes = kPlaneBytes;
   std::uint32_t updates = 0;
-  std::uint32_t visited = 0;  // updates looked at
+  std::uint32_t visited = 0;  // supercubes and updates
 
-  BatchBuilder(const IntervalVolume& volume, std::size_t most)
-      : around(volume.set()), above(kMaxLevels, Surroundings(volume.set())), max_bytes(most) {}
+  BatchBuilder(const IntervalVolume& volume, std::size_t max_payload)
+      : around(volume.set()), above(kMaxLevels, Surroundings(volume.set())), max_bytes(max_payload) {}
   SlotGroup* find(std::uint32_t supercube) {
     if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
     const auto found = group_of.find(supercube);
@@ -160,8 +160,9 @@ StreamPlan::Remaining StreamPlan::remaining() const {
   return remaining;
 }
 
-// Puts an update into the builder, after the ancestors it lacks. around: of its supercube; those of ancestors are kept too, for the next ones are
-// near by. False if the builder is full first; what went in is closed under parents all the same.
+// Adds an update after its missing ancestors. around: of its supercube; those of the ancestors are cached in the
+// builder, since the next update is near by. False if the batch is full first; even then the batch is closed under
+// parents.
 bool StreamPlan::add_with_ancestors(const Place& place, Surroundings& around, BatchBuilder& builder) {
   const Links& links = around.links(int(place.slot));
   const int parents = diamond_type(kTypeOfSlot[place.slot]).parents;
@@ -197,88 +198,88 @@ bool StreamPlan::add(const Place& place, BatchBuilder& builder) {
   return true;
 }
 
-// Takes what the band wants of a brick. False if the builder is full first.
+// Adds the updates of a brick that belong to the band. False if the batch is full first.
 bool StreamPlan::visit_brick(std::uint32_t brick, BatchBuilder& builder) {
   const SupercubeSet& set = volume_->set();
   const Ranking::Brick ranking = ranking_->of_brick(brick);
-  // Of what is left: no lower than any of it.
-  Rank most = 0;
-  unsigned left_wanted = 0, level = 0;
+  Unsent rest;
   float object_error = 0;
   bool full = false;
   set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
     if (full) return;
-    const UpdateIndex first = set.first(brick, s);
-    const std::uint64_t occupancy = set.occupancy()[s];
-    const auto count = unsigned(std::popcount(occupancy));
     ++builder.visited;
+    const UpdateIndex first = set.first(brick, s);
+    const auto count = unsigned(std::popcount(set.occupancy()[s]));
     const std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
-    const std::uint64_t may_be_sent = budget_ ? unsent & budget_->some(first, count) : unsent;
-    unsigned level_here = 0;
-    if (may_be_sent != 0) {
-      const Ranking::Supercube here = ranking.supercube(s, key);
-      level_here = volume_->level_of_half(half_levels_[s]);
-      const Rank bound = std::max(here.bound(level_here), budget_ ? Rank(1) : Rank(0));  // budget_ has ancestors too: they come last
-      if (bound < band_) {
-        most = std::max(most, bound);
-        left_wanted += bound == 0 ? 0 : unsigned(std::popcount(may_be_sent));
-      } else {
-        builder.visited += count;
-        builder.around.move_to(key);
-        const Left left = visit_supercube(here, {key, brick, s, 0, first}, occupancy, may_be_sent, builder);
-        full = left.full;
-        if (full) return;
-        most = std::max(most, left.most);
-        left_wanted += left.wanted;
-        level_here = left.level;
-        for (std::uint64_t others = unsent & ~may_be_sent; others != 0; others &= others - 1) {
-          level_here = std::max(level_here, volume_->error_level(first + UpdateIndex(std::countr_zero(others))));
-        }
-        half_levels_[s] = volume_->half_of_level(level_here);
-      }
-    } else if (unsent != 0) {
-      level_here = volume_->level_of_half(half_levels_[s]);
-    }
     if (unsent == 0) return;
-    level = std::max(level, level_here);
-    object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), level_here));
+    const auto here = visit_supercube(ranking, {key, brick, s, 0, first}, unsent, builder);
+    full = !here;
+    if (full) return;
+    rest.rank = std::max(rest.rank, here->rank);
+    rest.wanted += here->wanted;
+    rest.level = std::max(rest.level, here->level);
+    object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), here->level));
   });
   if (full) return false;
-  set_pending(brick, most, left_wanted);
-  pending_[brick].level = std::uint16_t(level);
+  set_pending(brick, rest.rank, rest.wanted);
+  pending_[brick].level = std::uint16_t(rest.level);
   pending_[brick].object_error = Up16(object_error);
   return true;
 }
 
-// Takes what the band wants of a supercube. place: its first update. may_be_sent: a bit for each of its updates, in their order.
-StreamPlan::Left StreamPlan::visit_supercube(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent,
-                                             BatchBuilder& builder) {
+// Adds the updates of a supercube that belong to the band, if it may have any. first: its first update. unsent: a bit
+// for each of its updates, in their order. nullopt if the batch is full first.
+std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent,
+                                                              BatchBuilder& builder) {
+  const std::uint32_t s = first.supercube;
+  const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
+  const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
+  Unsent rest{.level = volume_->level_of_half(half_levels_[s])};
+  if (candidates == 0) return rest;
+  const Ranking::Supercube ranking = brick.supercube(s, first.key);
+  // Ancestors in the budget come last.
+  const Rank bound = std::max(ranking.bound(rest.level), budget_ ? Rank(1) : Rank(0));
+  if (bound < band_) {
+    rest.rank = bound;
+    rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
+    return rest;
+  }
+  builder.visited += count;
+  builder.around.move_to(first.key);
+  rest = {};
+  if (!add_band(ranking, first, candidates, builder, rest)) return {};
+  for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
+    rest.level = std::max(rest.level, volume_->error_level(first.index + UpdateIndex(std::countr_zero(others))));
+  }
+  half_levels_[s] = volume_->half_of_level(rest.level);
+  return rest;
+}
+
+// Adds the candidates that belong to the band, and bounds the others in `rest`. False if the batch is full first.
+bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest) {
   const float in_band = ranking.least(band_), least = budget_ ? ranking.least(1) : 0;
   const UpdateIndex first = place.index;
-  Left left;
-  float most = 0;
-  unsigned at = 0;  // of the update last looked at, its number in the supercube, and 1
-  for (; may_be_sent != 0; may_be_sent &= may_be_sent - 1) {
-    const auto k = unsigned(std::countr_zero(may_be_sent));
-    for (; at <= k; ++at, occupancy &= occupancy - 1) place.slot = std::uint32_t(std::countr_zero(occupancy));
+  std::uint64_t slots = volume_->set().occupancy()[place.supercube];  // those of the updates from `at` on
+  float greatest = 0;
+  unsigned at = 0;
+  for (; candidates != 0; candidates &= candidates - 1) {
+    const auto k = unsigned(std::countr_zero(candidates));
+    for (; at <= k; ++at, slots &= slots - 1) place.slot = std::uint32_t(std::countr_zero(slots));
     const unsigned level = volume_->error_level(first + k);
     float importance = ranking.importance(level);
     if (importance > 0 && !ranking.meets_roi(int(place.slot))) importance = 0;
     importance = std::max(importance, least);
     if (importance > 0 && importance >= in_band) {
       place.index = first + k;
-      if (!add_with_ancestors(place, builder.around, builder)) {
-        left.full = true;
-        return left;
-      }
+      if (!add_with_ancestors(place, builder.around, builder)) return false;
       continue;
     }
-    left.level = std::max(left.level, level);
-    left.wanted += importance > 0;
-    most = std::max(most, importance);
+    rest.level = std::max(rest.level, level);
+    rest.wanted += importance > 0;
+    greatest = std::max(greatest, importance);
   }
-  left.most = ranking.rank(most);
-  return left;
+  rest.rank = ranking.rank(greatest);
+  return true;
 }
 
 std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {

@@ -1,9 +1,11 @@
-// What a session sends next: a pure function of the data set, what was asked for and what was sent. No I/O.
+// Selects what a session sends next: a pure function of the data set, the level of detail and the updates sent. No
+// I/O.
 //
-// Updates go out in bands of falling rank (ranking.h): errors within one differ by a factor of 2 on the screen, of 4 without a camera. Within a band
-// they go region by region, each with the ancestors it still lacks: neighbours share names and code tables, and a batch is small for what it holds. A
-// brick is looked into only when its turn comes, and what was found there is kept, so a new view costs a glance at each brick, and then what it
-// sends.
+// Updates are sent in bands of falling rank (ranking.h): within a band, errors differ by a factor of 2 on the screen,
+// or of 4 without a camera. Within a band they are sent region by region, each after its missing ancestors:
+// neighbours share names and code tables, which makes the batch smaller. Bounds of the unsent updates are kept for
+// each brick and supercube, and a brick is visited only if its bound is in the band: a new view costs O(bricks), and
+// then the work for what it sends.
 #pragma once
 
 #include <bit>
@@ -22,44 +24,47 @@
 
 namespace intervale {
 
-// A batch of updates, parents before children, as the client's StreamClient::apply takes it.
+// A batch of updates, parents before children.
 struct Batch {
-  std::vector<std::uint8_t> payload;  // update_codec.h
+  std::vector<std::uint8_t> payload;  // see common/codec/batch.h
   std::uint32_t updates = 0;
 };
 
-// The first batch is small, so that there is something to draw soon; each is twice the last, up to where a larger one gains nothing.
+// Payload of a view's first batch: small, so that there is a mesh to draw soon. Each further batch may be twice as
+// large, up to protocol::kMaxBatchPayload.
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
-// The stream of one session over one data set. One thread at a time. Beside the data set it takes one bit for each update, a byte for each supercube
-// and ten for each brick. Another bit for each update while there is a budget of updates.
+// The stream of one session over one data set. One thread at a time. Memory besides the data set: one bit for each
+// update (two with max_updates), a byte for each supercube and ten bytes for each brick.
 class StreamPlan {
  public:
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
-  // Takes for sent what the client says it has: slots of a supercube. False if the data set has no such updates. Before the first set_lod. What has
-  // not all its ancestors among them is the client's own trouble.
+  // Marks the updates that a resuming client has as sent: slots of a supercube. False if the data set has no such
+  // updates. Before the first set_lod(). If ancestors are missing, the client cannot use the updates; the server is
+  // not affected.
   bool resume(SupercubeKey key, std::uint64_t slots);
 
-  // Takes for not sent what the client gives up: Front::forget says which of these that is. False, and nothing done, if the data set has no such
-  // updates. groups: keys strictly ascending. Before the set_lod of the view that asks for it.
+  // Marks updates that the client forgets as not sent: those of the groups that Front::forget() removes, too. False,
+  // without any change, if the data set has no such updates. groups: keys strictly ascending. Before the set_lod() of
+  // the same view.
   bool forget(std::span<const SlotGroup> groups);
 
-  // The client keeps no more updates than this.
+  // The most updates that the client holds.
   void set_room(std::uint64_t updates) { room_ = updates; }
 
-  // Replaces what is wanted. lod: one that check_lod lets pass. What was sent stays sent, but for what forget() took back. O(bricks); with
-  // max_updates O(updates).
+  // Replaces the level of detail; check_lod(lod) must hold. O(bricks); with max_updates O(updates).
   void set_lod(const Lod& lod);
 
-  // The next batch. Nothing when all that is wanted has been sent, and when the search for more has taken long enough for one turn: done() tells.
-  // max_bytes, at least 256, bounds the payload as it would be if nothing could be compressed; it is about half of that.
+  // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call: done()
+  // tells which. max_bytes, at least 256, bounds the payload before compression, which takes about half of it.
   std::optional<Batch> next(std::size_t max_bytes);
   [[nodiscard]] bool done() const { return pending_bricks_ == 0 || is_full(); }
-  [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }  // there is no room for what is wanted
+  // More is wanted than the client may hold.
+  [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }
 
-  [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates that the client has, in all
-  // Of what is wanted for its own sake and not yet sent. All are bounds from above, and 0 when all has been sent.
+  [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates that the client holds
+  // Upper bounds over the updates that are wanted (not only as ancestors) and not sent; 0 when everything is sent.
   struct Remaining {
     std::uint64_t updates = 0;
     double error = 0;   // field units
@@ -70,44 +75,45 @@ class StreamPlan {
  private:
   using Rank = Ranking::Rank;
   struct BatchBuilder;
-  // A number that is not negative, rounded up by at most a hundredth.
+  // A non-negative float in 16 bits, rounded up by at most 1 %.
   struct Up16 {
     std::uint16_t bits = 0;
     Up16() = default;
     explicit Up16(float value) : bits(std::uint16_t((std::bit_cast<std::uint32_t>(value) + 0xffff) >> 16)) {}
     explicit operator float() const { return std::bit_cast<float>(std::uint32_t(bits) << 16); }
   };
-  // Of a brick. No brick has more updates than 64 * kSlots.
+  // The unsent updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
   struct Pending {
-    Rank rank = 0;             // no lower than that of any update wanted and not sent; 0: there is none
-    std::uint16_t unsent = 0;  // updates
-    std::uint16_t wanted = 0;  // of those, at most
-    std::uint16_t level = 0;   // of error: no lower than that of any not sent
-    Up16 object_error;         // no less than that of any not sent
+    Rank rank = 0;             // of those that are wanted; 0: there are none
+    std::uint16_t unsent = 0;  // their number
+    std::uint16_t wanted = 0;  // bound on the number of those that are wanted
+    std::uint16_t level = 0;   // of error
+    Up16 object_error;
   };
   void set_pending(std::uint32_t brick, Rank rank, unsigned wanted);
   void begin_band();
-  bool visit_brick(std::uint32_t brick, BatchBuilder& builder);
-  // Of a supercube, after a look.
-  struct Left {
-    bool full = false;  // the batch is: the rest is not known
-    Rank most = 0;
+  // Upper bounds over updates that were visited and not sent.
+  struct Unsent {
+    Rank rank = 0;
     unsigned wanted = 0, level = 0;
   };
-  Left visit_supercube(const Ranking::Supercube& ranking, Place place, std::uint64_t occupancy, std::uint64_t may_be_sent, BatchBuilder& builder);
+  bool visit_brick(std::uint32_t brick, BatchBuilder& builder);
+  std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent, BatchBuilder& builder);
+  bool add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest);
   bool add_with_ancestors(const Place& place, Surroundings& around, BatchBuilder& builder);
   bool add(const Place& place, BatchBuilder& builder);
 
   std::shared_ptr<const IntervalVolume> volume_;
   SplitSet sent_;
-  std::vector<Pending> pending_;           // by brick
-  std::vector<std::uint8_t> half_levels_;  // by supercube: of what is not sent, IntervalVolume::half_of_level() or more
+  std::vector<Pending> pending_;  // by brick
+  // By supercube: bound on the error level of the unsent updates, as half_of_level().
+  std::vector<std::uint8_t> half_levels_;
   std::optional<Ranking> ranking_;
-  std::optional<SplitSet> budget_;  // with a budget of updates: those within it
+  std::optional<SplitSet> budget_;  // with max_updates: the updates within the budget
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);
   std::uint32_t pending_bricks_ = 0;  // whose rank is not 0
   Rank band_ = 0;                     // the lowest rank of the current band
-  std::uint32_t next_brick_ = 0;      // the band goes from the last brick to the first; those below this one are still to come
+  std::uint32_t next_brick_ = 0;      // a band visits the bricks from last to first; those below this one are left
 };
 
 }  // namespace intervale
