@@ -19,7 +19,7 @@ using Bytes = std::span<const std::uint8_t>;
 fbs::Vector to_vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 std::array<double, 3> to_array(const fbs::Vector& v) { return {v.x(), v.y(), v.z()}; }
 
-// FlatBuffers' optionals and ours.
+// Between FlatBuffers' optional type and std::optional.
 flatbuffers::Optional<std::uint64_t> to_wire(const std::optional<std::uint64_t>& value) {
   return value ? flatbuffers::Optional<std::uint64_t>(*value) : flatbuffers::nullopt;
 }
@@ -97,11 +97,11 @@ Body encode_body(FlatBufferBuilder& out, const Fault& message) {
 
 std::vector<std::uint8_t> finished(FlatBufferBuilder& out) { return {out.GetBufferPointer(), out.GetBufferPointer() + out.GetSize()}; }
 
-// Decoding: each table, verified already, to its message.
+// Decoding: each verified table to its message.
 
 tl::unexpected<Error> malformed(const std::string& what) { return fail("malformed message: " + what); }
 
-// A string's or an array's length is known to lie within the message; here it is held to its own limit.
+// The verifier has checked that a string or array lies within the message; this checks its own limit.
 template <class Container>
 bool longer_than(const Container* container, std::size_t limit) {
   return container != nullptr && container->size() > limit;
@@ -191,7 +191,7 @@ Result<ServerMessage> decode_body(const fbs::Fault& table) {
   return Fault{CloseCode(table.code()), table.text()->str()};
 }
 
-// Bytes that begin at a multiple of 8, as FlatBuffers' scalars take for granted: these, or a copy of them.
+// The bytes at an address that is a multiple of 8, as FlatBuffers requires: the original, or a copy.
 class Aligned {
  public:
   explicit Aligned(Bytes bytes) : bytes_(bytes) {
@@ -233,7 +233,7 @@ std::vector<std::uint8_t> encode(const ServerMessage& message) {
 Result<ClientMessage> decode_client_message(Bytes bytes) {
   const Aligned aligned(bytes);
   const auto* root = verified<fbs::ClientMessage>(aligned.bytes());
-  if (root == nullptr) return malformed("not a client's message");
+  if (root == nullptr) return malformed("not a client message");
   switch (root->body_type()) {
     case fbs::ClientBody::Open:
       return decode_body(*root->body_as_Open());
@@ -246,13 +246,13 @@ Result<ClientMessage> decode_client_message(Bytes bytes) {
     case fbs::ClientBody::NONE:
       break;
   }
-  return malformed("of an unknown kind");  // the verifier lets kinds pass that it does not know
+  return malformed("unknown message type");  // the verifier accepts unknown union types
 }
 
 Result<ServerMessage> decode_server_message(Bytes bytes) {
   const Aligned aligned(bytes);
   const auto* root = verified<fbs::ServerMessage>(aligned.bytes());
-  if (root == nullptr) return malformed("not a server's message");
+  if (root == nullptr) return malformed("not a server message");
   switch (root->body_type()) {
     case fbs::ServerBody::Opened:
       return decode_body(*root->body_as_Opened());
@@ -265,7 +265,7 @@ Result<ServerMessage> decode_server_message(Bytes bytes) {
     case fbs::ServerBody::NONE:
       break;
   }
-  return malformed("of an unknown kind");
+  return malformed("unknown message type");
 }
 
 }  // namespace intervale::protocol

@@ -1,4 +1,4 @@
-// Messages to bytes and back. The only place that knows FlatBuffers.
+// Encodes and decodes messages. The only user of FlatBuffers.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,14 @@
 
 namespace intervale::protocol {
 
-// One WebSocket message. What is encoded must be within limits.h.
+// The bytes of one WebSocket message. The message must be within limits.h.
 [[nodiscard]] std::vector<std::uint8_t> encode(const ClientMessage& message);
 [[nodiscard]] std::vector<std::uint8_t> encode(const ServerMessage& message);
 
-// Bytes from outside. Structure is verified first, then meaning: strings and arrays within limits.h, levels of detail in order (errors finite
-// and not negative, percent 0 to 100, boxes min <= max), a batch's sizes within their bounds. Descriptions are checked further by
-// StreamClient::start, payloads by decompress. No allocation beyond the size of the bytes.
+// Untrusted bytes. The FlatBuffers verifier checks the structure; then the values are checked: strings and arrays
+// against limits.h, levels of detail (errors finite and not negative, percentages in [0, 100], boxes with min <=
+// max), the sizes of a batch. Not checked here: descriptions beyond that (see StreamClient::start) and payloads (see
+// apply_batch). Allocates no more than the size of the bytes.
 [[nodiscard]] Result<ClientMessage> decode_client_message(std::span<const std::uint8_t> bytes);
 [[nodiscard]] Result<ServerMessage> decode_server_message(std::span<const std::uint8_t> bytes);
 

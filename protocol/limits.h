@@ -1,4 +1,4 @@
-// Every maximum of the protocol, and why it is what it is. Sizes in bytes.
+// The limits of the protocol, with their reasons. Sizes in bytes.
 #pragma once
 
 #include <chrono>
@@ -7,50 +7,52 @@
 
 namespace intervale::protocol {
 
-// A client's largest messages are a Have, or a View that forgets: room for kMaxHave supercubes.
+// Largest message from a client: a Have, or a View that forgets, with kMaxHave supercubes.
 inline constexpr std::size_t kMaxClientMessage = 64 << 10;
 
-// Supercubes in one Have, or to be forgotten in one View: 25 bytes each at most, uncompressed.
+// Most supercubes in one Have, or forgotten in one View: at most 25 bytes each, uncompressed.
 inline constexpr std::size_t kMaxHave = 2048;
 
-// Largest payload of a Batch. A batch is cut by what it would take if nothing could be compressed; it takes about half of that, and 64 KiB keep a
-// batch's time on a slow line short (50 ms at 10 Mbit/s), so that a new view soon gets its turn.
+// Largest payload of a Batch, before compression, which about halves it. 64 KiB take 50 ms at 10 Mbit/s: short enough
+// that a new view soon gets its first batch.
 inline constexpr std::size_t kMaxBatchPayload = 128 << 10;
 
-// What a Batch message holds besides its payload, at most (the codec's tests hold it to that), and what a Batch costs in credit besides it.
+// Most bytes of a Batch message besides its payload (checked by the codec's tests), and what it costs in credit
+// besides it.
 inline constexpr std::size_t kBatchEnvelope = 160;
 
-// Largest message to a client: a Batch; an Opened is well below.
+// Largest message from the server: a Batch. An Opened is much smaller.
 inline constexpr std::size_t kMaxServerMessage = kMaxBatchPayload + kBatchEnvelope;
 
-// Smallest payload that a server cuts: a batch is still worth its envelope, and a client's byte budget is used up to about this.
+// Smallest bound on a payload: large against the envelope, and small enough that a client can use up its byte budget.
 inline constexpr std::size_t kMinPayload = 1 << 10;
 
-// With this much credit a batch of kMinPayload fits for certain, incompressible or not: below it the server may wait, at it, it may not.
+// Credit with which a batch of kMinPayload certainly fits. Below it the server may wait for credit; otherwise it must
+// send.
 inline constexpr std::uint64_t kMinCredit = kMinPayload + 256;
 
-// A client's usual window: a few batches, so that the line never runs dry at 20 ms round trip and 100 Mbit/s.
+// A client's default window: a few batches, enough for 100 Mbit/s at a round trip of 20 ms.
 inline constexpr std::uint64_t kDefaultWindow = 256 << 10;
 
-// Most credit outstanding: bounds what a session can have in flight; enough for 1 Gbit/s at 100 ms.
+// Most credit outstanding, which bounds the bytes in flight: enough for 1 Gbit/s at a round trip of 100 ms.
 inline constexpr std::uint64_t kMaxWindow = 16 << 20;
 
-// A file name's length, since a data set is named after its file.
+// Longest name of a data set: that of a file name, since data sets are named after their files.
 inline constexpr std::size_t kMaxName = 255;
 
-// Free text: a client's name, a fault's reason.
+// Longest free text: the client's name, the text of a Fault.
 inline constexpr std::size_t kMaxText = 200;
 
-// The base's bytes: 8 corners' sides and up to two cuts on each of 19 edges take far fewer.
+// Largest root patch: the sides of 8 corners and up to two cuts on each of 19 edges take far fewer bytes.
 inline constexpr std::size_t kMaxBase = 1024;
 
-// What the FlatBuffers verifier lets pass: the deepest message of ours nests 3 tables and has 3 in all.
+// Limits of the FlatBuffers verifier. The deepest message nests 3 tables, and has 3 in all.
 inline constexpr std::uint32_t kMaxDepth = 8;
 inline constexpr std::uint32_t kMaxTables = 16;
 
-inline constexpr std::chrono::seconds kHandshakeTime{10};  // from the WebSocket's start to Open, and for closing
-inline constexpr std::chrono::seconds kStallTime{120};     // how long updates wait for credit
-inline constexpr std::chrono::seconds kWriteTime{60};      // how long one message may take to leave the server
-inline constexpr std::chrono::seconds kIdleTime{60};       // silence, pings unanswered
+inline constexpr std::chrono::seconds kHandshakeTime{10};  // from the upgrade to Open, and for the closing handshake
+inline constexpr std::chrono::seconds kStallTime{120};     // without credit while there are updates to send
+inline constexpr std::chrono::seconds kWriteTime{60};      // for sending one message
+inline constexpr std::chrono::seconds kIdleTime{60};       // without any frame or pong
 
 }  // namespace intervale::protocol

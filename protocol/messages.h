@@ -1,4 +1,4 @@
-// The messages of intervale.v1 as plain structs. Who may send what when: PROTOCOL.md.
+// The messages of intervale.v1 as plain structs. PROTOCOL.md says who may send which message when.
 #pragma once
 
 #include <cstdint>
@@ -14,90 +14,93 @@
 
 namespace intervale::protocol {
 
-inline constexpr const char* kSubprotocol = "intervale.v1";  // the WebSocket subprotocol: client offers it, server confirms it
-// A client that cannot set headers offers its token beside it, as a subprotocol of this and the token in base64url without padding.
+inline constexpr const char* kSubprotocol = "intervale.v1";  // the WebSocket subprotocol
+// A client that cannot set headers offers its token as a second subprotocol: this prefix, then the token in base64url
+// without padding.
 inline constexpr const char* kTokenSubprotocol = "intervale.token.";
-inline constexpr const char* kPath = "/v1/stream";       // the WebSocket's path
-inline constexpr const char* kServerName = "intervale";  // how the server's HTTP Server header begins
+inline constexpr const char* kPath = "/v1/stream";       // the path of the WebSocket
+inline constexpr const char* kServerName = "intervale";  // how the HTTP field Server begins
 
-// Why a session ended, as the WebSocket's close code.
+// Why a session ended: WebSocket close codes.
 enum class CloseCode : std::uint16_t {
   normal = 1000,
-  going_away = 1001,    // the server shuts down
-  text_frame = 1003,    // a text frame, where only binary ones are spoken
-  internal = 1011,      // the server's own failure
-  malformed = 4400,     // a message that does not decode, or says what cannot be
-  unauthorized = 4401,  // no token, or one that opens nothing
-  forbidden = 4403,     // the token does not open this data set
+  going_away = 1001,    // the server shuts down, or has no capacity
+  text_frame = 1003,    // a text frame: only binary frames are allowed
+  internal = 1011,      // an internal error of the server
+  malformed = 4400,     // a message that cannot be decoded, or has invalid values
+  unauthorized = 4401,  // no valid token
+  forbidden = 4403,     // the token does not grant this data set
   no_such_dataset = 4404,
-  timed_out = 4408,     // no Open within the handshake time, or no credit while updates wait
+  timed_out = 4408,     // no Open, or no credit, in time
   out_of_order = 4409,  // a message that is not allowed in this state
-  too_large = 4413,     // a message, or a credit, over its limit
+  too_large = 4413,     // a message or the credit exceeds its limit
 };
 
 // Client to server.
 struct Open {
   std::string dataset;
-  std::string client;                        // name and version, for the server's log
-  std::uint64_t credit = 0;                  // first grant; see Credit
-  std::optional<std::uint64_t> resume = {};  // the content_hash of what the client holds updates of, and will name in Have
+  std::string client;        // its name and version, for the server's log
+  std::uint64_t credit = 0;  // first grant; see Credit
+  // Content_hash of the data set whose updates the client holds and will list in Have.
+  std::optional<std::uint64_t> resume = {};
   friend bool operator==(const Open&, const Open&) = default;
 };
-// What a client that resumes has split already: between Open and the first View, as many Haves as it takes.
+// The updates that a resuming client holds. Between Open and the first View, in as many messages as needed.
 struct Have {
   std::vector<SlotGroup> splits;  // at most kMaxHave; keys ascending; only keys and slots are sent
   friend bool operator==(const Have&, const Have&) = default;
 };
 struct View {
-  std::uint64_t epoch = 0;  // greater than that of the View before
+  std::uint64_t epoch = 0;  // greater than that of the previous View
   Lod lod;
-  std::optional<std::uint64_t> room = {};  // the most updates that the client keeps: no more are sent than make so many
-  // What it gives up for this view: at most kMaxHave; keys ascending; only keys and slots are sent. See Front::forget, which both sides do.
+  std::optional<std::uint64_t> room = {};  // most updates that the client holds; the server sends no more than that
+  // Updates that the client forgets: at most kMaxHave; keys ascending; only keys and slots are sent. Both sides apply
+  // the rule of Front::forget().
   std::vector<SlotGroup> forget = {};
   friend bool operator==(const View&, const View&) = default;
 };
 struct Credit {
-  std::uint64_t bytes = 0;  // so much more of Batch messages may come; see cost_of
+  std::uint64_t bytes = 0;  // additional bytes of Batch messages that the server may send; see cost_of
   friend bool operator==(const Credit&, const Credit&) = default;
 };
 using ClientMessage = std::variant<Open, View, Credit, Have>;
 
 // Server to client.
 struct SessionLimits {
-  std::uint64_t max_window = kMaxWindow;  // most credit that may be outstanding
-  std::uint64_t min_credit = kMinCredit;  // with at least this much outstanding the server sends if anything is wanted
+  std::uint64_t max_window = kMaxWindow;  // most credit outstanding
+  std::uint64_t min_credit = kMinCredit;  // with at least this credit the server sends, if there is anything to send
   std::uint64_t max_message = kMaxClientMessage;
   friend bool operator==(const SessionLimits&, const SessionLimits&) = default;
 };
 struct Opened {
   Description description;
   SessionLimits limits;
-  bool resumed = false;  // the data is what the client holds updates of: what it has is not sent again. Else it starts afresh.
+  bool resumed = false;  // the server does not send the updates in Have again; false: the client must discard them
   friend bool operator==(const Opened&, const Opened&) = default;
 };
 struct Batch {
   std::uint64_t epoch = 0;     // of the View it serves
   std::uint64_t sequence = 0;  // 0, 1, 2, … within a session
   std::uint32_t updates = 0;
-  // Of what the view wants and was not yet sent when this batch was made; bounds from above, 0 with the last batch.
+  // Upper bounds over the updates that the view wants and that are not yet sent; 0 in the last batch.
   double remaining_error = 0;   // the largest saturated error; field units
-  double remaining_pixels = 0;  // the largest error on the camera's screen; 0 without a camera
+  double remaining_pixels = 0;  // the largest error on the screen; 0 without a camera
   std::uint64_t updates_to_go = 0;
   std::vector<std::uint8_t> payload;  // updates; see common/codec/batch.h
   friend bool operator==(const Batch&, const Batch&) = default;
 };
-// The credit that a Batch takes: client and server count alike, and never less than the message's bytes.
+// The credit that a Batch uses, counted alike by client and server: at least the bytes of its message.
 [[nodiscard]] inline std::uint64_t cost_of(const Batch& batch) { return batch.payload.size() + kBatchEnvelope; }
 
 struct Done {
   std::uint64_t epoch = 0;
-  std::uint64_t updates_sent = 0;  // that the client has
-  bool full = false;               // there was no room for more, which may be wanted
+  std::uint64_t updates_sent = 0;  // updates that the client holds
+  bool full = false;               // the view wants more, but the client holds as many as it may (View::room)
   friend bool operator==(const Done&, const Done&) = default;
 };
 struct Fault {
   CloseCode code = CloseCode::internal;  // the close code that follows
-  std::string text;                      // one line for people
+  std::string text;                      // one line for users
   friend bool operator==(const Fault&, const Fault&) = default;
 };
 using ServerMessage = std::variant<Opened, Batch, Done, Fault>;

@@ -22,7 +22,7 @@ Result<std::shared_ptr<const TlsContext>> tls_for(const ServerUrl& url) {
 
 std::string tls_failure(const Stream& stream, const ServerUrl& url, const error_code& error) {
   const std::string who = "cannot trust the server at " + url.authority() + ": ";
-  if (const std::string why = stream.tls()->distrust(); !why.empty()) return who + why + "; --ca FILE names certificates to trust";
+  if (const std::string why = stream.tls()->verify_error(); !why.empty()) return who + why + "; --ca FILE names certificates to trust";
   return "cannot speak TLS with " + url.authority() + ": " + error.message() + "; is it a server without TLS (ws://)?";
 }
 

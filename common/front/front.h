@@ -83,7 +83,7 @@ class Front {
   [[nodiscard]] bool is_hidden(Handle handle) const;                      // split, but not shown
 
   // The mesh, in world coordinates.
-  [[nodiscard]] Mesh mesh(const ParallelFor& parallel = in_turn) const;
+  [[nodiscard]] Mesh mesh(const ParallelFor& parallel = serial) const;
 
   // Whether both are of one grid and base, and every diamond split here is split in `other` with the same side and cuts. The mesh depends on nothing
   // else. O(front).
@@ -105,7 +105,7 @@ class Front {
   // no more use.
   template <class CutCount, class Decode>
   std::optional<Vertex> split_all(const SupercubeSet& set, std::span<const SlotGroup> groups, const CutCount& cut_count, const Decode& decode,
-                                  const ParallelFor& parallel = in_turn, const OnProgress& progress = {});
+                                  const ParallelFor& parallel = serial, const OnProgress& progress = {});
 
  private:
   friend class FrontPatches;

@@ -20,7 +20,7 @@ struct Extraction {
 // The mesh of a level of detail, budgets included: best first, and never more than max_tets tetrahedra or max_updates updates. Fails on a lod that
 // check_lod refuses, and on a volume whose updates do not fit together (validate() says which).
 [[nodiscard]] Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const OnProgress& progress = {},
-                                         const ParallelFor& parallel = in_turn);
+                                         const ParallelFor& parallel = serial);
 
 // The mesh after the given updates, which must be closed under parents. apply: splits the diamond of a place, and says whether that could be done.
 [[nodiscard]] Result<Extraction> extract(const Grid& grid, const Base& base, const SupercubeSet& set, const SplitSet& split,

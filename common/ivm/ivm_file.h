@@ -16,13 +16,13 @@ namespace intervale {
 inline constexpr std::uint32_t kIvmVersion = 4;
 
 // The file's bytes. Equal volumes give equal bytes; the name is not stored.
-[[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = in_turn);
+[[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
 // The inverse, for bytes from outside: every checksum is compared, every count bounded by the bytes there are before anything is allocated.
 [[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name);
 
 // Writes aside and renames.
-[[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = in_turn);
+[[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
 // The bytes of a file that begins as one of these and is as long as it says, for decode_ivm: nothing is allocated for another. Errors begin with the
 // path.

@@ -7,9 +7,9 @@
 namespace intervale {
 namespace {
 
-// The parser reads "nan" and "inf" as numbers, which no option here means anything by.
+// The parser accepts "nan" and "inf", which are meaningless for these options.
 double finite(double value, const char* option) {
-  if (!std::isfinite(value)) throw CLI::ValidationError(option, "a finite number is wanted");
+  if (!std::isfinite(value)) throw CLI::ValidationError(option, "must be a finite number");
   return value;
 }
 
@@ -17,14 +17,15 @@ void add_count(CLI::App& app, const std::string& name, std::optional<std::uint64
   app.add_option_function<std::uint64_t>(
          name, [&count](std::uint64_t value) { count = value; }, description)
       ->check(
-          [](const std::string& text) { return std::string(text.starts_with('-') ? "must be at least 0" : ""); })  // the parser would wrap -1 around
+          // The parser would wrap -1 around.
+          [](const std::string& text) { return std::string(text.starts_with('-') ? "must be at least 0" : ""); })
       ->type_name("N")
       ->group("Level of detail");
 }
 
 using Vector = std::array<double, 3>;
 
-// --eye and what only means something with it.
+// --eye, and the options that need it.
 void add_camera_options(CLI::App& app, std::optional<Camera>& camera) {
   const auto set = [&camera](auto member) {
     return [&camera, member](const auto& value) {
@@ -33,21 +34,22 @@ void add_camera_options(CLI::App& app, std::optional<Camera>& camera) {
     };
   };
   const auto group = "View";
-  CLI::Option* eye = app.add_option_function<Vector>("--eye", set(&Camera::eye), "Where the camera is, in world coordinates: refine what it sees");
+  CLI::Option* eye =
+      app.add_option_function<Vector>("--eye", set(&Camera::eye), "Camera position in world coordinates: refines what the camera sees");
   eye->type_name("X Y Z")->group(group);
-  CLI::Option* at = app.add_option_function<Vector>("--look-at", set(&Camera::look_at), "The point in the middle of its picture");
+  CLI::Option* at = app.add_option_function<Vector>("--look-at", set(&Camera::look_at), "World point at the centre of the picture");
   at->type_name("X Y Z")->group(group)->needs(eye);
   eye->needs(at);
-  app.add_option_function<Vector>("--up", set(&Camera::up), "What is up in it (default 0 1 0)")->type_name("X Y Z")->group(group)->needs(eye);
-  app.add_option_function<double>("--fov", set(&Camera::fov), "How high it sees, in degrees (default 45)")
-      ->type_name("DEGREES")
+  app.add_option_function<Vector>("--up", set(&Camera::up), "Up direction of the camera (default 0 1 0)")
+      ->type_name("X Y Z")
       ->group(group)
       ->needs(eye);
-  app.add_option_function<std::array<int, 2>>("--viewport", set(&Camera::viewport), "The picture's size in pixels (default 1920 1080)")
+  app.add_option_function<double>("--fov", set(&Camera::fov), "Vertical field of view (default 45)")->type_name("DEGREES")->group(group)->needs(eye);
+  app.add_option_function<std::array<int, 2>>("--viewport", set(&Camera::viewport), "Size of the picture in pixels (default 1920 1080)")
       ->type_name("W H")
       ->group(group)
       ->needs(eye);
-  app.add_option_function<double>("--pixel-error", set(&Camera::pixel_error), "How far surfaces may be off in it, in pixels (default 1)")
+  app.add_option_function<double>("--pixel-error", set(&Camera::pixel_error), "Largest screen-space error of the surfaces (default 1)")
       ->type_name("PX")
       ->group(group)
       ->needs(eye);
@@ -58,7 +60,7 @@ Box box_of(const std::array<double, 6>& corners) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     box.min[axis] = finite(corners[axis], "--roi");
     box.max[axis] = finite(corners[axis + 3], "--roi");
-    if (box.min[axis] > box.max[axis]) throw CLI::ValidationError("--roi", "each of X0 Y0 Z0 must be at most the X1 Y1 Z1 that belongs to it");
+    if (box.min[axis] > box.max[axis]) throw CLI::ValidationError("--roi", "X0 Y0 Z0 must not be greater than X1 Y1 Z1");
   }
   return box;
 }
@@ -74,22 +76,22 @@ void add_lod_options(CLI::App& app, Lod& lod) {
     if (finite(value, "--error-percent") < 0 || value > 100) throw CLI::ValidationError("--error-percent", "must be 0 to 100");
     lod.error_percent = value;
   };
-  CLI::Option* error = app.add_option_function<double>("--error", set_error, "Largest error, in the field's units; 0: every update (default)");
-  CLI::Option* percent = app.add_option_function<double>("--error-percent", set_percent, "The same, in percent of the data set's max_error");
+  CLI::Option* error = app.add_option_function<double>("--error", set_error, "Largest error, in field units; 0: every update (default)");
+  CLI::Option* percent = app.add_option_function<double>("--error-percent", set_percent, "Largest error, in percent of the data set's max_error");
   error->type_name("E")->group("Level of detail");
   percent->type_name("P")->group("Level of detail")->excludes(error);
   app.add_option_function<std::array<double, 6>>(
          "--roi", [&lod](const std::array<double, 6>& corners) { lod.roi = box_of(corners); },
-         "World box refined to the error; elsewhere as coarse as conformity allows")
+         "World box refined to the error; outside, the mesh is as coarse as a mesh without cracks allows")
       ->type_name("X0 Y0 Z0 X1 Y1 Z1")
       ->group("Level of detail");
   add_camera_options(app, lod.camera);
-  add_count(app, "--max-tets", lod.max_tets, "Stop before the mesh has more tetrahedra, best first");
-  add_count(app, "--max-updates", lod.max_updates, "Stop after this many updates, best first");
+  add_count(app, "--max-tets", lod.max_tets, "Stop before the mesh has more tetrahedra; greatest errors first");
+  add_count(app, "--max-updates", lod.max_updates, "Stop after this many updates; greatest errors first");
 }
 
 void add_max_bytes_option(CLI::App& app, std::optional<std::uint64_t>& max_bytes) {
-  add_count(app, "--max-bytes", max_bytes, "Stop before more bytes are received, best first");
+  add_count(app, "--max-bytes", max_bytes, "Stop before more bytes are received; greatest errors first");
 }
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// The options of a level of detail, the same for every program that takes one.
+// The level-of-detail options, common to all programs.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,13 @@
 
 namespace intervale {
 
-// Adds --error, --error-percent, --roi, those of a camera from --eye to --pixel-error, --max-tets and --max-updates, which fill lod when the
-// arguments are read. Afterwards every number is finite, the error is at least 0, the percentage within 0 to 100, not both are given, and the box is
-// in order: what is not so is wrong usage. The camera is for check_lod to check. lod must outlive app.
+// Adds --error, --error-percent, --roi, the camera's options from --eye to --pixel-error, --max-tets and
+// --max-updates, which set lod when the arguments are parsed. Wrong usage: a number that is not finite, a negative
+// error, a percentage outside [0, 100], --error together with --error-percent, a box with min > max. check_lod()
+// checks the camera. lod must outlive app.
 void add_lod_options(CLI::App& app, Lod& lod);
 
-// --max-bytes: for programs that receive updates.
+// Adds --max-bytes, for programs that receive updates.
 void add_max_bytes_option(CLI::App& app, std::optional<std::uint64_t>& max_bytes);
 
 }  // namespace intervale

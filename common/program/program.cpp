@@ -19,7 +19,7 @@
 namespace intervale {
 namespace {
 
-// The parser's messages may hold line breaks; an error of ours is one line.
+// The parser's messages may contain line breaks; our errors are one line.
 std::string one_line(std::string text) {
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) text.pop_back();
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -32,12 +32,12 @@ std::string environment_name(const std::string& long_name) {
   return name;
 }
 
-void name_in_environment(CLI::App& app) {
+void set_environment_names(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
     const auto& names = option->get_lnames();
     if (names.empty() || names.front() == "help" || names.front() == "version" || !option->get_envname().empty()) continue;
     option->envname(environment_name(names.front()));
-    if (option->get_items_expected_max() > 1) option->delimiter(',');  // the environment holds one string only
+    if (option->get_items_expected_max() > 1) option->delimiter(',');  // a variable is one string
   }
 }
 
@@ -46,13 +46,13 @@ void name_in_environment(CLI::App& app) {
 Program::Program(std::string name, std::string description) : name_(std::move(name)), app_(std::move(description), name_) {
   app_.require_subcommand(1);
   app_.set_version_flag("--version", name_ + " " INTERVALE_VERSION);
-  app_.set_config("--config", "", "Options from a TOML or INI file, a section for each command");
+  app_.set_config("--config", "", "Read options from a TOML or INI file, with a section for each command");
   app_.allow_config_extras(CLI::config_extras_mode::error);
 }
 
 CLI::App& Program::add_command(const std::string& name, const std::string& description, std::function<Result<void>()> body) {
   CLI::App& command = *app_.add_subcommand(name, description);
-  command.fallthrough();  // --config may come after the command too
+  command.fallthrough();  // --config is also accepted after the command
   commands_.emplace_back(&command, std::move(body));
   return command;
 }
@@ -64,9 +64,9 @@ CLI::App& Program::only_command(std::function<Result<void>()> body) {
 }
 
 int Program::run(int argc, const char* const* argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a reader that left is an error to report
-  name_in_environment(app_);
-  for (auto& [command, body] : commands_) name_in_environment(*command);
+  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error to report, not a signal
+  set_environment_names(app_);
+  for (auto& [command, body] : commands_) set_environment_names(*command);
   try {
     app_.parse(argc, argv);
   } catch (const CLI::Success& asked) {  // --help, --version: not errors
@@ -74,32 +74,32 @@ int Program::run(int argc, const char* const* argv) {
   } catch (const CLI::Error& error) {
     const auto begun = app_.get_subcommands();
     const std::string of = begun.empty() ? "" : begun.front()->get_name() + " ";
-    const bool is_none = begun.empty() && argc > 1 && argv[1][0] != '-' && !app_.get_subcommands([](const CLI::App*) { return true; }).empty();
-    const std::string what = is_none ? "there is no command '" + std::string(argv[1]) + "'" : one_line(error.what());
-    return complain(what + " (see " + name_ + " " + of + "--help)", kExitUsage);
+    const bool is_unknown = begun.empty() && argc > 1 && argv[1][0] != '-' && !app_.get_subcommands([](const CLI::App*) { return true; }).empty();
+    const std::string what = is_unknown ? "unknown command '" + std::string(argv[1]) + "'" : one_line(error.what());
+    return report(what + " (see " + name_ + " " + of + "--help)", kExitUsage);
   }
   try {
     for (auto& [command, body] : commands_) {
       if (!command->parsed()) continue;
-      if (auto result = body(); !result) return complain(result.error().message, result.error().usage ? kExitUsage : kExitFailed);
+      if (auto result = body(); !result) return report(result.error().message, result.error().usage ? kExitUsage : kExitFailed);
     }
   } catch (const std::bad_alloc&) {
-    return complain("out of memory", kExitFailed);
+    return report("out of memory", kExitFailed);
   } catch (const std::exception& exception) {
-    return complain(exception.what(), kExitFailed);
+    return report(exception.what(), kExitFailed);
   }
   return kExitDone;
 }
 
-int Program::complain(const std::string& message, ExitStatus status) const {
+int Program::report(const std::string& message, ExitStatus status) const {
   const std::string line = name_ + ": " + printable(one_line(message)) + "\n";
   std::fwrite(line.data(), 1, line.size(), stderr);
   return status;
 }
 
-CLI::Option* add_json_flag(CLI::App& app, bool& json) { return app.add_flag("--json", json, "Print the figures as one JSON object"); }
+CLI::Option* add_json_flag(CLI::App& app, bool& json) { return app.add_flag("--json", json, "Print the results as one JSON object"); }
 CLI::Option* add_digest_flag(CLI::App& app, bool& digest) {
-  return app.add_flag("--digest", digest, "Say the mesh's digest too: equal for equal meshes, whatever the order of what is in them");
+  return app.add_flag("--digest", digest, "Print a digest of the mesh: equal for equal meshes, whatever the order of vertices and tetrahedra");
 }
 
 Result<void> print(const std::string& text) {

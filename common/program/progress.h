@@ -1,4 +1,4 @@
-// Progress of long work: one line on a terminal, nothing in a pipe.
+// Progress of long work: one line on a terminal, nothing if stderr is not a terminal.
 #pragma once
 
 #include <chrono>
@@ -7,17 +7,17 @@
 
 namespace intervale {
 
-// A line on stderr that rewrites itself, at most ten times a second, and is wiped when this goes. Any thread may call.
+// A line on stderr, rewritten at most ten times a second, and erased on destruction. Any thread.
 class Progress {
  public:
-  explicit Progress(std::string what);  // what is being done: "building tooth"
+  explicit Progress(std::string what);  // the work: "building tooth"
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   void fraction(double done);           // 0 to 1
-  void text(const std::string& state);  // anything short
-  void note(const std::string& line);   // a line that stays, also in a pipe
+  void text(const std::string& state);  // any short text
+  void note(const std::string& line);   // prints a line that stays, also without a terminal
   [[nodiscard]] bool is_seen() const { return terminal_; }
 
  private:

@@ -24,15 +24,15 @@ tl::unexpected<Error> failed(const char* what, const std::filesystem::path& path
   return fail(std::string("cannot ") + what + " '" + path.string() + "': " + std::generic_category().message(error));
 }
 
-// A link is followed, so that the file it points to is replaced and not the link itself.
-std::filesystem::path followed(const std::filesystem::path& path) {
+// The file that a link points to is replaced, not the link.
+std::filesystem::path resolve_link(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::is_symlink(path, ignored)) return path;
   const auto target = std::filesystem::canonical(path, ignored);
   return target.empty() ? path : target;
 }
 
-// Short whatever the final name is: a name beside one of 255 bytes must itself fit into 255.
+// Short, and independent of the final name, which may already have 255 bytes, the most that a file system permits.
 std::string unique_name() {
   static std::atomic<std::uint64_t> counter{0};
   static const std::uint64_t salt = std::random_device{}();
@@ -52,11 +52,12 @@ Result<void> write_all(int descriptor, const std::byte* data, std::size_t size, 
   return {};
 }
 
-// Makes the renaming itself survive a power cut. File systems that cannot sync a folder say so with EINVAL, which harms nothing.
+// Makes the rename durable. EINVAL: the file system cannot sync folders, which is no error.
 Result<void> sync_folder(const std::filesystem::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0)
-    return errno == EACCES ? Result<void>{} : failed("open the folder", folder, errno);  // writable but not readable: no way to sync
+    // Writable but not readable: cannot be synced.
+    return errno == EACCES ? Result<void>{} : failed("open the folder", folder, errno);
   const int error = ::fsync(descriptor) == 0 ? 0 : errno;
   ::close(descriptor);
   if (error != 0 && error != EINVAL) return failed("sync the folder", folder, error);
@@ -84,31 +85,33 @@ AtomicFile::~AtomicFile() {
   if (!beside_.empty()) ::unlink(beside_.c_str());
 }
 
-Result<AtomicFile> AtomicFile::create(const std::filesystem::path& wanted) {
-  if (wanted.empty()) return misuse("the output file has no name");
-  const auto path = followed(wanted);
+Result<AtomicFile> AtomicFile::create(const std::filesystem::path& requested) {
+  if (requested.empty()) return misuse("the name of the output file is empty");
+  const auto path = resolve_link(requested);
   struct stat status {};
   const bool exists = ::stat(path.c_str(), &status) == 0;
-  if (exists && S_ISDIR(status.st_mode)) return fail("cannot write '" + path.string() + "': it is a folder; name a file in it");
+  if (exists && S_ISDIR(status.st_mode)) return fail("cannot write '" + path.string() + "': it is a folder: name a file in it");
   if (exists && !S_ISREG(status.st_mode)) {
-    // A device or a pipe: to rename over it would destroy it, and there is nothing half written to hide. beside_ stays empty.
+    // A device or a pipe: a rename would replace it with a file, and it has no contents to protect. beside_ stays
+    // empty.
     const int descriptor = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
     if (descriptor < 0) return failed("write", path, errno);
     return AtomicFile(path, {}, descriptor);
   }
-  if (!path.has_filename()) return fail("cannot write '" + path.string() + "': it names a folder; name a file in it");
+  if (!path.has_filename()) return fail("cannot write '" + path.string() + "': it is a folder: name a file in it");
   const auto folder = folder_of(path);
   for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
     auto beside = folder / unique_name();
     const int descriptor = ::open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor >= 0) {
-      if (exists) (void)::fchmod(descriptor, status.st_mode & 07777);  // a replaced file keeps its permissions where the system lets it
+      // Keeps the permissions of the replaced file, if permitted.
+      if (exists) (void)::fchmod(descriptor, status.st_mode & 07777);
       return AtomicFile(path, std::move(beside), descriptor);
     }
-    if (errno == ENOENT) return fail("cannot write '" + path.string() + "': the folder '" + folder.string() + "' does not exist; make it first");
+    if (errno == ENOENT) return fail("cannot write '" + path.string() + "': the folder '" + folder.string() + "' does not exist");
     if (errno != EEXIST) return failed("write", path, errno);
   }
-  return failed("find a free name beside", path, EEXIST);
+  return failed("create a temporary file beside", path, EEXIST);
 }
 
 Result<void> AtomicFile::flush() {
@@ -118,7 +121,7 @@ Result<void> AtomicFile::flush() {
 }
 
 Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
-  assert(descriptor_ >= 0 && "written after commit()");
+  assert(descriptor_ >= 0 && "write() after commit()");
   if (buffer_.size() + bytes.size() > kBufferBytes) {
     if (auto flushed = flush(); !flushed) return flushed;
     if (bytes.size() >= kBufferBytes) return write_all(descriptor_, bytes.data(), bytes.size(), path_);
@@ -128,9 +131,9 @@ Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
 }
 
 Result<void> AtomicFile::commit() {
-  assert(descriptor_ >= 0 && "committed twice");
+  assert(descriptor_ >= 0 && "second commit()");
   if (auto flushed = flush(); !flushed) return flushed;
-  // Without the sync before the rename a power cut may leave the new name with no contents. Pipes and some devices cannot sync.
+  // Without a sync before the rename, a power failure may leave an empty file. Pipes and some devices cannot sync.
   if (::fsync(descriptor_) != 0 && !beside_.empty()) return failed("write", path_, errno);
   const int descriptor = std::exchange(descriptor_, -1);
   const int close_error = ::close(descriptor) == 0 ? 0 : errno;

@@ -1,4 +1,4 @@
-// Writing a file so that nobody ever sees half of it.
+// Writes files atomically: readers see the old file or the complete new one.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace intervale {
 
-// A file being written beside its final place. commit() syncs and renames; destruction without commit removes what was written.
+// A temporary file beside the final path. commit() syncs and renames it; destruction without commit() removes it.
 class AtomicFile {
  public:
   static Result<AtomicFile> create(const std::filesystem::path& path);
@@ -18,8 +18,8 @@ class AtomicFile {
   AtomicFile& operator=(AtomicFile&&) = delete;
   ~AtomicFile();
 
-  Result<void> write(
-      std::span<const std::byte> bytes);  // appends; buffered; an error names the path and the system's reason ("No space left on device")
+  // Appends, with a buffer of 1 MiB. Errors name the path and the system's reason ("No space left on device").
+  Result<void> write(std::span<const std::byte> bytes);
   Result<void> commit();
 
  private:

@@ -1,4 +1,4 @@
-// Numbers as text.
+// Formats numbers.
 #pragma once
 
 #include <array>
@@ -11,11 +11,11 @@
 
 namespace intervale {
 
-// The shortest decimal that reads back as the same value. The text lies in `digits`.
+// The shortest decimal that parses to the same value. The result points into `digits`.
 template <class T>
 std::string_view decimal(T value, std::array<char, 32>& digits) {
 #ifndef __cpp_lib_to_chars
-  if constexpr (std::is_floating_point_v<T>) {  // Emscripten's library has it for whole numbers only
+  if constexpr (std::is_floating_point_v<T>) {  // libc++ of Emscripten has to_chars for integers only
     int size = 0;
     for (int precision = 1; precision <= 17; ++precision) {
       size = std::snprintf(digits.data(), digits.size(), "%.*g", precision, double(value));

@@ -1,4 +1,4 @@
-// How independent pieces of work are run. This layer knows no threads: whoever has some passes a way to use them.
+// An interface for parallel loops. The common layer creates no threads: the caller passes a ParallelFor.
 #pragma once
 
 #include <cstddef>
@@ -6,14 +6,14 @@
 
 namespace intervale {
 
-// Calls piece(i) for every i in [0, count), in any order, perhaps on many threads, and returns when all are done.
+// Calls piece(i) for every i in [0, count), in any order, possibly on several threads. Returns when all calls are done.
 using ParallelFor = std::function<void(std::size_t count, const std::function<void(std::size_t)>& piece)>;
 
-// Called with the share done, 0 to 1, now and then, by the thread that waits for the work.
+// Called from time to time with the fraction done, 0 to 1, by the thread that called the computation.
 using OnProgress = std::function<void(double)>;
 
-// One after the other.
-inline void in_turn(std::size_t count, const std::function<void(std::size_t)>& piece) {
+// A ParallelFor that runs on the calling thread.
+inline void serial(std::size_t count, const std::function<void(std::size_t)>& piece) {
   for (std::size_t i = 0; i < count; ++i) piece(i);
 }
 

@@ -1,4 +1,4 @@
-// Text from outside, for a terminal or a log: whoever chose a file's or a data set's name must not choose what a terminal does.
+// Makes untrusted text, such as the name of a file or data set, safe for a terminal or a log.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace intervale {
 
-// Control characters are '?' each: line breaks, escapes, DEL, and those of U+0080 to U+009F, which begin escapes too. All else stays as it is, what
-// is no UTF-8 too.
+// Replaces each control character by '?': line breaks, escapes, DEL, and U+0080 to U+009F, which also begin escape
+// sequences. All else is unchanged, including bytes that are not UTF-8.
 [[nodiscard]] inline std::string printable(std::string_view text) {
   std::string shown;
   for (std::size_t i = 0; i < text.size(); ++i) {

@@ -1,4 +1,4 @@
-// What a function gives back that can fail through no fault of the program: a value, or one line that says what, where, and the mend.
+// The result of a function that can fail because of its input or environment: a value, or one line of text.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 namespace intervale {
 
 struct Error {
-  std::string message;  // one line, no full stop at its end: what is wrong, where, and what would mend it
-  bool usage = false;   // the caller asked for something that makes no sense (exit status 2), rather than something that failed (1)
+  std::string message;  // one line without a full stop: what is wrong, where, and how to correct it
+  bool usage = false;   // wrong usage (exit status 2), not a failure (1)
 };
 
 template <class T>

@@ -1,7 +1,8 @@
-// What Beast speaks HTTP and WebSocket over: TCP, or TLS over TCP, chosen when running. Brings in Asio.
+// The stream beneath HTTP and WebSocket: TCP, or TLS over TCP, chosen at run time. Includes Asio.
 //
-// Beast's own way, a template for either, would compile all that is above it twice, a minute more. Here it is compiled once: plain TCP goes straight
-// to the socket, and TLS through a call whose handler's type is forgotten, which is nothing beside enciphering.
+// Beast's usual way, a template over the stream type, would compile everything above it twice, which takes a minute
+// more. Here plain TCP calls the socket directly, and TLS goes through a type-erased handler, whose cost is small
+// beside encryption.
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
@@ -20,7 +21,7 @@
 
 namespace intervale {
 
-// One thread at a time. Beast's AsyncStream. A moved-from one can be closed and destroyed.
+// A model of Beast's AsyncStream. One thread at a time. A moved-from stream can be closed and destroyed.
 class Stream {
  public:
   using executor_type = boost::asio::any_io_executor;
@@ -35,26 +36,25 @@ class Stream {
   Socket& socket() { return *socket_; }
   [[nodiscard]] const Tls* tls() const { return tls_.get(); }
 
-  // From here on TLS is spoken, from the handshake on. See make_tls.
+  // Use TLS from now on, beginning with async_handshake(). See make_tls().
   void use_tls(std::shared_ptr<const TlsContext> context, const std::string& host = {}) { tls_ = make_tls(*socket_, std::move(context), host); }
 
-  // Cuts it. What is under way fails.
+  // Closes the socket. Pending operations fail.
   void close() {
     Error ignored;
     if (socket_) socket_->close(ignored);
   }
 
-  // void(Error). Done at once without TLS.
+  // Completes with void(Error); at once without TLS.
   template <class Token>
   auto async_handshake(Token&& token) {
-    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { this->tls_or_nothing(std::move(handler), &Tls::handshake); },
-                                                           token);
+    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { this->run_with_tls(std::move(handler), &Tls::handshake); }, token);
   }
 
-  // Says good-bye within TLS, and waits for the answer. void(Error). Done at once without TLS.
+  // Sends the TLS close_notify, and waits for the peer's. Completes with void(Error); at once without TLS.
   template <class Token>
   auto async_shutdown(Token&& token) {
-    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { this->tls_or_nothing(std::move(handler), &Tls::shutdown); }, token);
+    return boost::asio::async_initiate<Token, void(Error)>([this](auto handler) { this->run_with_tls(std::move(handler), &Tls::shutdown); }, token);
   }
 
   template <class Buffers, class Token>
@@ -62,7 +62,7 @@ class Stream {
     return boost::asio::async_initiate<Token, void(Error, std::size_t)>(
         [this](auto handler, const Buffers& into) {
           if (!tls_) return socket_->async_read_some(into, std::move(handler));
-          tls_->read_some(first_of(into), forget_type(std::move(handler)));
+          tls_->read_some(first_of(into), erase_type(std::move(handler)));
         },
         token, buffers);
   }
@@ -72,15 +72,15 @@ class Stream {
     return boost::asio::async_initiate<Token, void(Error, std::size_t)>(
         [this](auto handler, const Buffers& from) {
           if (!tls_) return socket_->async_write_some(from, std::move(handler));
-          // One record, however many pieces it is in.
-          tls_->write_some(boost::asio::buffer_copy(tls_->room(), from), forget_type(std::move(handler)));
+          // All buffers in one TLS record.
+          tls_->write_some(boost::asio::buffer_copy(tls_->write_buffer(), from), erase_type(std::move(handler)));
         },
         token, buffers);
   }
 
  private:
   template <class Handler>
-  auto forget_type(Handler handler) {
+  auto erase_type(Handler handler) {
     return [shared = std::make_shared<Handler>(std::move(handler)), executor = get_executor()](Error error, auto... more) {
       boost::asio::dispatch(boost::asio::get_associated_executor(*shared, executor),
                             [shared, error, more...] { std::move (*shared)(error, more...); });
@@ -88,8 +88,8 @@ class Stream {
   }
 
   template <class Handler>
-  void tls_or_nothing(Handler handler, void (Tls::*act)(Tls::Done)) {
-    if (tls_) return ((*tls_).*act)(forget_type(std::move(handler)));
+  void run_with_tls(Handler handler, void (Tls::*act)(Tls::Done)) {
+    if (tls_) return ((*tls_).*act)(erase_type(std::move(handler)));
     auto executor = boost::asio::get_associated_executor(handler, get_executor());
     boost::asio::post(executor, [done = std::move(handler)]() mutable { std::move(done)(Error()); });
   }
@@ -103,11 +103,11 @@ class Stream {
     return {};
   }
 
-  std::unique_ptr<Socket> socket_;  // where it stays, for TLS refers to it
+  std::unique_ptr<Socket> socket_;  // on the heap: TLS refers to it, also after a move
   std::unique_ptr<Tls> tls_;
 };
 
-// How Beast's WebSocket ends a stream: at once, and in order.
+// Beast's WebSocket calls these to close the stream: at once, or in order.
 inline void beast_close_socket(Stream& stream) { stream.close(); }
 
 inline void teardown(boost::beast::role_type role, Stream& stream, boost::system::error_code& error) {

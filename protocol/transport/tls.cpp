@@ -22,10 +22,12 @@ struct TlsContext::Parts {
 
 namespace {
 
-constexpr std::size_t kRecord = 16 << 10;                                                      // TLS' largest
-constexpr std::array<unsigned char, 9> kProtocols{8, 'h', 't', 't', 'p', '/', '1', '.', '1'};  // as ALPN has them
+constexpr std::size_t kRecord = 16 << 10;  // the largest TLS record
+// In the wire format of ALPN.
+constexpr std::array<unsigned char, 9> kProtocols{8, 'h', 't', 't', 'p', '/', '1', '.', '1'};
 
-// What is chosen is pointed to, in kProtocols: HTTP/1.1, if the client says what it speaks at all; a client that speaks something else only may try.
+// Selects HTTP/1.1, if the client offers it. A client that offers only other protocols is not rejected. *chosen
+// points into kProtocols.
 int choose_protocol(SSL*, const unsigned char** chosen, unsigned char* size, const unsigned char* offered, unsigned int offered_size, void*) {
   unsigned char* found = nullptr;
   if (SSL_select_next_proto(&found, size, kProtocols.data(), kProtocols.size(), offered, offered_size) != OPENSSL_NPN_NEGOTIATED)
@@ -37,7 +39,7 @@ int choose_protocol(SSL*, const unsigned char** chosen, unsigned char* size, con
 void set_up(SSL_CTX* context) {
   SSL_CTX_set_min_proto_version(context, TLS1_2_VERSION);
   SSL_CTX_set_options(context, SSL_OP_NO_COMPRESSION | SSL_OP_NO_RENEGOTIATION);
-  SSL_CTX_set_mode(context, SSL_MODE_RELEASE_BUFFERS);  // idle connections hold 34 kB less
+  SSL_CTX_set_mode(context, SSL_MODE_RELEASE_BUFFERS);  // saves 34 kB for each idle connection
   SSL_CTX_set_session_cache_mode(context, SSL_SESS_CACHE_OFF);
 }
 
@@ -61,10 +63,10 @@ class TlsOverTcp : public Tls {
     stream_.async_handshake(context_->parts().is_server ? ssl::stream_base::server : ssl::stream_base::client, std::move(done));
   }
   void read_some(asio::mutable_buffer buffer, DoneBytes done) override { stream_.async_read_some(buffer, std::move(done)); }
-  asio::mutable_buffer room() override { return asio::buffer(record_); }
+  asio::mutable_buffer write_buffer() override { return asio::buffer(record_); }
   void write_some(std::size_t bytes, DoneBytes done) override { stream_.async_write_some(asio::buffer(record_.data(), bytes), std::move(done)); }
   void shutdown(Done done) override { stream_.async_shutdown(std::move(done)); }
-  std::string distrust() const override {
+  std::string verify_error() const override {
     const long result = SSL_get_verify_result(const_cast<ssl::stream<tcp::socket&>&>(stream_).native_handle());
     return result == X509_V_OK ? std::string() : X509_verify_cert_error_string(result);
   }
@@ -90,7 +92,7 @@ Result<std::shared_ptr<const TlsContext>> TlsContext::server(const std::filesyst
   if (error) return fail("cannot read the certificate " + certificate.string() + ": " + error.message());
   parts->context.use_private_key_file(key.string(), ssl::context::pem, error);
   if (!error && SSL_CTX_check_private_key(handle) != 1) error = boost::system::errc::make_error_code(boost::system::errc::invalid_argument);
-  if (error) return fail("cannot read the key " + key.string() + ", or it is not that of " + certificate.string() + ": " + error.message());
+  if (error) return fail("cannot read the key " + key.string() + ", or it does not match " + certificate.string() + ": " + error.message());
   return std::shared_ptr<const TlsContext>(new TlsContext(std::move(parts)));
 }
 
@@ -102,12 +104,12 @@ Result<std::shared_ptr<const TlsContext>> TlsContext::client(const std::optional
   parts->context.set_verify_mode(ssl::verify_peer);
   boost::system::error_code error;
   if (authorities) {
-    // Whatever stands in the file is trusted for itself: a server's own certificate does, without anyone who signed it.
+    // Every certificate in the file is trusted itself: a server's own certificate is enough, without its issuer.
     X509_VERIFY_PARAM_set_flags(SSL_CTX_get0_param(handle), X509_V_FLAG_PARTIAL_CHAIN);
     parts->context.load_verify_file(authorities->string(), error);
     if (error) return fail("cannot read the certificates in " + authorities->string() + ": " + error.message());
   } else {
-    parts->context.set_default_verify_paths(error);  // none is not an error: then nobody is trusted
+    parts->context.set_default_verify_paths(error);  // not an error if there is none: then no certificate is trusted
   }
   return std::shared_ptr<const TlsContext>(new TlsContext(std::move(parts)));
 }

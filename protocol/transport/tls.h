@@ -1,4 +1,4 @@
-// TLS behind a narrow interface: OpenSSL, and what Asio makes of it, take long to compile and stay in tls.cpp.
+// TLS behind a narrow interface: OpenSSL and asio::ssl take long to compile, and are included in tls.cpp only.
 #pragma once
 
 #include <boost/asio/buffer.hpp>
@@ -16,21 +16,23 @@
 
 namespace intervale {
 
-// What one end needs to speak TLS (1.2 at least). Immutable and shared; each connection keeps what it began with.
+// Certificates and settings of one end; TLS 1.2 or later. Immutable and shared; a connection keeps the context it
+// began with.
 class TlsContext {
  public:
-  // A server that shows the certificates of a PEM file, its own first, and has the key of another. Failures: files that cannot be read or do not
-  // belong together.
+  // A server with the certificate chain of a PEM file, its own certificate first, and the private key of another.
+  // Failures: files that cannot be read; a key that does not match the certificate.
   static Result<std::shared_ptr<const TlsContext>> server(const std::filesystem::path& certificate, const std::filesystem::path& key);
 
-  // A client that trusts the certificates of a PEM file, or without one those that the system does. Failures: a file that cannot be read.
+  // A client that trusts the certificates of a PEM file, or if there is none those of the system. Failure: the file
+  // cannot be read.
   static Result<std::shared_ptr<const TlsContext>> client(const std::optional<std::filesystem::path>& authorities);
 
   ~TlsContext();
   TlsContext(const TlsContext&) = delete;
   TlsContext& operator=(const TlsContext&) = delete;
 
-  // When the server's own certificate expires.
+  // The expiry of the server's own certificate.
   [[nodiscard]] std::chrono::system_clock::time_point expires() const;
 
   struct Parts;
@@ -41,7 +43,8 @@ class TlsContext {
   std::unique_ptr<Parts> parts_;
 };
 
-// One connection's TLS. Operations are started and complete on the socket's executor; one read, and one of the others, at a time.
+// TLS of one connection. Operations start and complete on the socket's executor. At a time: one read, and one other
+// operation.
 class Tls {
  public:
   using Error = boost::system::error_code;
@@ -51,15 +54,17 @@ class Tls {
   virtual ~Tls() = default;
   virtual void handshake(Done done) = 0;
   virtual void read_some(boost::asio::mutable_buffer buffer, DoneBytes done) = 0;
-  // Room for what is to be written next: copy there, then write_some so many bytes of it. Room is taken when done.
-  [[nodiscard]] virtual boost::asio::mutable_buffer room() = 0;
+  // The buffer for the next write: copy the bytes there, then call write_some() with their number. In use until that
+  // completes.
+  [[nodiscard]] virtual boost::asio::mutable_buffer write_buffer() = 0;
   virtual void write_some(std::size_t bytes, DoneBytes done) = 0;
-  virtual void shutdown(Done done) = 0;  // says good-bye, and waits for the other side's
-  // Why the other side's certificate was not trusted, for people; empty if that is not what went wrong.
-  [[nodiscard]] virtual std::string distrust() const = 0;
+  virtual void shutdown(Done done) = 0;  // sends close_notify, and waits for the peer's
+  // Why the peer's certificate was rejected, for users; empty if it was not.
+  [[nodiscard]] virtual std::string verify_error() const = 0;
 };
 
-// Over a connected socket, which must outlive it. host: whom a client means to talk to, a name or an address; of no meaning to a server.
+// TLS over a connected socket, which must outlive the result. host: the name or address that the peer's certificate
+// must have; ignored by a server.
 [[nodiscard]] std::unique_ptr<Tls> make_tls(boost::asio::ip::tcp::socket& socket, std::shared_ptr<const TlsContext> context, const std::string& host);
 
 }  // namespace intervale

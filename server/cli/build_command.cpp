@@ -37,18 +37,17 @@ Result<double> parse_bound(const std::string& text) {
     const double value = std::stod(text, &used);
     if (used == text.size() && !std::isnan(value)) return value;
   } catch (const std::exception&) {
-    // said below
+    // reported below
   }
-  return misuse("--range: '" + text + "' is no bound; give a number, -inf or inf");
+  return misuse("--range: '" + text + "' is not a number, -inf or inf");
 }
 
 Result<Range> parse_range(const std::vector<std::string>& bounds) {
   const auto low = parse_bound(bounds.at(0)), high = parse_bound(bounds.at(1));
   if (!low) return tl::unexpected(low.error());
   if (!high) return tl::unexpected(high.error());
-  if (*low > *high)
-    return misuse("--range: the lower bound " + bounds[0] + " is greater than the upper bound " + bounds[1] + "; give the lower one first");
-  if (*low == INFINITY || *high == -INFINITY) return misuse("--range: nothing lies between " + bounds[0] + " and " + bounds[1]);
+  if (*low > *high) return misuse("--range: invalid range: LO (" + bounds[0] + ") is greater than HI (" + bounds[1] + ")");
+  if (*low == INFINITY || *high == -INFINITY) return misuse("--range: no number lies between " + bounds[0] + " and " + bounds[1]);
   return Range{*low, *high};
 }
 
@@ -56,7 +55,7 @@ Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
   const bool any = !options.dims.empty() || !options.type.empty() || !options.spacing.empty() || !options.origin.empty() || options.big_endian ||
                    options.skip != 0;
   if (!any) return std::optional<RawLayout>{};
-  if (options.dims.empty() || options.type.empty()) return misuse("raw samples need both --dims X Y Z and --type");
+  if (options.dims.empty() || options.type.empty()) return misuse("raw input needs both --dims X Y Z and --type");
   RawLayout layout;
   const auto type = parse_sample_type(options.type);
   if (!type) return tl::unexpected(type.error());
@@ -69,13 +68,12 @@ Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
   return std::optional(layout);
 }
 
-// Neither the volume itself nor a file of another kind is to be written over by mistake.
+// Protects the input, and files of other kinds, from being overwritten by mistake.
 Result<void> check_output(const std::filesystem::path& input, const std::filesystem::path& output) {
   std::error_code none;
-  if (std::filesystem::equivalent(input, output, none)) return misuse("the output '" + output.string() + "' is the input: give it a name of its own");
+  if (std::filesystem::equivalent(input, output, none)) return misuse("the output '" + output.string() + "' is the input file: choose another name");
   for (const char* ending : {".nrrd", ".nhdr", ".raw", ".gz", ".vtu", ".vtp", ".ply", ".stl", ".obj", ".glb", ".png"}) {
-    if (output.extension() == ending)
-      return misuse("the output '" + output.string() + "' is an interval volume, and named like something else: .ivm is wanted");
+    if (output.extension() == ending) return misuse("the output '" + output.string() + "' has the extension of another format: use .ivm");
   }
   return {};
 }
@@ -93,10 +91,10 @@ Result<void> run(const BuildCommand& options) {
   if (!range) return tl::unexpected(range.error());
   const auto layout = parse_layout(options);
   if (!layout) return tl::unexpected(layout.error());
-  // Seen before the long work, not after it.
+  // Before the long computation, not after it.
   const std::filesystem::path folder = std::filesystem::absolute(options.output).parent_path();
-  if (!std::filesystem::is_directory(folder)) return fail("'" + options.output + "' cannot be written: there is no folder '" + folder.string() + "'");
-
+  if (!std::filesystem::is_directory(folder))
+    return fail("cannot write '" + options.output + "': the folder '" + folder.string() + "' does not exist");
   if (auto output = check_output(options.input, options.output); !output) return output;
 
   auto volume = read_volume(options.input, *layout);
@@ -115,45 +113,45 @@ Result<void> run(const BuildCommand& options) {
     made = hierarchy.compact();
   }
   if (!made) return tl::unexpected(made.error());
-  volume->bytes = std::vector<std::byte>();  // compression needs the room, with several threads at it
+  volume->bytes = std::vector<std::byte>();  // frees memory for the compression, which runs on several threads
   if (auto saved = save_ivm(options.output, *made, on_all_cores); !saved) return saved;
   std::error_code code;
   const auto size = std::filesystem::file_size(options.output, code);
   const std::uint64_t file_bytes = code ? 0 : size;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
-    fmt::print(stderr, "intervale: nothing lies in the range: the values are {}\n", values);
+    fmt::print(stderr, "intervale: warning: no part of the volume lies in the range; its values are {}\n", values);
   }
   if (options.json) {
-    auto figures = figures_of(*made, file_bytes);
-    figures["seconds"] = seconds;
-    return print_json(figures);
+    auto stats = stats_of(*made, file_bytes);
+    stats["seconds"] = seconds;
+    return print_json(stats);
   }
-  return print(text_of(*made, file_bytes) + fmt::format("the volume's values are {}\nwrote {} in {:.2f} s\n", values, options.output, seconds));
+  return print(text_of(*made, file_bytes) + fmt::format("values {}\nwrote {} in {:.2f} s\n", values, options.output, seconds));
 }
 
 }  // namespace
 
 void add_build_command(Program& program) {
   const auto o = std::make_shared<BuildCommand>();
-  CLI::App& command = program.add_command("build", "Makes an interval volume from a volume and a range", [o] { return run(*o); });
-  command.add_option("INPUT", o->input, "Volume: .nrrd, .nhdr, or raw samples (then --dims and --type)")->required();
+  CLI::App& command = program.add_command("build", "Build an interval volume from a volume and a range of values", [o] { return run(*o); });
+  command.add_option("INPUT", o->input, "Volume: .nrrd, .nhdr, or raw samples (with --dims and --type)")->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
-  command.add_option("--range", o->range, "Values to keep, both ends among them: numbers, -inf, inf; may be equal")
+  command.add_option("--range", o->range, "Closed range of values to keep: numbers, -inf or inf; LO may equal HI")
       ->required()
       ->expected(2)
       ->type_name("LO HI");
-  command.add_option("--refine", o->refine, "boundary: the inside stays as coarse as it can; uniform: it is refined too")
+  command.add_option("--refine", o->refine, "What to refine: boundary: the surfaces of the range only; uniform: the inside too")
       ->check(CLI::IsMember({"boundary", "uniform"}))
       ->capture_default_str();
-  command.add_option("--nan", o->nan, "Put this in place of samples that are NaN or infinite, which are refused otherwise")->type_name("VALUE");
-  command.add_option("--threads", o->threads, "0: one for each core")->capture_default_str();
-  command.add_option("--dims", o->dims, "Raw input: samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
-  command.add_option("--type", o->type, "Raw input: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");
-  command.add_flag("--big-endian", o->big_endian, "Raw input: samples are big endian");
-  command.add_option("--skip", o->skip, "Raw input: bytes before the first sample")->type_name("BYTES");
-  command.add_option("--spacing", o->spacing, "Raw input: distance of samples in world units")->expected(3)->type_name("X Y Z");
-  command.add_option("--origin", o->origin, "Raw input: world position of the first sample")->expected(3)->type_name("X Y Z");
+  command.add_option("--nan", o->nan, "Value that replaces NaN and infinite samples; without it they are an error")->type_name("VALUE");
+  command.add_option("--threads", o->threads, "Number of threads; 0: one for each core")->capture_default_str();
+  command.add_option("--dims", o->dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
+  command.add_option("--type", o->type, "Raw input: type of a sample: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");
+  command.add_flag("--big-endian", o->big_endian, "Raw input: samples are big-endian; default: little-endian");
+  command.add_option("--skip", o->skip, "Raw input: bytes to skip before the first sample")->type_name("BYTES");
+  command.add_option("--spacing", o->spacing, "Raw input: distance between samples, in world units; default: 1 1 1")->expected(3)->type_name("X Y Z");
+  command.add_option("--origin", o->origin, "Raw input: world position of the first sample; default: 0 0 0")->expected(3)->type_name("X Y Z");
   add_json_flag(command, o->json);
 }
 

@@ -11,20 +11,19 @@
 
 namespace intervale {
 
-nlohmann::ordered_json figures_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
-  nlohmann::ordered_json figures = to_json(volume.description());
-  figures["supercubes"] = volume.set().supercubes();
-  figures["memory_bytes"] = volume.memory_bytes();
-  figures["file_bytes"] = file_bytes;
-  return figures;
+nlohmann::ordered_json stats_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
+  nlohmann::ordered_json stats = to_json(volume.description());
+  stats["supercubes"] = volume.set().supercubes();
+  stats["memory_bytes"] = volume.memory_bytes();
+  stats["file_bytes"] = file_bytes;
+  return stats;
 }
 
 std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
   const Description& d = volume.description();
   const auto times = [&d](std::uint64_t bytes) { return bytes == 0 ? 0.0 : double(d.full.indexed_bytes()) / double(bytes); };
-  std::string text =
-      fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined at its {}\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
-                  d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
+  std::string text = fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined: {}\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
+                                 d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
   std::array<double, 3> last{};
   for (std::size_t k = 0; k < 3; ++k) last[k] = d.grid.origin[k] + d.grid.spacing[k] * (d.grid.dims[k] - 1);
   text += fmt::format("world box ({:g}) to ({:g})\n", fmt::join(d.grid.origin, ", "), fmt::join(last, ", "));
@@ -32,8 +31,8 @@ std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
                       d.max_error);
   text += fmt::format("full mesh: {} vertices, {} tetrahedra, {} as an indexed mesh\n", d.full.vertices, d.full.tets,
                       human_bytes(d.full.indexed_bytes()));
-  return text + fmt::format("in memory {} ({:.1f} times smaller), in the file {} ({:.1f} times smaller)\n", human_bytes(volume.memory_bytes()),
-                            times(volume.memory_bytes()), human_bytes(file_bytes), times(file_bytes));
+  return text + fmt::format("in memory {} ({:.1f} times smaller than the full mesh), in the file {} ({:.1f} times smaller)\n",
+                            human_bytes(volume.memory_bytes()), times(volume.memory_bytes()), human_bytes(file_bytes), times(file_bytes));
 }
 
 }  // namespace intervale

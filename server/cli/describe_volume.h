@@ -1,4 +1,4 @@
-// What build and info say of an interval volume.
+// The statistics that build and info print, as JSON and as text.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace intervale {
 
-[[nodiscard]] nlohmann::ordered_json figures_of(const IntervalVolume& volume, std::uint64_t file_bytes);
+[[nodiscard]] nlohmann::ordered_json stats_of(const IntervalVolume& volume, std::uint64_t file_bytes);
 [[nodiscard]] std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes);
 
 }  // namespace intervale

@@ -81,15 +81,16 @@ Result<void> run(const ExtractCommand& options) {
 
 void add_extract_command(Program& program) {
   const auto options = std::make_shared<ExtractCommand>();
-  CLI::App& command = program.add_command("extract", "Makes a mesh of an interval volume, without a server", [options] { return run(*options); });
+  CLI::App& command = program.add_command("extract", "Extract a mesh from an interval volume, without a server", [options] { return run(*options); });
   command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
   command
       .add_option_function<std::string>(
-          "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
+          "-o,--output", [options](const std::string& path) { options->output = path; },
+          "Mesh to write: .vtu (tetrahedra), .vtp, .ply, .stl, .obj or .glb (boundary triangles)")
       ->type_name("MESH");
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);
-  command.add_option("--threads", options->threads, "0: one for each core")->capture_default_str();
+  command.add_option("--threads", options->threads, "Number of threads; 0: one for each core")->capture_default_str();
   add_digest_flag(command, options->digest);
   add_json_flag(command, options->json);
 }

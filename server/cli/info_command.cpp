@@ -24,7 +24,7 @@ std::uint64_t file_size(const std::string& path) {
 Result<void> info(const InfoCommand& options) {
   const auto volume = load_ivm(options.file);
   if (!volume) return tl::unexpected(volume.error());
-  if (options.json) return print_json(figures_of(**volume, file_size(options.file)));
+  if (options.json) return print_json(stats_of(**volume, file_size(options.file)));
   return print(text_of(**volume, file_size(options.file)));
 }
 
@@ -40,7 +40,8 @@ Result<void> verify(const InfoCommand& options) {
 
 void add_info_command(Program& program) {
   const auto options = std::make_shared<InfoCommand>();
-  CLI::App& command = program.add_command("info", "Says what an interval volume holds and how small it is", [options] { return info(*options); });
+  CLI::App& command =
+      program.add_command("info", "Print dimensions, range, counts and sizes of an interval volume", [options] { return info(*options); });
   command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
   add_json_flag(command, options->json);
 }
@@ -48,7 +49,7 @@ void add_info_command(Program& program) {
 void add_verify_command(Program& program) {
   const auto options = std::make_shared<InfoCommand>();
   CLI::App& command =
-      program.add_command("verify", "Checks every checksum and every invariant of an interval volume", [options] { return verify(*options); });
+      program.add_command("verify", "Check every checksum and every invariant of an interval volume", [options] { return verify(*options); });
   command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
   add_json_flag(command, options->json);
 }

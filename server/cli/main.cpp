@@ -1,7 +1,7 @@
 #include "server/cli/commands.h"
 
 int main(int argc, char** argv) {
-  intervale::Program program("intervale", "Makes, inspects and serves multiresolution interval volumes");
+  intervale::Program program("intervale", "Build, inspect, extract and serve multiresolution interval volumes");
   intervale::add_sample_command(program);
   intervale::add_build_command(program);
   intervale::add_info_command(program);

@@ -31,10 +31,10 @@ Result<void> run(const SampleCommand& options) {
 
 void add_sample_command(Program& program) {
   const auto options = std::make_shared<SampleCommand>();
-  CLI::App& command = program.add_command("sample", "Makes a volume by formula, to try things with", [options] { return run(*options); });
+  CLI::App& command = program.add_command("sample", "Write a synthetic volume, for tests and demonstrations", [options] { return run(*options); });
   command.add_option("NAME", options->name, fmt::format("{}", fmt::join(sample_names(), ", ")))->required();
-  command.add_option("-o,--output", options->output, "NRRD file to write")->required()->type_name("FILE");
-  command.add_option("--size", options->size, "Samples a side")->capture_default_str();
+  command.add_option("-o,--output", options->output, "Volume to write (.nrrd)")->required()->type_name("FILE");
+  command.add_option("--size", options->size, "Number of samples on each side")->capture_default_str();
   add_json_flag(command, options->json);
 }
 

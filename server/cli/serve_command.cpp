@@ -20,7 +20,7 @@ struct ServeCommand {
   std::vector<std::string> inputs;
 };
 
-// The parser takes a variable that is empty for none. One that was meant to guard the server is not to leave it open.
+// The parser ignores empty variables. One that was meant to protect the server must not leave it open.
 bool is_empty_in_environment(const char* name) {
   const char* const value = std::getenv(name);
   return value != nullptr && *value == '\0';
@@ -30,33 +30,33 @@ Result<void> run(const ServeCommand& options) {
   for (const auto& [name, given] :
        {std::pair("INTERVALE_TOKENS", options.serve.tokens.has_value()), std::pair("INTERVALE_TLS_CERT", options.serve.tls.has_value()),
         std::pair("INTERVALE_TLS_KEY", options.serve.tls.has_value())}) {
-    if (!given && is_empty_in_environment(name)) return misuse(std::string(name) + " is empty: name a file in it, or leave it out");
+    if (!given && is_empty_in_environment(name)) return misuse(std::string(name) + " is set but empty: set it to a file, or unset it");
   }
   return serve(options.serve, options.log, std::vector<std::filesystem::path>(options.inputs.begin(), options.inputs.end()));
 }
 
-// What a configuration file says of the log level; nothing if it says nothing, or cannot be read.
+// The log level in a configuration file; nullopt if it has none, or cannot be read.
 std::optional<std::string> configured_level(const std::string& file) {
   try {
     for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_file(file)) {
       if (item.parents == std::vector<std::string>{"serve"} && item.name == "log-level" && item.inputs.size() == 1) return item.inputs.front();
     }
   } catch (const CLI::Error& error) {
-    spdlog::warn("cannot read {} again: {}", file, error.what());
+    spdlog::warn("cannot reread {}: {}", file, error.what());
   }
   return {};
 }
 
 void add_log_options(CLI::App& command, LogOptions& log) {
-  const auto group = "Observation";
+  const auto group = "Logs and metrics";
   command
       .add_option_function<std::string>(
           "--log-format", [&log](const std::string& format) { log.format = format == "json" ? LogFormat::json : LogFormat::text; },
-          "Lines of text (default) or JSON, on stderr")
+          "Format of the log on stderr: text (default), or one JSON object per line")
       ->check([](const std::string& format) { return std::string(format == "text" || format == "json" ? "" : "must be text or json"); })
       ->type_name("text|json")
       ->group(group);
-  command.add_option("--log-level", log.level, "SIGHUP: what the --config file says now; if it says nothing, debug and back")
+  command.add_option("--log-level", log.level, "Least severity logged: trace, debug, info, warn, error, off; SIGHUP rereads it from --config")
       ->check([](const std::string& level) { return std::string(is_log_level(level) ? "" : "must be trace, debug, info, warn, error or off"); })
       ->type_name("LEVEL")
       ->capture_default_str()
@@ -68,7 +68,7 @@ void add_log_options(CLI::App& command, LogOptions& log) {
   };
 }
 
-// One with a path would never be met.
+// An origin has no path: one with a path would never match.
 bool may_be_origin(const std::string& text) {
   const std::size_t scheme = text.find("://");
   return text == "*" ||
@@ -88,7 +88,8 @@ void add_milliseconds(CLI::App& command, const std::string& name, std::chrono::m
       .add_option_function<double>(
           name,
           [&time, name](double seconds) {
-            if (std::isnan(seconds)) throw CLI::ValidationError(name, "a number is wanted");  // which is in every range
+            // NaN passes every range check.
+            if (std::isnan(seconds)) throw CLI::ValidationError(name, "must be a number");
             time = std::chrono::milliseconds(std::llround(1000 * seconds));
           },
           description)
@@ -105,46 +106,47 @@ CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optio
 
 void add_limits(CLI::App& command, ServeOptions& serve) {
   const auto group = "Limits";
-  command.add_option("--max-connections", serve.max_connections, "More than these are turned away")
+  command.add_option("--max-connections", serve.max_connections, "Connections at a time; further ones are closed at once")
       ->check(at_least_one())
       ->capture_default_str()
       ->group(group);
   add_optional(command, "--max-connections-per-address", serve.max_connections_per_address,
-               "The same, from one address (IPv6: from one /64); not behind a proxy, whose address is that of all. Default: none")
+               "The same for each address (IPv6: for each /64); not behind a proxy, which is one address. Default: no limit")
       ->check(at_least_one())
       ->type_name("N")
       ->group(group);
-  add_optional(command, "--max-sessions", serve.max_sessions, "More than these are answered 503. Default: none")
+  add_optional(command, "--max-sessions", serve.max_sessions, "Sessions at a time; further ones are answered 503. Default: no limit")
       ->check(at_least_one())
       ->type_name("N")
       ->group(group);
   const auto bytes = CLI::AsSizeValue(true);
   add_optional(command, "--max-memory", serve.max_memory,
-               "While the process has more resident, new sessions are answered 503; 2GiB, 500MB. Default: none")
+               "Resident memory above which new sessions are answered 503, such as 2GiB or 500MB. Default: no limit")
       ->transform(bytes)
       ->check(at_least_one())
       ->type_name("BYTES")
       ->group(group);
   command
-      .add_option(
-          "--max-queued-bytes", serve.max_queued_bytes,
-          "Of messages that are leaving, in all; past it, those that have been leaving the longest are cut off with their connections, if that is "
-          "more than a second. Default: 512MiB")
+      .add_option("--max-queued-bytes", serve.max_queued_bytes,
+                  "Unsent bytes of all sessions; above, the slowest readers are disconnected, if their message has been waiting for more "
+                  "than 1 s. Default: 512MiB")
       ->transform(bytes)
       ->check(at_least_one())
       ->type_name("BYTES")
       ->group(group);
-  command.add_option("--max-messages-per-second", serve.messages_per_second, "Of each session; one that sends more is read more slowly")
+  command
+      .add_option("--max-messages-per-second", serve.messages_per_second, "Messages of each session; a session that sends more is read more slowly")
       ->check(at_least_one())
       ->capture_default_str()
       ->group(group);
-  command.add_option("--max-views-per-second", serve.views_per_second, "Of those, new views; likewise")
+  command.add_option("--max-views-per-second", serve.views_per_second, "Views among those messages; likewise")
       ->check(at_least_one())
       ->capture_default_str()
       ->group(group);
   add_milliseconds(command, "--handshake-time", serve.handshake_time, 0.1,
-                   "For a request to arrive, and from a WebSocket's start to its Open: each. Default: 10");
-  add_milliseconds(command, "--drain-time", serve.drain_time, 0, "How long clients have to take their leave at the end. Default: 5");
+                   "Longest time for a request to arrive, and from a WebSocket's start to its Open. Default: 10");
+  add_milliseconds(command, "--drain-time", serve.drain_time, 0,
+                   "Longest time for clients to disconnect at shutdown; then they are disconnected. Default: 5");
 }
 
 void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
@@ -159,22 +161,25 @@ void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
       command
           .add_option_function<std::string>(
               "--tls-cert", use_tls(tls.certificate),
-              "Speak https and wss with this certificate (PEM), and those that vouch for it behind it; read again when it changes")
+              "Serve https and wss with this certificate (PEM, followed by its intermediate certificates); reloaded when it changes")
           ->type_name("FILE")
           ->group(group);
-  command.add_option_function<std::string>("--tls-key", use_tls(tls.key), "Its key (PEM)")->type_name("FILE")->group(group)->needs(certificate);
+  command.add_option_function<std::string>("--tls-key", use_tls(tls.key), "Private key of the certificate (PEM)")
+      ->type_name("FILE")
+      ->group(group)
+      ->needs(certificate);
   certificate->needs("--tls-key");
   command
       .add_option_function<std::string>(
           "--tokens", [&serve](const std::string& file) { serve.tokens = file; },
-          "Who may come in: a token a line, and after it the data sets it opens, if not all, where * and ? stand for others; read again when it "
-          "changes")
+          "File of access tokens: on each line a token, and patterns (with * and ?) of the data sets it grants, if not all; reloaded "
+          "when it changes")
       ->type_name("FILE")
       ->group(group);
   command
       .add_option("--allow-origin", serve.allowed_origins,
-                  "Pages that may open sessions: https://example.org, * for any; in the environment, with commas between. Default: those of the host "
-                  "that the request names")
+                  "Origins of web pages that may open sessions: https://example.org, or * for any; separated by commas in the environment. "
+                  "Default: the host of the request")
       ->check([](const std::string& origin) {
         return std::string(may_be_origin(origin) ? "" : "must be like https://example.org:8443, without a path, or *");
       })
@@ -187,21 +192,24 @@ void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
 void add_serve_command(Program& program) {
   const auto options = std::make_shared<ServeCommand>();
   CLI::App& command =
-      program.add_command("serve", "Streams interval volumes to clients, until SIGTERM or Ctrl-C", [options] { return run(*options); });
-  command.add_option("INPUTS", options->inputs, "Interval volumes (.ivm), or folders of them")->required()->type_name("FILE.ivm|FOLDER ...");
-  command.add_option("--listen", options->serve.listen, "Address and port; [::1]:8080 for IPv6, port 0 for any free one")->capture_default_str();
+      program.add_command("serve", "Stream interval volumes to clients, until SIGTERM or Ctrl-C", [options] { return run(*options); });
+  command.add_option("INPUTS", options->inputs, "Interval volumes (.ivm), or folders with them")->required()->type_name("FILE.ivm|FOLDER ...");
+  command.add_option("--listen", options->serve.listen, "Address and port to listen on; IPv6: [::1]:8080; port 0: any free port")
+      ->capture_default_str();
   command
       .add_option_function<std::string>(
           "--viewer", [options](const std::string& folder) { options->serve.viewer = folder; },
-          "Where the browser's viewer is; by default ../share/intervale/viewer from this program's folder, if that is there")
+          "Folder of the browser viewer; default: ../share/intervale/viewer, seen from the program's folder, if it exists")
       ->type_name("FOLDER");
-  command.add_option("--threads", options->serve.threads, "0: one for each core")->check(CLI::Range(0, 1024))->capture_default_str();
+  command.add_option("--threads", options->serve.threads, "Number of threads; 0: one for each core")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
   command
       .add_option_function<std::string>(
           "--metrics-listen", [options](const std::string& address) { options->serve.metrics_listen = address; },
-          "Address and port where /metrics is answered instead, to plain HTTP and everybody: keep it to those who watch")
+          "Address and port for /metrics, in plain HTTP and without tokens: keep it private")
       ->type_name("ADDRESS:PORT")
-      ->group("Observation");
+      ->group("Logs and metrics");
   add_log_options(command, options->log);
   add_access_options(command, options->serve, options->tls);
   add_limits(command, options->serve);

@@ -67,7 +67,7 @@ struct Extracted {
   Mesh mesh;
   std::uint64_t updates = 0;
 };
-Extracted extract_mesh(const IntervalVolume& volume, double error, const ParallelFor& parallel = in_turn) {
+Extracted extract_mesh(const IntervalVolume& volume, double error, const ParallelFor& parallel = serial) {
   Lod lod;
   lod.error = error;
   const auto extraction = or_throw(extract(volume, lod, {}, parallel));

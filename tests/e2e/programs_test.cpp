@@ -215,7 +215,7 @@ TEST(Programs, AGuardThatIsEmptyInTheEnvironmentIsAnError) {
     ::setenv(name, "", 1);
     const auto open = run({program("intervale"), "serve", buckyball(), "--listen", "127.0.0.1:0"});
     ::unsetenv(name);
-    expect_complaint(open, 2, std::string(name) + " is empty", "intervale: ");
+    expect_complaint(open, 2, std::string(name) + " is set but empty", "intervale: ");
   }
 }
 
@@ -293,11 +293,11 @@ TEST(Programs, ARangeThatHoldsNothingIsSaid) {
   ASSERT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "9", "-o", volume}).status, 0);
   const auto empty = run({program("intervale"), "build", volume, "-o", folder / "x.ivm", "--range", "1200", "2000"});
   EXPECT_EQ(empty.status, 0);
-  EXPECT_THAT(empty.err, HasSubstr("nothing lies in the range: the values are "));
+  EXPECT_THAT(empty.err, HasSubstr("no part of the volume lies in the range; its values are "));
 }
 
 TEST(Programs, AMistakeIsNamedWithTheHelpForIt) {
-  expect_complaint(run({program("intervale"), "bulid", "x"}), 2, "there is no command 'bulid' (see intervale --help)", "intervale: ");
+  expect_complaint(run({program("intervale"), "bulid", "x"}), 2, "unknown command 'bulid' (see intervale --help)", "intervale: ");
   expect_complaint(run({program("intervale"), "build", "x", "--rnage"}), 2, "(see intervale build --help)", "intervale: ");
 }
 
