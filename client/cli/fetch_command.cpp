@@ -53,37 +53,38 @@ Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& op
   Progress progress("receiving " + printable(url.name));
   FetchEvents events;
   events.on_notice = [&progress](const std::string& notice) { progress.note(notice); };
-  events.on_batch = [&progress, volume = VolumeSoFar()](const StreamClient& client, const FetchFigures& figures) mutable {
+  events.on_batch = [&progress, volume = VolumeSoFar()](const StreamClient& client, const FetchStats& stats) mutable {
     if (!progress.is_seen()) return;
-    const std::string left = figures.remaining_pixels > 0 ? fmt::format("error {:.3g} px, {:.4g}", figures.remaining_pixels, figures.remaining_error)
-                                                          : fmt::format("error {:.4g}", figures.remaining_error);
-    progress.text(fmt::format("{} updates, at most {} to go, {} tetrahedra, volume {:.6g}, {}, {}", client.updates(), figures.updates_to_go,
-                              client.tet_count(), volume.of(client), human_bytes(figures.bytes_received), left));
+    const ClientSession::Stats& session = stats.session;
+    const std::string left = session.remaining_pixels > 0 ? fmt::format("error {:.3g} px, {:.4g}", session.remaining_pixels, session.remaining_error)
+                                                          : fmt::format("error {:.4g}", session.remaining_error);
+    progress.text(fmt::format("{} updates, at most {} to go, {} tetrahedra, volume {:.6g}, {}, {}", client.updates(), session.updates_to_go,
+                              client.tet_count(), volume.of(client), human_bytes(session.bytes), left));
   };
   return fetch(url, options, events);
 }
 
 Result<void> report(const FetchCommand& options, const Fetched& fetched, const Mesh& mesh) {
-  const FetchFigures& figures = fetched.figures;
+  const FetchStats& stats = fetched.stats;
   const double volume = volume_of(mesh);
   if (options.json) {
     nlohmann::ordered_json json{{"updates", fetched.client.updates_in_mesh()},
                                 {"vertices", mesh.points.size()},
                                 {"tets", mesh.tets.size()},
                                 {"volume", volume},
-                                {"bytes_received", figures.bytes_received},
-                                {"messages", figures.messages},
-                                {"reconnects", figures.reconnects},
-                                {"seconds_first_mesh", figures.seconds_first_mesh},
-                                {"seconds_applying", figures.seconds_applying},
-                                {"seconds", figures.seconds}};
+                                {"bytes_received", stats.session.bytes},
+                                {"messages", stats.session.messages},
+                                {"reconnects", stats.session.connections - 1},
+                                {"seconds_first_mesh", stats.seconds_first_mesh},
+                                {"seconds_applying", stats.session.seconds_applying},
+                                {"seconds", stats.seconds}};
     if (options.digest) json["digest"] = mesh_digest(mesh);
     return print_json(json);
   }
   std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}\n", printable(fetched.client.description().name),
                                  fetched.client.updates_in_mesh(), mesh.points.size(), mesh.tets.size(), volume);
-  text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(figures.bytes_received),
-                      figures.messages, 1000 * figures.seconds_first_mesh, figures.complete ? "all" : "budget reached", 1000 * figures.seconds);
+  text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(stats.session.bytes),
+                      stats.session.messages, 1000 * stats.seconds_first_mesh, stats.is_complete ? "all" : "budget reached", 1000 * stats.seconds);
   if (options.digest) text += "digest " + mesh_digest(mesh) + "\n";
   if (options.output) text += "wrote " + options.output->string() + "\n";
   if (options.picture) text += "drew " + options.picture->file.string() + "\n";

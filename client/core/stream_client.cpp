@@ -11,7 +11,7 @@ namespace intervale {
 StreamClient::StreamClient(Description description, Front front) : description_(std::move(description)), front_(std::move(front)) {}
 
 Result<StreamClient> StreamClient::start(Description description, const Budget& budget) {
-  if (auto ok = check_description(description); !ok) return fail("the server describes no volume: " + ok.error().message);
+  if (auto ok = check_description(description); !ok) return tl::unexpected(ok.error());
   const auto base = decode_base(description.base, Domain(description.grid.dims));
   if (!base) return tl::unexpected(base.error());
   Front front(description.grid, *base);
@@ -37,6 +37,7 @@ void StreamClient::look(const Camera& camera) {
 }
 
 void StreamClient::set_budget(const Budget& budget, std::uint64_t epoch) {
+  if (budget == Budget{budget_.max_tets, less_room_ ? less_room_->max_updates : budget_.max_updates}) return;
   budget_.max_tets = budget.max_tets;
   less_room_.reset();
   if (budget.max_updates < budget_.max_updates) {

@@ -19,6 +19,7 @@ namespace intervale {
 struct Budget {
   std::uint64_t max_tets = ~std::uint64_t(0);     // in its mesh
   std::uint64_t max_updates = ~std::uint64_t(0);  // in the mesh and beside it; some 30 bytes each. The server is to be told, as View::room.
+  friend bool operator==(const Budget&, const Budget&) = default;
 };
 
 class StreamClient {

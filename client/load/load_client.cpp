@@ -6,10 +6,6 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <utility>
-#include <variant>
-
-#include "common/util/printable.h"
-#include "protocol/codec.h"
 
 namespace intervale {
 namespace {
@@ -17,7 +13,6 @@ namespace {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
-using protocol::CloseCode;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
@@ -27,181 +22,153 @@ CameraPath path_of(const LoadPlan& plan, unsigned client) {
   return path;
 }
 
-// Close codes after which another server, or this one later, may go on.
-bool is_to_be_found_again(unsigned code) {
-  return code == static_cast<unsigned>(CloseCode::going_away) || code == static_cast<unsigned>(CloseCode::internal);
-}
-
 }  // namespace
 
-LoadClient::LoadClient(asio::io_context& io, const LoadConnection::Endpoints& endpoints, const LoadPlan& plan, unsigned number, LoadFigures& figures,
+LoadClient::LoadClient(asio::io_context& io, const LoadConnection::Endpoints& endpoints, const LoadPlan& plan, unsigned number, LoadStats& stats,
                        LoadProgress& progress)
-    : LoadClient(io, endpoints, plan, path_of(plan, number), plan.start + plan.ramp * number / plan.clients, figures, progress) {}
+    : LoadClient(io, endpoints, plan, path_of(plan, number), plan.start + plan.ramp * number / plan.clients, stats, progress) {}
 
 LoadClient::LoadClient(asio::io_context& io, const LoadConnection::Endpoints& endpoints, const LoadPlan& plan, const CameraPath& path, Time start,
-                       LoadFigures& figures, LoadProgress& progress)
+                       LoadStats& stats, LoadProgress& progress)
     : plan_(plan),
-      figures_(figures),
+      stats_(stats),
       progress_(progress),
       start_(start),
       connection_(io, endpoints, plan, path.seed),
-      views_(path, start, figures),
-      stream_(plan, figures),
+      views_(path, start, stats),
+      session_({.dataset = plan.url.name, .client = "intervale-load " INTERVALE_VERSION, .window = plan.window, .has_mesh = plan.verify}),
       wake_(io),
-      line_(io) {}
+      rate_timer_(io) {}
 
 asio::awaitable<void> LoadClient::run() {
   wake_.expires_at(start_);
   co_await wake_.async_wait(kAwait);
-  if (co_await connection_.open()) {
-    ++figures_.connected;
+  bool is_open = co_await connection_.open();
+  if (is_open) {
+    ++stats_.connected;
     views_.begin(LoadClock::now());
-    stream_.look(views_.lod().camera);
-    co_await converse();
-    while (lost_ && !failed_) {
-      gone_ = lost_ = false;
-      credit_due_ = 0;
-      stream_.begin_again();
-      const bool found = co_await connection_.open_again();
-      if (!found) {
-        fail(connection_.complaint());
-        break;
-      }
-      ++figures_.reconnects;
-      co_await converse();
-    }
-  } else {
-    fail(connection_.complaint());
   }
-  figures_.repeated_updates += stream_.repeated_updates();
-  views_.report_rest(failed_, LoadClock::now());
+  while (is_open && (state_ == State::connecting || state_ == State::lost)) {
+    co_await converse();
+    if (state_ != State::lost) break;
+    is_open = co_await connection_.open_again();
+    if (is_open) ++stats_.reconnects;
+  }
+  if (!is_open) fail(connection_.complaint());
+  report();
 }
 
 asio::awaitable<void> LoadClient::converse() {
   using namespace asio::experimental::awaitable_operators;
-  connected_ = true;
+  const Time now = LoadClock::now();
+  state_ = State::connected;
+  views_.advance(now);
+  session_.look(newest_view());
+  session_.connected(now);
+  views_.asked(session_.epoch());
   ++progress_.connected;
   co_await (read_messages() && write_messages());
   --progress_.connected;
-  connected_ = false;
+  session_.disconnected();
 }
 
+// Messages have names: g++ 12 destroys temporaries in a co_await twice.
 asio::awaitable<void> LoadClient::write_messages() {
-  if (!co_await greet()) co_return;
-  while (!gone_) {
-    if (closing_) {
+  while (is_connected()) {
+    if (state_ == State::closing) {
       // Within the plan's patience; an error is a server that left first.
       co_await connection_.websocket().async_close(websocket::close_code::normal, kAwait);
-      co_return cut_off();
+      co_return cut_off(State::closed);
     }
-    if (const std::uint64_t bytes = std::exchange(credit_due_, 0); bytes != 0) {
-      const protocol::ClientMessage credit = protocol::Credit{bytes};
-      if (!co_await send(credit)) co_return;
-    } else if (advance()) {
-      const protocol::ClientMessage message = view();
-      if (!co_await send(message)) co_return;
-    } else {
-      wake_.expires_at(views_.next_due());
-      co_await wake_.async_wait(kAwait);
+    const auto messages = session_.take_messages();
+    for (const auto& message : messages) {
+      const auto [error, size] = co_await connection_.websocket().async_write(asio::buffer(message), kAwait);
+      if (error) co_return end_connection(error);
     }
+    if (!messages.empty() || look()) continue;
+    wake_.expires_at(views_.next_due());
+    co_await wake_.async_wait(kAwait);
   }
 }
 
-// Open, the first grant, what the client has, and a view go out together, to save a round trip. Messages have names: g++ 12 destroys temporaries in a
-// co_await twice.
-asio::awaitable<bool> LoadClient::greet() {
-  const auto greeting = stream_.greeting();
-  asked_ = LoadClock::now();
-  for (const protocol::ClientMessage& message : greeting) {
-    if (std::holds_alternative<protocol::Have>(message)) figures_.resume_bytes += protocol::encode(message).size();
-    if (!co_await send(message)) co_return false;
-  }
-  (void)advance();
-  const protocol::ClientMessage first = view();
-  const bool sent = co_await send(first);
-  co_return sent;
-}
-
-asio::awaitable<bool> LoadClient::send(const protocol::ClientMessage& message) {
-  const auto bytes = protocol::encode(message);
-  const auto [error, size] = co_await connection_.websocket().async_write(asio::buffer(bytes), kAwait);
-  if (error) lost(error);
-  co_return !error;
-}
-
-// To the newest view that is due, if any is.
-bool LoadClient::advance() {
+// Asks for the newest view that is due, if any is.
+bool LoadClient::look() {
   if (!views_.advance(LoadClock::now())) return false;
-  stream_.look(views_.lod().camera);
+  session_.look(newest_view());
+  views_.asked(session_.epoch());
   return true;
 }
 
+ViewRequest LoadClient::newest_view() const {
+  const Lod lod = views_.lod();
+  return {lod, lod.camera, plan_.budget};
+}
+
 asio::awaitable<void> LoadClient::read_messages() {
-  while (!gone_) {
+  while (is_connected()) {
     buffer_.clear();
     const auto [error, size] = co_await connection_.websocket().async_read(buffer_, kAwait);
-    if (error) co_return lost(error);
-    if (plan_.rate) co_await pass_line(buffer_.size());
-    if (!closing_ && !gone_) receive(buffer_.size());
+    if (error) co_return end_connection(error);
+    if (plan_.rate) co_await wait_for_rate(buffer_.size());
+    if (state_ == State::connected) receive(buffer_.size());
   }
 }
 
-// A message has come only once the line it comes by has carried it: what lies ready in this machine is still on its way there.
-asio::awaitable<void> LoadClient::pass_line(std::size_t bytes) {
+// A message counts as received once a connection of the plan's rate would have carried it: what this machine holds
+// ready would still be on its way there.
+asio::awaitable<void> LoadClient::wait_for_rate(std::size_t bytes) {
   const std::chrono::duration<double> time(double(bytes) / double(*plan_.rate));
-  line_free_ = std::max(line_free_, LoadClock::now()) + std::chrono::duration_cast<LoadClock::duration>(time);
-  if (closing_ || gone_) co_return;
-  line_.expires_at(line_free_);
-  co_await line_.async_wait(kAwait);
+  received_until_ = std::max(received_until_, LoadClock::now()) + std::chrono::duration_cast<LoadClock::duration>(time);
+  if (state_ != State::connected) co_return;
+  rate_timer_.expires_at(received_until_);
+  co_await rate_timer_.async_wait(kAwait);
 }
 
 void LoadClient::receive(std::size_t size) {
-  now_ = LoadClock::now();
+  using Kind = ClientSession::Event::Kind;
+  const Time now = LoadClock::now();
   if (connection_.websocket().got_text()) return fail("the server sent text");
-  auto message = protocol::decode_server_message({static_cast<const std::uint8_t*>(buffer_.data().data()), size});
-  if (!message) return fail("the server sent a " + message.error().message);
-  bytes_ += size;
-  if (now_ <= plan_.end()) {
-    figures_.bytes += size;
+  const bool resumes = session_.mesh() != nullptr;
+  const auto event = session_.receive({static_cast<const std::uint8_t*>(buffer_.data().data()), size}, now);
+  if (now <= plan_.end()) {
+    stats_.bytes += size;
     progress_.bytes += size;
   }
-  std::visit([this](auto& m) { take(std::move(m)); }, *message);
+  if (!event) {
+    if (session_.fault()) ++stats_.protocol_closes;
+    return end_session(event.error().message, session_.state() == ClientSession::State::connecting);
+  }
+  if (event->kind == Kind::opened) take_opened(resumes, event->is_new_mesh, size);
+  if (event->kind == Kind::batch) take_batch(*event, size, now);
+  if (event->kind == Kind::done) take_done(*event, now);
+  if (session_.has_messages()) wake_.cancel();
 }
 
-void LoadClient::take(protocol::Opened opened) {
-  const auto taken = stream_.take(std::move(opened), buffer_.size(), now_ - asked_);
-  if (!taken) fail(taken.error().message);
+void LoadClient::take_opened(bool resumes, bool is_new_mesh, std::size_t size) {
+  if (session_.description()->content_hash != plan_.description.content_hash) return fail("the server sent another volume than before");
+  if (resumes && is_new_mesh) return fail("the server has the same volume, but does not resume");
+  if (resumes) stats_.repeated_bytes += size;
+  if (session_.mesh() && is_new_mesh) root_tets_ = session_.mesh()->tet_count();
 }
 
-void LoadClient::take(const protocol::Batch& batch) {
-  if (auto taken = stream_.take(batch, views_.epoch()); !taken) return fail(taken.error().message);
-  if (now_ <= plan_.end()) {
-    figures_.updates += batch.updates;
+void LoadClient::take_batch(const ClientSession::Event& batch, std::size_t size, Time now) {
+  if (now <= plan_.end()) {
+    stats_.updates += batch.updates;
     progress_.updates += batch.updates;
   }
-  views_.serve(batch.epoch, now_);
-  views_.note_bytes(buffer_.size());
-  if (auto applied = stream_.apply(batch); !applied) return fail(applied.error().message);
-  if (plan_.verify) now_ = LoadClock::now();
-  if (batch.updates > 0 && !stream_.shows_nothing()) views_.note_mesh(bytes_, now_);
+  views_.serve(batch.epoch, now);
+  views_.note_bytes(size);
+  const StreamClient* mesh = session_.mesh();
+  if (mesh && mesh->tet_count() > std::max(plan_.budget.max_tets, root_tets_)) return fail("a mesh exceeds its budget");
+  const bool is_seen = batch.updates > 0 && (!mesh || mesh->tet_count() > 0);
+  if (is_seen) views_.note_mesh(session_.stats().bytes, mesh ? LoadClock::now() : now);
   close_if_answered();
-  credit_due_ += stream_.grant(batch, now_);
-  if (credit_due_ != 0) wake_.cancel();
 }
 
-void LoadClient::take(const protocol::Done& done) {
-  if (auto taken = stream_.take(done, views_.epoch()); !taken) return fail(taken.error().message);
-  views_.finish(done.epoch, !done.full, now_);
+void LoadClient::take_done(const ClientSession::Event& done, Time now) {
+  views_.finish(done.epoch, !done.is_full, now);
   if (views_.is_only_one()) return leave();
   close_if_answered();
-}
-
-void LoadClient::take(const protocol::Fault& fault) {
-  ++figures_.protocol_closes;
-  const std::string what =
-      "the server ended the session: " + printable(fault.text) + " (code " + std::to_string(static_cast<unsigned>(fault.code)) + ")";
-  if (is_to_be_found_again(static_cast<unsigned>(fault.code))) return lose(what);
-  fail(what);
 }
 
 void LoadClient::end_views() {
@@ -214,46 +181,58 @@ void LoadClient::close_if_answered() {
 }
 
 void LoadClient::leave() {
-  closing_ = true;
-  if (!connected_) fail(views_.is_lost() ? connection_.complaint() + ", and not found again before the end" : "not connected before the end");
+  if (state_ == State::connecting) return fail("not connected before the end");
+  if (state_ == State::lost) return fail(connection_.complaint() + ", and not found again before the end");
+  if (state_ == State::connected) state_ = State::closing;
   wake_.cancel();
-  line_.cancel();
+  rate_timer_.cancel();
 }
 
-// The connection is over. In order, if it was to be.
-void LoadClient::lost(beast::error_code error) {
-  if (closing_ || gone_) return cut_off();
-  if (error != websocket::error::closed) return lose("lost the server: " + error.message());
-  ++figures_.protocol_closes;
+// A read or a write failed: as was to be expected, or the server ended the session.
+void LoadClient::end_connection(beast::error_code error) {
+  if (state_ == State::closing) return cut_off(State::closed);
+  if (state_ != State::connected) return;
+  if (error != websocket::error::closed) return end_session("lost the server: " + error.message(), true);
+  ++stats_.protocol_closes;
   const unsigned code = connection_.websocket().reason().code;
-  const std::string what = "the server closed the session with code " + std::to_string(code);
-  if (is_to_be_found_again(code)) return lose(what);
-  fail(what);
+  end_session("the server closed the session with code " + std::to_string(code), may_reconnect(protocol::CloseCode(code)));
 }
 
-// There may be another server.
-void LoadClient::lose(const std::string& what) {
-  if (!plan_.reconnect) return fail(what);
+void LoadClient::end_session(const std::string& what, bool may_reconnect) {
+  if (!may_reconnect || !plan_.reconnect) return fail(what);
   views_.lose(LoadClock::now());
-  lost_ = true;
   connection_.lose(what);
-  cut_off();
+  cut_off(State::lost);
 }
 
 void LoadClient::fail(const std::string& what) {
-  if (failed_) return;
-  failed_ = true;
-  ++figures_.failed;
-  ++figures_.errors[what];
+  if (state_ == State::failed) return;
+  ++stats_.failed;
+  ++stats_.errors[what];
   connection_.give_up();
-  cut_off();
+  cut_off(State::failed);
 }
 
-void LoadClient::cut_off() {
-  gone_ = true;
+void LoadClient::cut_off(State state) {
+  state_ = state;
   connection_.cut();
   wake_.cancel();
-  line_.cancel();
+  rate_timer_.cancel();
+}
+
+void LoadClient::report() {
+  const ClientSession::Stats& session = session_.stats();
+  stats_.resume_bytes += session.have_bytes;
+  if (session_.mesh() && session_.state() != ClientSession::State::closed) {
+    stats_.repeated_updates += session.updates - session.forgotten - session_.mesh()->updates();
+  }
+  views_.report_rest(state_ == State::failed, LoadClock::now());
+}
+
+std::optional<StreamClient> LoadClient::take_mesh() {
+  const Description* description = session_.description();
+  if (description && description->content_hash != plan_.description.content_hash) return {};  // nothing to compare it with
+  return std::move(session_).take_mesh();
 }
 
 }  // namespace intervale

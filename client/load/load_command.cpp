@@ -27,11 +27,11 @@ struct LoadCommand {
 
 // "3 of 50 clients failed (cannot connect …)": what makes this a failure, or nothing.
 Result<void> verdict(const LoadReport& report) {
-  const LoadFigures& figures = report.figures;
-  if (figures.failed > 0) {
-    const auto most = std::ranges::max_element(figures.errors, {}, [](const auto& error) { return error.second; });
-    const std::string why = most == figures.errors.end() ? std::string() : ": " + most->first;
-    return fail(fmt::format("{} of {} clients failed{}", figures.failed, report.clients, why));
+  const LoadStats& stats = report.stats;
+  if (stats.failed > 0) {
+    const auto most = std::ranges::max_element(stats.errors, {}, [](const auto& error) { return error.second; });
+    const std::string why = most == stats.errors.end() ? std::string() : ": " + most->first;
+    return fail(fmt::format("{} of {} clients failed{}", stats.failed, report.clients, why));
   }
   if (report.differing > 0) return fail(fmt::format("{} of {} meshes differ from the reference", report.differing, report.verified.value_or(0)));
   return {};

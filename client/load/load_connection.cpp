@@ -5,8 +5,8 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "client/core/backoff.h"
+#include "client/net/blocking_connection.h"
 #include "client/net/connection.h"
-#include "client/net/line.h"
 #include "protocol/messages.h"
 
 namespace intervale {

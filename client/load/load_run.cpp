@@ -11,14 +11,13 @@
 #include <string>
 #include <thread>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "client/load/run_clients.h"
 #include "client/load/verify_meshes.h"
+#include "client/net/blocking_connection.h"
 #include "client/net/connection.h"
 #include "client/net/fetch.h"
-#include "client/net/line.h"
 #include "common/program/program.h"
 #include "common/program/progress.h"
 #include "common/util/printable.h"
@@ -58,20 +57,20 @@ Result<void> allow_files(unsigned clients) {
   return {};
 }
 
-// What the server says of the data set: cameras go around its box.
+// The description of the data set: cameras move around its box. No view is sent, and no credit.
 Result<Description> describe(const ServerUrl& url) {
   auto connection = StreamConnection::open(url);
   if (!connection) return tl::unexpected(connection.error());
-  if (auto sent = connection->send(protocol::Open{url.name, "intervale-load " INTERVALE_VERSION, 0, {}}); !sent) return tl::unexpected(sent.error());
-  auto answer = connection->receive();
-  if (!answer) return tl::unexpected(answer.error());
-  auto* opened = std::get_if<protocol::Opened>(&*answer);
-  if (opened == nullptr) return fail("the server at " + url.authority() + " sent nonsense: something else than the data set's description");
-  if (auto ok = check_description(opened->description); !ok) {
-    return fail("the server at " + url.authority() + " describes no volume: " + ok.error().message);
-  }
+  ClientSession session({.dataset = url.name,
+                         .client = "intervale-load " INTERVALE_VERSION,
+                         .server = "the server at " + url.authority(),
+                         .max_bytes = 0,
+                         .has_mesh = false});
+  session.connected(ClientSession::Clock::now());
+  if (auto sent = connection->send(session); !sent) return tl::unexpected(sent.error());
+  if (const auto opened = connection->receive(session); !opened) return tl::unexpected(opened.error());
   connection->close();
-  return std::move(opened->description);
+  return *session.description();
 }
 
 LoadClock::duration ticks(std::chrono::duration<double> time) { return std::chrono::duration_cast<LoadClock::duration>(time); }
@@ -128,10 +127,10 @@ class Crew {
     }
   }
 
-  LoadFigures figures() {
+  LoadStats stats() {
     for (std::thread& thread : threads_) thread.join();
     if (failure_) std::rethrow_exception(failure_);
-    return std::move(figures_);
+    return std::move(stats_);
   }
 
   [[nodiscard]] double busiest_thread() const { return busiest_; }  // its CPU seconds
@@ -139,15 +138,15 @@ class Crew {
 
  private:
   void work(const LoadPlan& plan, unsigned first, unsigned step) {
-    LoadFigures figures;
+    LoadStats stats;
     std::exception_ptr failure;
     try {
-      figures = run_clients(plan, first, step, meshes_, progress_);
+      stats = run_clients(plan, first, step, meshes_, progress_);
     } catch (...) {
       failure = std::current_exception();
     }
     const std::lock_guard lock(mutex_);
-    figures_.add(std::move(figures));
+    stats_.add(std::move(stats));
     busiest_ = std::max(busiest_, cpu_seconds(RUSAGE_THREAD));
     if (failure) failure_ = failure;
     --running_;
@@ -159,7 +158,7 @@ class Crew {
   std::mutex mutex_;
   std::condition_variable ended_;
   unsigned running_;
-  LoadFigures figures_;
+  LoadStats stats_;
   double busiest_ = 0;
   std::exception_ptr failure_;
   std::vector<std::thread> threads_;
@@ -191,7 +190,7 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   plan.tls = std::move(*tls);
   Crew crew(plan, report.threads);
   crew.watch(plan);
-  report.figures = crew.figures();
+  report.stats = crew.stats();
   const std::chrono::duration<double> wall = LoadClock::now() - plan.start;
   report.seconds = std::min(wall, options.duration).count();
   report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));

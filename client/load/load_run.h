@@ -1,4 +1,4 @@
-// A whole load run: from a URL and a wish to figures.
+// A whole load run: from a URL and options to stats.
 #pragma once
 
 #include <chrono>
@@ -7,7 +7,7 @@
 
 #include "client/core/stream_client.h"
 #include "client/load/camera_paths.h"
-#include "client/load/figures.h"
+#include "client/load/load_stats.h"
 #include "client/net/url.h"
 #include "common/util/result.h"
 #include "protocol/limits.h"

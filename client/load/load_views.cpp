@@ -1,5 +1,6 @@
 #include "client/load/load_views.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -12,8 +13,8 @@ double milliseconds(LoadClock::duration time) { return std::chrono::duration<dou
 
 void LoadViews::begin(Time now) {
   first_ = now;
-  ++figures_.views;
-  if (is_only_one()) pending_.push_back({1, now});
+  ++stats_.views;
+  if (is_only_one()) pending_.push_back({now});
 }
 
 LoadViews::Time LoadViews::next_due() const {
@@ -26,12 +27,17 @@ bool LoadViews::advance(Time now) {
   if (next_due() > now) return false;
   for (Time due = next_due(); due <= now; due = next_due()) {
     ++view_;
-    ++figures_.views;
-    if (now - due > kLate) ++figures_.late_views;
-    pending_.push_back({epoch(), due});
+    ++stats_.views;
+    if (now - due > kLate) ++stats_.late_views;
+    pending_.push_back({due});
   }
   is_complete_ = false;
   return true;
+}
+
+void LoadViews::asked(std::uint64_t epoch) {
+  epoch_ = epoch;
+  for (Pending& view : pending_) view.epoch = std::min(view.epoch, epoch);
 }
 
 void LoadViews::note_bytes(std::size_t bytes) {
@@ -39,24 +45,24 @@ void LoadViews::note_bytes(std::size_t bytes) {
 }
 
 void LoadViews::serve(std::uint64_t epoch, Time now) {
-  if (lost_at_) figures_.resume_ms.push_back(milliseconds(now - *std::exchange(lost_at_, {})));
+  if (lost_at_) stats_.resume_ms.push_back(milliseconds(now - *std::exchange(lost_at_, {})));
   for (; !pending_.empty() && pending_.front().epoch <= epoch; pending_.pop_front()) {
-    figures_.view_change_ms.push_back(milliseconds(now - pending_.front().due));
-    if (pending_.front().epoch > 1) figures_.stale_bytes.push_back(double(pending_.front().stale_bytes));  // the first one replaces none
+    stats_.view_change_ms.push_back(milliseconds(now - pending_.front().due));
+    if (!is_only_one()) stats_.stale_bytes.push_back(double(pending_.front().stale_bytes));  // the first one replaces none
   }
 }
 
 void LoadViews::finish(std::uint64_t epoch, bool is_all, Time now) {
-  ++figures_.done_views;
+  ++stats_.done_views;
   has_mesh_ = true;  // if it has none, there is none
-  is_complete_ = is_all && epoch == this->epoch();
+  is_complete_ = is_all && epoch == epoch_;
   serve(epoch, now);
 }
 
 void LoadViews::note_mesh(std::uint64_t bytes, Time now) {
   if (std::exchange(has_mesh_, true)) return;
-  figures_.first_mesh_ms.push_back(milliseconds(now - start_));
-  figures_.first_mesh_bytes.push_back(double(bytes));
+  stats_.first_mesh_ms.push_back(milliseconds(now - start_));
+  stats_.first_mesh_bytes.push_back(double(bytes));
 }
 
 void LoadViews::lose(Time now) {
@@ -65,10 +71,10 @@ void LoadViews::lose(Time now) {
 }
 
 void LoadViews::report_rest(bool failed, Time now) {
-  figures_.unanswered_views += pending_.size();
+  stats_.unanswered_views += pending_.size();
   if (failed) return;
-  if (is_complete_) ++figures_.complete;
-  if (!has_mesh_) figures_.first_mesh_ms.push_back(milliseconds(now - start_));
+  if (is_complete_) ++stats_.complete;
+  if (!has_mesh_) stats_.first_mesh_ms.push_back(milliseconds(now - start_));
   if (!pending_.empty() || lost_at_) serve(UINT64_MAX, now);
 }
 

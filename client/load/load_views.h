@@ -12,8 +12,8 @@
 #include <optional>
 
 #include "client/load/camera_paths.h"
-#include "client/load/figures.h"
 #include "client/load/load_plan.h"
+#include "client/load/load_stats.h"
 
 namespace intervale {
 
@@ -22,17 +22,17 @@ class LoadViews {
  public:
   using Time = LoadClock::time_point;
 
-  // path: the client's own. start: when it was to connect. figures: to be added to; they outlive this.
-  LoadViews(const CameraPath& path, Time start, LoadFigures& figures) : path_(path), start_(start), figures_(figures) {}
+  // path: the client's own. start: when it was to connect. stats: to be added to; they outlive this.
+  LoadViews(const CameraPath& path, Time start, LoadStats& stats) : path_(path), start_(start), stats_(stats) {}
 
   void begin(Time now);         // the first WebSocket is open, and the first view due
   void end() { over_ = true; }  // no view is due from now on
 
   [[nodiscard]] Time next_due() const;  // Time::max(): none will be
-  bool advance(Time now);               // to the newest view that is due, if any is; those before it are as good as sent
+  bool advance(Time now);               // to the newest view that is due, if any is; those before it count as sent with it
+  void asked(std::uint64_t epoch);      // the newest view was sent, with this epoch, which is greater than the last
 
   [[nodiscard]] Lod lod() const { return view_of(path_, view_); }  // of the last one that was due
-  [[nodiscard]] std::uint64_t epoch() const { return view_ + 1; }  // likewise
   [[nodiscard]] bool is_only_one() const { return path_.scenario == Scenario::full; }
 
   // What comes.
@@ -51,15 +51,16 @@ class LoadViews {
 
  private:
   struct Pending {  // an answer is waited for
-    std::uint64_t epoch = 0;
     Time due;
+    std::uint64_t epoch = UINT64_MAX;  // not sent yet
     std::uint64_t stale_bytes = 0;
   };
   CameraPath path_;
   Time start_;
-  LoadFigures& figures_;
+  LoadStats& stats_;
   Time first_;                   // when the first one was due
   std::uint64_t view_ = 0;       // number of the last one
+  std::uint64_t epoch_ = 0;      // of the last one sent
   std::deque<Pending> pending_;  // in order
   std::optional<Time> lost_at_;  // when the server was seen to be lost
   bool has_mesh_ = false;        // or it is known that none will come

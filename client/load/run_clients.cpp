@@ -35,13 +35,13 @@ asio::awaitable<void> end_in_time(asio::steady_timer& timer, const LoadPlan& pla
 
 }  // namespace
 
-LoadFigures run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<StreamClient>> meshes, LoadProgress& progress) {
+LoadStats run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<StreamClient>> meshes, LoadProgress& progress) {
   asio::io_context io(1);
   const auto endpoints = tcp::resolver(io).resolve(plan.url.host, plan.url.port);
-  LoadFigures figures;
+  LoadStats stats;
   std::vector<std::unique_ptr<LoadClient>> clients;
   for (unsigned number = first; number < plan.clients; number += step) {
-    clients.push_back(std::make_unique<LoadClient>(io, endpoints, plan, number, figures, progress));
+    clients.push_back(std::make_unique<LoadClient>(io, endpoints, plan, number, stats, progress));
   }
   asio::steady_timer end(io);
   std::size_t running = clients.size();
@@ -59,7 +59,7 @@ LoadFigures run_clients(const LoadPlan& plan, unsigned first, unsigned step, std
   });
   io.run();
   if (failure) std::rethrow_exception(failure);
-  return figures;
+  return stats;
 }
 
 }  // namespace intervale

@@ -6,9 +6,10 @@
 #include <string>
 #include <utility>
 
-#include "client/net/line.h"
+#include "client/net/blocking_connection.h"
 #include "common/util/printable.h"
-#include "protocol/codec.h"
+#include "protocol/limits.h"
+#include "protocol/messages.h"
 
 namespace intervale {
 namespace {
@@ -26,13 +27,11 @@ struct StreamConnection::Socket {
   BlockingRun run;
   websocket::stream<Stream> ws{run.io()};
   beast::flat_buffer buffer;
-  std::uint64_t bytes_received = 0;
-  std::uint64_t messages = 0;
   bool is_lost = false;
 
   Result<void> shake_hands();
   tl::unexpected<Error> lost(beast::error_code error);
-  tl::unexpected<Error> faulted(const protocol::Fault& fault) const;
+  [[nodiscard]] Error faulted(const protocol::Fault& fault, const Error& error) const;
 };
 
 Result<void> StreamConnection::Socket::shake_hands() {
@@ -63,7 +62,7 @@ tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) {
   is_lost = error != websocket::error::message_too_big;
   if (error == websocket::error::closed) {
     const auto reason = ws.reason();
-    is_lost = reason.code == static_cast<unsigned>(CloseCode::going_away) || reason.code == static_cast<unsigned>(CloseCode::internal);
+    is_lost = may_reconnect(CloseCode(reason.code));
     return fail("the server at " + url.authority() + " closed the session with code " + std::to_string(reason.code));
   }
   if (error == websocket::error::message_too_big) return fail("the server at " + url.authority() + " sent a message larger than the protocol allows");
@@ -71,15 +70,14 @@ tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) {
   return fail("lost the server at " + url.authority() + ": " + error.message());
 }
 
-tl::unexpected<Error> StreamConnection::Socket::faulted(const protocol::Fault& fault) const {
-  const std::string text = printable(fault.text);
+// Some faults are the user's to correct: the error says how.
+Error StreamConnection::Socket::faulted(const protocol::Fault& fault, const Error& error) const {
   if (fault.code == CloseCode::no_such_dataset) {
-    return fail("no data set '" + url.name + "' at " + url.server() + "; see intervale-client list " + url.server());
+    return {"no data set '" + url.name + "' at " + url.server() + "; see intervale-client list " + url.server()};
   }
-  if (fault.code == CloseCode::unauthorized) return tl::unexpected(unauthorized(url));
-  if (fault.code == CloseCode::forbidden) return fail("the token given does not open '" + url.name + "' at " + url.server());
-  return fail("the server at " + url.authority() + " ended the session: " + text + " (code " + std::to_string(static_cast<unsigned>(fault.code)) +
-              ")");
+  if (fault.code == CloseCode::unauthorized) return unauthorized(url);
+  if (fault.code == CloseCode::forbidden) return {"the token given does not open '" + url.name + "' at " + url.server()};
+  return error;
 }
 
 Error unauthorized(const ServerUrl& url) {
@@ -107,27 +105,28 @@ Result<StreamConnection> StreamConnection::open(const ServerUrl& url) {
   return StreamConnection(std::move(socket));
 }
 
-Result<void> StreamConnection::send(const protocol::ClientMessage& message) {
-  const auto bytes = protocol::encode(message);
-  const auto error = socket_->run([&](auto done) { socket_->ws.async_write(asio::buffer(bytes), done); });
-  if (error) return socket_->lost(error);
+Result<void> StreamConnection::send(ClientSession& session) {
+  for (const auto& message : session.take_messages()) {
+    const auto error = socket_->run([&](auto done) { socket_->ws.async_write(asio::buffer(message), done); });
+    if (error) return socket_->lost(error);
+  }
   return {};
 }
 
-Result<protocol::ServerMessage> StreamConnection::receive() {
+Result<ClientSession::Event> StreamConnection::receive(ClientSession& session) {
   Socket& socket = *socket_;
   socket.buffer.clear();
   if (const auto error = socket.run([&](auto done) { socket.ws.async_read(socket.buffer, done); })) return socket.lost(error);
   if (socket.ws.got_text()) return fail("the server at " + socket.url.authority() + " sent text, where only binary messages are spoken");
-  ++socket.messages;
-  socket.bytes_received += socket.buffer.size();
-  auto message = protocol::decode_server_message({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()});
-  if (!message) return fail("the server at " + socket.url.authority() + " sent a " + message.error().message);
-  if (const auto* fault = std::get_if<protocol::Fault>(&*message)) {
-    socket.is_lost = fault->code == CloseCode::going_away || fault->code == CloseCode::internal;
-    return socket.faulted(*fault);
+  const auto event =
+      session.receive({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()}, ClientSession::Clock::now());
+  if (!event && session.fault()) {
+    socket.is_lost = may_reconnect(session.fault()->code);
+    return tl::unexpected(socket.faulted(*session.fault(), event.error()));
   }
-  return message;
+  if (!event) return event;
+  if (auto sent = send(session); !sent) return tl::unexpected(sent.error());
+  return event;
 }
 
 void StreamConnection::close() {
@@ -135,7 +134,5 @@ void StreamConnection::close() {
 }
 
 bool StreamConnection::is_lost() const { return socket_->is_lost; }
-std::uint64_t StreamConnection::bytes_received() const { return socket_->bytes_received; }
-std::uint64_t StreamConnection::messages() const { return socket_->messages; }
 
 }  // namespace intervale

@@ -1,27 +1,27 @@
-// A WebSocket to a server, one message at a time. Blocks, never for longer than its deadlines.
+// A WebSocket to a server. Blocks, never for longer than its deadlines.
 #pragma once
 
 #include <chrono>
-#include <cstdint>
 #include <memory>
 #include <string_view>
 
+#include "client/core/client_session.h"
 #include "client/net/url.h"
 #include "common/util/result.h"
-#include "protocol/messages.h"
 
 namespace intervale {
 
-inline constexpr std::chrono::seconds kConnectTime{5};   // to reach the server, and then for it to answer
-inline constexpr std::chrono::seconds kSilenceTime{30};  // pings unanswered: the server is gone
+inline constexpr std::chrono::seconds kConnectTime{5};   // to connect, and then for the WebSocket's handshake
+inline constexpr std::chrono::seconds kSilenceTime{30};  // without an answer to pings; then the server is lost
 
-// The server wants a token, or another one.
+// The server requires a token, or another one.
 [[nodiscard]] Error unauthorized(const ServerUrl& url);
 
-// The server answered 503 with that body: its first line, cut at 80 bytes, says why, unless it is a page (of some proxy's).
+// The server answered 503 with that body. Its first line, cut at 80 bytes, says why, unless it is HTML (from a proxy).
 [[nodiscard]] Error turned_away(const ServerUrl& url, std::string_view body);
 
-// One thread at a time. Every error says which server it is about.
+// The connection of one session at a time, on one thread. Every error names the server. After one, only is_lost() may
+// be called.
 class StreamConnection {
  public:
   static Result<StreamConnection> open(const ServerUrl& url);
@@ -29,18 +29,16 @@ class StreamConnection {
   StreamConnection& operator=(StreamConnection&&) noexcept;
   ~StreamConnection();  // cuts the connection, if close() did not end it
 
-  Result<void> send(const protocol::ClientMessage& message);
+  // Sends what the session has to send.
+  Result<void> send(ClientSession& session);
 
-  // The next message. The server's going away, a fault and a message that makes no sense are errors, after which nothing else is to be called.
-  Result<protocol::ServerMessage> receive();
+  // Waits for the next message, passes it to the session, and sends what that has to send then.
+  Result<ClientSession::Event> receive(ClientSession& session);
 
-  // Whether the last error was the line's or the server's end, so that connecting again may help; false for faults and nonsense.
+  // Whether the last error was the end of the connection or of the server, so that connecting again may help.
   [[nodiscard]] bool is_lost() const;
 
   void close();  // in order, with code 1000; waits for the server's answer at most kConnectTime
-
-  [[nodiscard]] std::uint64_t bytes_received() const;  // of messages received, without WebSocket's framing
-  [[nodiscard]] std::uint64_t messages() const;        // received
 
  private:
   struct Socket;  // keeps Beast out of this header

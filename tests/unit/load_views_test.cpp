@@ -12,9 +12,9 @@ using std::chrono::milliseconds;
 
 // A client that asks five times a second, and connects as the clock begins.
 struct Client {
-  LoadFigures figures;
+  LoadStats stats;
   LoadViews views;
-  explicit Client(Scenario scenario = Scenario::orbit) : views({.scenario = scenario, .box = {{0, 0, 0}, {1, 1, 1}}}, {}, figures) {}
+  explicit Client(Scenario scenario = Scenario::orbit) : views({.scenario = scenario, .box = {{0, 0, 0}, {1, 1, 1}}}, {}, stats) {}
 };
 
 LoadViews::Time at(int ms) { return LoadViews::Time(milliseconds(ms)); }
@@ -24,22 +24,25 @@ TEST(LoadViews, WaitSinceTheyWereDueHoweverLateTheyAreSent) {
   c.views.begin(at(50));
   EXPECT_FALSE(c.views.advance(at(249)));
   EXPECT_EQ(c.views.next_due(), at(250));
-  EXPECT_TRUE(c.views.advance(at(700)));  // those of 250, 450 and 650
-  EXPECT_EQ(c.views.epoch(), 4u);
+  EXPECT_TRUE(c.views.advance(at(256)));
+  c.views.asked(2);
+  EXPECT_TRUE(c.views.advance(at(700)));  // those of 450 and 650
+  c.views.asked(3);
   EXPECT_EQ(c.views.next_due(), at(850));
   c.views.serve(2, at(710));
   c.views.note_bytes(1000);
-  c.views.serve(4, at(750));
-  EXPECT_EQ(c.figures.view_change_ms, (std::vector<double>{460, 300, 100}));
-  EXPECT_EQ(c.figures.stale_bytes, (std::vector<double>{0, 1000, 1000}));
-  EXPECT_EQ(c.figures.views, 4u);
-  EXPECT_EQ(c.figures.late_views, 3u);
+  c.views.serve(3, at(750));
+  EXPECT_EQ(c.stats.view_change_ms, (std::vector<double>{460, 300, 100}));
+  EXPECT_EQ(c.stats.stale_bytes, (std::vector<double>{0, 1000, 1000}));
+  EXPECT_EQ(c.stats.views, 4u);
+  EXPECT_EQ(c.stats.late_views, 3u);
 }
 
 TEST(LoadViews, AreOverOnceAllAreAnsweredAndThereIsAMesh) {
   Client c;
   c.views.begin(at(0));
   EXPECT_TRUE(c.views.advance(at(200)));
+  c.views.asked(2);
   c.views.end();
   EXPECT_EQ(c.views.next_due(), LoadViews::Time::max());
   EXPECT_FALSE(c.views.advance(at(1000)));
@@ -47,7 +50,7 @@ TEST(LoadViews, AreOverOnceAllAreAnsweredAndThereIsAMesh) {
   EXPECT_FALSE(c.views.are_over());
   c.views.note_mesh(300, at(1010));
   EXPECT_TRUE(c.views.are_over());
-  EXPECT_EQ(c.figures.first_mesh_ms, (std::vector<double>{1010}));
+  EXPECT_EQ(c.stats.first_mesh_ms, (std::vector<double>{1010}));
 }
 
 TEST(LoadViews, WhatIsUnansweredCountsWithItsTimeUnlessTheClientFailed) {
@@ -55,35 +58,38 @@ TEST(LoadViews, WhatIsUnansweredCountsWithItsTimeUnlessTheClientFailed) {
     Client c;
     c.views.begin(at(0));
     EXPECT_TRUE(c.views.advance(at(400)));
+    c.views.asked(2);
     c.views.report_rest(failed, at(1000));
-    EXPECT_EQ(c.figures.unanswered_views, 2u);
-    EXPECT_EQ(c.figures.view_change_ms, failed ? std::vector<double>{} : (std::vector<double>{800, 600}));
-    EXPECT_EQ(c.figures.first_mesh_ms, failed ? std::vector<double>{} : std::vector<double>{1000});
+    EXPECT_EQ(c.stats.unanswered_views, 2u);
+    EXPECT_EQ(c.stats.view_change_ms, failed ? std::vector<double>{} : (std::vector<double>{800, 600}));
+    EXPECT_EQ(c.stats.first_mesh_ms, failed ? std::vector<double>{} : std::vector<double>{1000});
   }
 }
 
 TEST(LoadViews, ALostServerIsMissedUntilAViewIsServed) {
   Client c;
   c.views.begin(at(0));
+  c.views.asked(1);
   c.views.finish(1, true, at(10));
   c.views.lose(at(20));
   c.views.lose(at(40));  // the next one too
   EXPECT_TRUE(c.views.is_lost());
   c.views.serve(1, at(100));
   EXPECT_FALSE(c.views.is_lost());
-  EXPECT_EQ(c.figures.resume_ms, (std::vector<double>{80}));
+  EXPECT_EQ(c.stats.resume_ms, (std::vector<double>{80}));
   c.views.report_rest(false, at(200));
-  EXPECT_EQ(c.figures.complete, 0u) << "another session has to say so again";
+  EXPECT_EQ(c.stats.complete, 0u) << "another session has to say so again";
 }
 
 TEST(LoadViews, TheWholeStreamIsOneView) {
   Client c(Scenario::full);
   c.views.begin(at(5));
+  c.views.asked(1);
   EXPECT_FALSE(c.views.advance(at(10'000)));
   c.views.finish(1, true, at(10'005));
   c.views.report_rest(false, at(10'010));
-  EXPECT_EQ(c.figures.view_change_ms, (std::vector<double>{10'000}));
-  EXPECT_EQ(c.figures.complete, 1u);
+  EXPECT_EQ(c.stats.view_change_ms, (std::vector<double>{10'000}));
+  EXPECT_EQ(c.stats.complete, 1u);
 }
 
 }  // namespace

@@ -2,192 +2,150 @@
 
 #include <gtest/gtest.h>
 
-#include <deque>
 #include <memory>
 
 #include "common/ivm/extraction.h"
 #include "protocol/codec.h"
-#include "server/builder/field_hierarchy.h"
-#include "server/serve/access.h"
-#include "server/serve/atomic_shared_ptr.h"
-#include "server/serve/session_state.h"
-#include "tests/support/analytic_fields.h"
+#include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/session_server.h"
 
 namespace intervale {
 namespace {
 
 using testing::canonical;
-using Clock = ViewingSession::Clock;
+using Server = testing::SessionServer<ViewingSession>;
 
-Catalogue catalogue_of(Volume volume) {
-  Catalogue catalogue;
-  auto sigma = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
-  EXPECT_TRUE(sigma);
-  EXPECT_TRUE(catalogue.add(std::make_shared<const IntervalVolume>(std::move(*sigma))));
-  return catalogue;
+std::shared_ptr<const IntervalVolume> volume_of(const testing::Dims& dims) {
+  return testing::build_shared(testing::gyroid(dims), {.range = {-0.3, 0.2}});
 }
-
-// A server at the other end of a line that carries a message at once, or breaks.
-class Line {
- public:
-  Line(const Catalogue& catalogue, ViewingSession& client) : client_(client) {
-    catalogue_.store(std::make_shared<const Catalogue>(catalogue));
-    client_.opened_line(now_);
-  }
-  // Until neither has anything to say, or so many messages came from the server.
-  void run(int messages = 1 << 20) {
-    while (messages > 0) {
-      for (const auto& bytes : client_.take_messages()) {
-        const auto message = protocol::decode_client_message(bytes);
-        ASSERT_TRUE(message) << message.error().message;
-        const auto fault = server_.receive(*message);
-        ASSERT_FALSE(fault) << fault->text;
-      }
-      auto message = server_.next(2048);
-      if (!message && server_.has_work()) continue;
-      if (!message) return;
-      now_ += std::chrono::milliseconds(1);
-      const auto taken = client_.receive(protocol::encode(*message), now_);
-      ASSERT_TRUE(taken) << taken.error().message;
-      --messages;
-    }
-  }
-  SessionState& server() { return server_; }
-
- private:
-  AtomicSharedPtr<Catalogue> catalogue_;
-  SessionState server_{catalogue_, Scope::everything()};
-  ViewingSession& client_;
-  Clock::time_point now_{};
-};
 
 const Camera kCamera{.eye = {40, 30, 60}, .look_at = {8, 8, 8}, .viewport = {640, 480}};
 const Box kAll{{-1, -1, -1}, {100, 100, 100}};
 
-struct Viewing : ::testing::Test {
-  Catalogue catalogue = catalogue_of(testing::gyroid({17, 17, 17}));
-  std::shared_ptr<const IntervalVolume> volume = catalogue.find("made");
+struct ViewingSessionTest : ::testing::Test {
+  std::shared_ptr<const IntervalVolume> volume = volume_of({17, 17, 17});
   ViewingSession session{"made", "test"};
 };
 
-TEST_F(Viewing, ARegionComesToTheEnd) {
+TEST_F(ViewingSessionTest, RefinesARegionToTheEnd) {
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
-  Line line(catalogue, session);
-  line.run();
-  EXPECT_TRUE(session.figures().done);
-  EXPECT_FALSE(session.figures().full);
-  EXPECT_EQ(session.figures().received, volume->size());
-  EXPECT_EQ(canonical(session.client()->mesh()), canonical(extract(*volume, {})->front.mesh()));
+  Server server(volume, session);
+  server.run();
+  EXPECT_TRUE(session.is_done());
+  EXPECT_FALSE(session.session().stats().is_full);
+  EXPECT_EQ(session.session().stats().updates, volume->size());
+  EXPECT_EQ(canonical(session.mesh()->mesh()), canonical(extract(*volume, {})->front.mesh()));
 }
 
-TEST_F(Viewing, AViewComesAsFarAsItIsSeenAndANewOneGoesOn) {
+TEST_F(ViewingSessionTest, RefinesEachViewAsFarAsItIsSeen) {
   ASSERT_TRUE(session.look({.camera = kCamera}));
-  Line line(catalogue, session);
-  line.run();
-  EXPECT_TRUE(session.figures().done);
-  const auto before = session.figures().received;
+  Server server(volume, session);
+  server.run();
+  EXPECT_TRUE(session.is_done());
+  const auto before = session.session().stats().updates;
   EXPECT_LT(before, volume->size());
   Camera near = kCamera;
   near.eye = {12, 12, 20};
   ASSERT_TRUE(session.look({.camera = near}));
-  EXPECT_FALSE(session.figures().done);
-  line.run();
-  EXPECT_TRUE(session.figures().done);
-  EXPECT_GT(session.figures().received, before);
-  EXPECT_EQ(session.figures().received, session.client()->updates());
+  EXPECT_FALSE(session.is_done());
+  server.run();
+  EXPECT_TRUE(session.is_done());
+  EXPECT_GT(session.session().stats().updates, before);
+  EXPECT_EQ(session.session().stats().updates, session.mesh()->updates());
 }
 
-TEST_F(Viewing, TheSameViewAgainIsNotAsked) {
+TEST_F(ViewingSessionTest, DoesNotAskForTheSameViewAgain) {
   ASSERT_TRUE(session.look({.camera = kCamera}));
-  Line line(catalogue, session);
-  line.run();
+  Server server(volume, session);
+  server.run();
   ASSERT_TRUE(session.look({.camera = kCamera}));
   EXPECT_TRUE(session.take_messages().empty());
-  EXPECT_TRUE(session.figures().done);
+  EXPECT_TRUE(session.is_done());
 }
 
-TEST_F(Viewing, ALostLineGoesOnWithNothingSentTwice) {
+TEST_F(ViewingSessionTest, ResumesWithNothingSentTwice) {
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
   for (int k = 0; k < 3; ++k) {
-    Line line(catalogue, session);
-    line.run(3);
-    session.lost_line();
+    Server server(volume, session);
+    server.run(3);
+    EXPECT_EQ(server.resumed(), k > 0);
+    session.disconnected();
   }
-  Line line(catalogue, session);
-  line.run();
-  EXPECT_TRUE(session.figures().done);
-  EXPECT_EQ(session.figures().received, volume->size());
-  EXPECT_EQ(session.figures().resumed, 3u);
-  EXPECT_EQ(canonical(session.client()->mesh()), canonical(extract(*volume, {})->front.mesh()));
+  Server server(volume, session);
+  server.run();
+  EXPECT_TRUE(server.resumed());
+  EXPECT_TRUE(session.is_done());
+  EXPECT_EQ(session.session().stats().updates, volume->size());
+  EXPECT_EQ(canonical(session.mesh()->mesh()), canonical(extract(*volume, {})->front.mesh()));
 }
 
-TEST_F(Viewing, OtherDataStartsAfresh) {
+TEST_F(ViewingSessionTest, StartsAgainWithOtherData) {
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
   {
-    Line line(catalogue, session);
-    line.run(3);
-    session.lost_line();
+    Server server(volume, session);
+    server.run(3);
+    session.disconnected();
   }
-  const Catalogue other = catalogue_of(testing::gyroid({12, 20, 9}));
-  Line line(other, session);
-  line.run();
-  EXPECT_EQ(session.figures().received, other.find("made")->size());
-  EXPECT_EQ(session.figures().resumed, 0u);
+  const auto other = volume_of({12, 20, 9});
+  Server server(other, session);
+  server.run();
+  EXPECT_EQ(session.session().stats().updates, other->size());
+  EXPECT_FALSE(server.resumed());
 }
 
-TEST_F(Viewing, TheBudgetOfTetrahedraHoldsAtEveryMoment) {
+TEST_F(ViewingSessionTest, KeepsTheBudgetOfTetrahedraAtEveryMoment) {
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_tets = 3000}}));
-  Line line(catalogue, session);
-  for (int k = 0; k < 1000 && !session.figures().done; ++k) {
-    line.run(1);
-    ASSERT_TRUE(session.client()->tet_count() <= 3000);
+  Server server(volume, session);
+  for (int k = 0; k < 1000 && !session.is_done(); ++k) {
+    server.run(1);
+    ASSERT_TRUE(session.mesh()->tet_count() <= 3000);
   }
-  EXPECT_EQ(session.client()->updates(), volume->size()) << "all is kept";
+  EXPECT_EQ(session.mesh()->updates(), volume->size()) << "all is kept";
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
-  EXPECT_EQ(session.client()->tet_count(), volume->description().full.tets) << "and shown when there is room";
+  EXPECT_EQ(session.mesh()->tet_count(), volume->description().full.tets) << "and shown when there is room";
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_tets = 2000}}));
-  EXPECT_LE(session.client()->tet_count(), 2000u);
+  EXPECT_LE(session.mesh()->tet_count(), 2000u);
 }
 
-TEST_F(Viewing, TheRoomForUpdatesHoldsAndCanChange) {
+TEST_F(ViewingSessionTest, KeepsTheRoomForUpdatesWhichMayChange) {
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_updates = 1000}}));
-  Line line(catalogue, session);
-  line.run();
-  EXPECT_TRUE(session.figures().done);
-  EXPECT_TRUE(session.figures().full);
-  EXPECT_LE(session.client()->updates(), 1000u);
+  Server server(volume, session);
+  server.run();
+  EXPECT_TRUE(session.is_done());
+  EXPECT_TRUE(session.session().stats().is_full);
+  EXPECT_LE(session.mesh()->updates(), 1000u);
   ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_updates = 2000}}));
-  line.run();
-  EXPECT_GT(session.client()->updates(), 1000u);
-  EXPECT_LE(session.client()->updates(), 2000u);
+  server.run();
+  EXPECT_GT(session.mesh()->updates(), 1000u);
+  EXPECT_LE(session.mesh()->updates(), 2000u);
   for (int k = 0; k < 4; ++k) {  // less, seen from elsewhere each time
     Camera camera = kCamera;
     camera.eye[k % 3] += 5 * k + 5;
     ASSERT_TRUE(session.look({.camera = camera, .region = kAll, .budget = {.max_updates = 1100}}));
-    line.run();
+    server.run();
   }
-  EXPECT_LE(session.client()->updates(), 1100u);
+  EXPECT_LE(session.mesh()->updates(), 1100u);
 }
 
-TEST_F(Viewing, NonsenseAndFaultsEndIt) {
+TEST_F(ViewingSessionTest, InvalidMessagesAndFaultsEndIt) {
   EXPECT_FALSE(session.look({.camera = {.eye = {1, 1, 1}, .look_at = {1, 1, 1}}}));
   EXPECT_FALSE(session.look({.camera = kCamera, .budget = {.max_updates = 1}}));
   ASSERT_TRUE(session.look({.camera = kCamera}));
-  session.opened_line({});
+  session.connected({});
   EXPECT_FALSE(session.receive(std::vector<std::uint8_t>{1, 2, 3}, {}));
   ViewingSession early("made", "test");
   ASSERT_TRUE(early.look({.camera = kCamera}));
-  early.opened_line({});
+  early.connected({});
   EXPECT_FALSE(early.receive(protocol::encode(protocol::ServerMessage(protocol::Done{1, 0, false})), {}));
   ViewingSession refused("nothing", "test");
   ASSERT_TRUE(refused.look({.camera = kCamera}));
-  refused.opened_line({});
+  refused.connected({});
   const auto taken =
       refused.receive(protocol::encode(protocol::ServerMessage(protocol::Fault{protocol::CloseCode::no_such_dataset, "no\nsuch"})), {});
   ASSERT_FALSE(taken);
   EXPECT_EQ(taken.error().message.find('\n'), std::string::npos);
-  EXPECT_EQ(refused.fault_code(), protocol::CloseCode::no_such_dataset);
+  EXPECT_EQ(refused.session().fault()->code, protocol::CloseCode::no_such_dataset);
 }
 
 }  // namespace

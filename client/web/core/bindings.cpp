@@ -70,8 +70,8 @@ class Viewer {
     stale_ = true;  // a budget hides and shows at once
     return text_of(session_.look(wanted));
   }
-  void opened_line(double now) { session_.opened_line(time_of(now)); }
-  void lost_line() { session_.lost_line(); }
+  void connected(double now) { session_.connected(time_of(now)); }
+  void disconnected() { session_.disconnected(); }
 
   // Room for one message; valid until the next call.
   val inbox(std::size_t size) {
@@ -80,9 +80,10 @@ class Viewer {
   }
   std::string receive(double now) {
     stale_ = true;
-    const auto received = session_.receive(inbox_, time_of(now));
-    if (received && session_.is_fresh()) skin_.emplace(session_.client()->front());
-    return text_of(received);
+    const auto event = session_.receive(inbox_, time_of(now));
+    event_ = event ? *event : ClientSession::Event();
+    if (event_.is_new_mesh) skin_.emplace(session_.mesh()->front());
+    return text_of(event);
   }
   val take_messages() {
     val messages = val::array();
@@ -92,17 +93,21 @@ class Viewer {
   }
 
   // Of the last receive().
-  [[nodiscard]] bool was_opened() const { return session_.was_opened(); }
-  [[nodiscard]] bool is_fresh() const { return session_.is_fresh(); }
-  [[nodiscard]] int fault_code() const { return int(session_.fault_code()); }
+  [[nodiscard]] bool was_opened() const { return event_.kind == ClientSession::Event::Kind::opened; }
+  [[nodiscard]] bool is_fresh() const { return event_.is_new_mesh; }
+  // Of the last failure; 1000 if the server did not say it.
+  [[nodiscard]] int fault_code() const {
+    const auto& fault = session_.session().fault();
+    return int(fault ? fault->code : protocol::CloseCode::normal);
+  }
 
-  [[nodiscard]] double updates() const { return session_.client() ? double(session_.client()->updates()) : 0.0; }
-  [[nodiscard]] bool done() const { return session_.figures().done; }
+  [[nodiscard]] double updates() const { return session_.mesh() ? double(session_.mesh()->updates()) : 0.0; }
+  [[nodiscard]] bool done() const { return session_.is_done(); }
 
   // A Dataset of messages.ts; undefined before the first description.
   [[nodiscard]] val dataset() const {
-    if (session_.client() == nullptr) return val::undefined();
-    const Description& d = session_.client()->description();
+    if (session_.mesh() == nullptr) return val::undefined();
+    const Description& d = session_.mesh()->description();
     val dataset = val::object();
     dataset.set("name", d.name);
     dataset.set("dims", array_of(d.grid.dims));
@@ -118,23 +123,23 @@ class Viewer {
 
   // What a Progress of messages.ts has of the core.
   [[nodiscard]] val progress() const {
-    const ViewingSession::Figures& f = session_.figures();
-    const StreamClient* client = session_.client();
+    const ClientSession::Stats& stats = session_.session().stats();
+    const StreamClient* client = session_.mesh();
     val progress = val::object();
-    progress.set("bytes", double(f.bytes));
+    progress.set("bytes", double(stats.bytes));
     progress.set("updates", updates());
     progress.set("updatesShown", client ? double(client->updates_in_mesh()) : 0.0);
     progress.set("tets", client ? double(client->tet_count()) : 0.0);
     progress.set("triangles", skin_ ? double(skin_->triangles()) : 0.0);
-    progress.set("updatesToGo", double(f.updates_to_go));
-    progress.set("remainingError", f.remaining_error);
-    progress.set("remainingPixels", f.remaining_pixels);
+    progress.set("updatesToGo", double(stats.updates_to_go));
+    progress.set("remainingError", stats.remaining_error);
+    progress.set("remainingPixels", session_.remaining_pixels());
     progress.set("done", done());
-    progress.set("full", f.full);
+    progress.set("full", stats.is_full);
     progress.set("volume", skin_ ? skin_->volume() : 0.0);
     progress.set("volumeBound", skin_ ? skin_->volume_bound() : 0.0);
-    progress.set("reconnects", double(f.sessions > 0 ? f.sessions - 1 : 0));
-    progress.set("repeated", client && f.received > client->updates() ? double(f.received - client->updates()) : 0.0);
+    progress.set("reconnects", double(stats.connections > 0 ? stats.connections - 1 : 0));
+    progress.set("repeated", client && stats.updates > client->updates() ? double(stats.updates - client->updates()) : 0.0);
     return progress;
   }
 
@@ -187,19 +192,23 @@ class Viewer {
 
   // The mesh as a file of the format that this path ends in: its bytes, or a text that says why there are none.
   [[nodiscard]] val save(const std::string& path) const {
-    const auto written = write_mesh(path, session_.client()->mesh());
+    const auto written = write_mesh(path, session_.mesh()->mesh());
     if (!written) return val(written.error().message);
     return buffer_of(take_committed_file());
   }
-  std::string digest() const { return mesh_digest(session_.client()->mesh()); }
+  std::string digest() const { return mesh_digest(session_.mesh()->mesh()); }
 
  private:
-  static std::string text_of(const Result<void>& result) { return result ? std::string() : result.error().message; }
+  template <class T>
+  static std::string text_of(const Result<T>& result) {
+    return result ? std::string() : result.error().message;
+  }
 
   ViewingSession session_;
   std::optional<Skin> skin_;
   std::vector<std::uint8_t> inbox_;
-  bool stale_ = true;  // the mesh may have changed since the last skin
+  ClientSession::Event event_;  // of the last message
+  bool stale_ = true;           // the mesh may have changed since the last skin
 };
 
 }  // namespace
@@ -208,8 +217,8 @@ EMSCRIPTEN_BINDINGS(intervale) {
   emscripten::class_<Viewer>("Viewer")
       .constructor<const std::string&>()
       .function("look", &Viewer::look)
-      .function("openedLine", &Viewer::opened_line)
-      .function("lostLine", &Viewer::lost_line)
+      .function("openedLine", &Viewer::connected)
+      .function("lostLine", &Viewer::disconnected)
       .function("inbox", &Viewer::inbox)
       .function("receive", &Viewer::receive)
       .function("takeMessages", &Viewer::take_messages)

@@ -18,7 +18,7 @@ struct Percentiles {
 
 // Of one client, of one thread's clients, or of a whole run. Every sample is kept, 8 bytes each: a client that turns five times a second takes
 // 0.3 MB an hour.
-struct LoadFigures {
+struct LoadStats {
   std::uint64_t connected = 0;         // clients whose WebSocket was opened
   std::uint64_t failed = 0;            // clients that did not keep going to the end
   std::uint64_t updates = 0;           // received within the duration, by all clients
@@ -40,11 +40,11 @@ struct LoadFigures {
   std::vector<double> resume_ms;    // of each reconnect: from when the server was seen to be lost to the first batch or end of a view
   std::map<std::string, std::uint64_t> errors;
 
-  void add(LoadFigures&& other);
+  void add(LoadStats&& other);
 };
 
 struct LoadReport {
-  LoadFigures figures;
+  LoadStats stats;
   std::string scenario;
   std::uint64_t clients = 0;
   double seconds = 0;         // from the start until the duration was over or the last client had all it wanted

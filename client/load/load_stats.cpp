@@ -1,4 +1,4 @@
-#include "client/load/figures.h"
+#include "client/load/load_stats.h"
 
 #include <fmt/core.h>
 
@@ -29,7 +29,7 @@ double per_second(std::uint64_t count, double seconds) { return seconds > 0 ? do
 
 std::uint64_t errors_in(const LoadReport& report) {
   std::uint64_t sum = report.differing;
-  for (const auto& [text, count] : report.figures.errors) sum += count;
+  for (const auto& [text, count] : report.stats.errors) sum += count;
   return sum;
 }
 
@@ -54,22 +54,22 @@ std::optional<Percentiles> percentiles_of(std::vector<double> samples) {
   return Percentiles{rank(50), rank(95), rank(99), rank(100)};
 }
 
-void LoadFigures::add(LoadFigures&& other) {
+void LoadStats::add(LoadStats&& other) {
   for (const auto member :
-       {&LoadFigures::connected, &LoadFigures::failed, &LoadFigures::updates, &LoadFigures::bytes, &LoadFigures::views, &LoadFigures::late_views,
-        &LoadFigures::unanswered_views, &LoadFigures::done_views, &LoadFigures::complete, &LoadFigures::protocol_closes, &LoadFigures::reconnects,
-        &LoadFigures::repeated_updates, &LoadFigures::repeated_bytes, &LoadFigures::resume_bytes}) {
+       {&LoadStats::connected, &LoadStats::failed, &LoadStats::updates, &LoadStats::bytes, &LoadStats::views, &LoadStats::late_views,
+        &LoadStats::unanswered_views, &LoadStats::done_views, &LoadStats::complete, &LoadStats::protocol_closes, &LoadStats::reconnects,
+        &LoadStats::repeated_updates, &LoadStats::repeated_bytes, &LoadStats::resume_bytes}) {
     this->*member += other.*member;
   }
-  for (const auto member : {&LoadFigures::first_mesh_ms, &LoadFigures::first_mesh_bytes, &LoadFigures::view_change_ms, &LoadFigures::stale_bytes,
-                            &LoadFigures::resume_ms}) {
+  for (const auto member :
+       {&LoadStats::first_mesh_ms, &LoadStats::first_mesh_bytes, &LoadStats::view_change_ms, &LoadStats::stale_bytes, &LoadStats::resume_ms}) {
     append(this->*member, std::move(other.*member));
   }
   for (const auto& [text, count] : other.errors) errors[text] += count;
 }
 
 Json to_json(const LoadReport& report) {
-  const LoadFigures& f = report.figures;
+  const LoadStats& f = report.stats;
   Json json{{"scenario", report.scenario},
             {"clients", report.clients},
             {"connected", f.connected},
@@ -107,7 +107,7 @@ Json to_json(const LoadReport& report) {
 }
 
 std::string to_text(const LoadReport& report) {
-  const LoadFigures& f = report.figures;
+  const LoadStats& f = report.stats;
   std::string text = fmt::format("{} of {} clients connected, {} failed, {} complete; {} for {:.1f} s\n", f.connected, report.clients, f.failed,
                                  f.complete, report.scenario, report.seconds);
   text += fmt::format("received {} updates ({:.0f} a second) in {} ({} a second)\n", f.updates, per_second(f.updates, report.seconds),

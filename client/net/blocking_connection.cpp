@@ -1,4 +1,4 @@
-#include "client/net/line.h"
+#include "client/net/blocking_connection.h"
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/ip/tcp.hpp>

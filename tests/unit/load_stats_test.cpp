@@ -1,4 +1,4 @@
-#include "client/load/figures.h"
+#include "client/load/load_stats.h"
 
 #include <gtest/gtest.h>
 
@@ -36,14 +36,14 @@ TEST(Percentiles, AreByNearestRank) {
 
 TEST(Percentiles, OfNothingAreNothing) { EXPECT_FALSE(percentiles_of({})); }
 
-TEST(LoadFigures, AddUp) {
-  LoadFigures a;
+TEST(LoadStats, AddUp) {
+  LoadStats a;
   a.connected = 2;
   a.failed = 1;
   a.updates = 10;
   a.first_mesh_ms = {1, 2};
   a.errors = {{"lost", 1}};
-  LoadFigures b = a;
+  LoadStats b = a;
   b.view_change_ms = {7};
   b.errors = {{"lost", 2}, {"late", 1}};
   a.add(std::move(b));
@@ -59,10 +59,10 @@ TEST(LoadReport, JsonHasItsKeys) {
   LoadReport report;
   report.clients = 3;
   report.seconds = 2;
-  report.figures.updates = 5;
-  report.figures.bytes = 9;
-  report.figures.first_mesh_ms = {1, 2, 3};
-  report.figures.errors = {{"lost", 2}};
+  report.stats.updates = 5;
+  report.stats.bytes = 9;
+  report.stats.first_mesh_ms = {1, 2, 3};
+  report.stats.errors = {{"lost", 2}};
   auto json = to_json(report);
   for (const char* key : {"clients", "connected", "failed", "updates", "bytes", "updates_per_s", "bytes_per_s", "first_mesh_ms", "first_mesh_bytes",
                           "view_change_ms", "stale_bytes", "errors"}) {
