@@ -69,12 +69,12 @@ Body encode_body(FlatBufferBuilder& out, const Have& message) {
 Body encode_body(FlatBufferBuilder& out, const Opened& message) {
   const Description& d = message.description;
   const auto name = out.CreateString(d.name);
-  const auto base = out.CreateVector(d.base);
+  const auto root_patch = out.CreateVector(d.root_patch);
   const fbs::Dims dims(d.grid.dims[0], d.grid.dims[1], d.grid.dims[2]);
   const fbs::Vector spacing = to_vector(d.grid.spacing);
   const fbs::Vector origin = to_vector(d.grid.origin);
   const auto description = fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine),
-                                                  d.max_error, d.updates, d.coefficients, d.full.vertices, d.full.tets, d.content_hash, base);
+                                                  d.max_error, d.updates, d.coefficients, d.full.vertices, d.full.tets, d.content_hash, root_patch);
   const SessionLimits& limits = message.limits;
   return body(fbs::ServerBody::Opened,
               fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message, message.resumed));
@@ -153,7 +153,7 @@ Result<ClientMessage> decode_body(const fbs::Have& table) {
 Result<ServerMessage> decode_body(const fbs::Opened& table) {
   const fbs::Description& wire = *table.description();
   if (longer_than(wire.name(), kMaxName)) return malformed("the data set's name is too long");
-  if (longer_than(wire.base(), kMaxBase)) return malformed("the base is too long");
+  if (longer_than(wire.base(), kMaxRootPatch)) return malformed("the root patch is too long");
   if (wire.refine() > std::uint8_t(Refine::uniform)) return malformed("an unknown way to refine");
   Description d;
   d.name = wire.name()->str();
@@ -165,7 +165,7 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
   d.coefficients = wire.coefficients();
   d.full = {wire.full_vertices(), wire.full_tets()};
   d.content_hash = wire.content_hash();
-  d.base.assign(wire.base()->begin(), wire.base()->end());
+  d.root_patch.assign(wire.base()->begin(), wire.base()->end());
   return Opened{std::move(d), {table.max_window(), table.min_credit(), table.max_message()}, table.resumed()};
 }
 

@@ -12,9 +12,9 @@ StreamClient::StreamClient(Description description, Front front) : description_(
 
 Result<StreamClient> StreamClient::start(Description description, const Budget& budget) {
   if (auto ok = check_description(description); !ok) return tl::unexpected(ok.error());
-  const auto base = decode_base(description.base, Domain(description.grid.dims));
-  if (!base) return tl::unexpected(base.error());
-  Front front(description.grid, *base);
+  const auto root_patch = decode_root_patch(description.root_patch, Domain(description.grid.dims));
+  if (!root_patch) return tl::unexpected(root_patch.error());
+  Front front(description.grid, *root_patch);
   StreamClient client(std::move(description), std::move(front));
   client.budget_ = budget;
   return client;

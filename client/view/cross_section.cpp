@@ -7,12 +7,12 @@
 namespace intervale {
 namespace {
 
-using Tet = FrontPatches::Tet;
+using Tet = FrontMesher::Tet;
 
 class Cutter {
  public:
   Cutter(const Skin& skin, const CutPlane& plane) : skin_(skin) {
-    const Grid& grid = skin.patches().grid();
+    const Grid& grid = skin.mesher().state().grid;
     offset_ = plane.offset;
     for (int i = 0; i < 3; ++i) {
       normal_[i] = plane.normal[i] * grid.spacing[i];
@@ -22,11 +22,12 @@ class Cutter {
 
   std::vector<SectionVertex> run() {
     std::vector<Tet> tets;
-    for (std::size_t number = 0; number < skin_.patches().supercubes(); ++number) {
-      if (!may_meet(number)) continue;
+    for (std::size_t number = 0; number < skin_.mesher().state().blocks.size(); ++number) {
+      const FrontState::Block& block = skin_.mesher().block(number);
+      if (!may_meet(block)) continue;
       tets.clear();
-      skin_.patches().emit(number, FrontPatches::Themselves{}, tets);
-      level_ = std::uint8_t(skin_.patches().scale(number));
+      skin_.mesher().append_tets(number, tets);
+      level_ = std::uint8_t(block.scale);
       for (const Tet& tet : tets) cut(tet);
     }
     return std::move(out_);
@@ -34,11 +35,10 @@ class Cutter {
 
  private:
   // Its diamonds reach from h before its corner to 4 h behind. What the corners of the domain leave is everywhere.
-  [[nodiscard]] bool may_meet(std::size_t number) const {
-    const int scale = skin_.patches().scale(number);
-    if (scale == skin_.patches().domain().levels()) return true;
-    const double h = double(std::int32_t(1) << scale);
-    const Vertex p = skin_.patches().position(number);
+  [[nodiscard]] bool may_meet(const FrontState::Block& block) const {
+    if (skin_.mesher().state().is_root_block(block)) return true;
+    const double h = double(std::int32_t(1) << block.scale);
+    const Vertex p = block.position;
     const Vec3 low{(4.0 * p.x - 1) * h, (4.0 * p.y - 1) * h, (4.0 * p.z - 1) * h};
     double middle = -offset_, reach = 0;
     for (int i = 0; i < 3; ++i) {
@@ -54,7 +54,7 @@ class Cutter {
     std::array<double, 4> distances;
     for (std::size_t k = 0; k < 4; ++k) {
       const auto& at = skin_.position(tet[k]);
-      corners[k] = scaled(1.0 / FrontPatches::kSteps, {double(at[0]), double(at[1]), double(at[2])});
+      corners[k] = scaled(1.0 / FrontMesher::kSteps, {double(at[0]), double(at[1]), double(at[2])});
       distances[k] = dot(normal_, corners[k]) - offset_;
     }
     const TetCut polygon = cut_tet(corners, distances);

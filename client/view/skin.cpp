@@ -13,8 +13,8 @@
 namespace intervale {
 namespace {
 
-using Tet = FrontPatches::Tet;
-using Position = FrontPatches::Position;
+using Tet = FrontMesher::Tet;
+using Position = FrontMesher::Position;
 
 constexpr int kCellsAcross = 8;  // pieces along the virtual grid's side, at most
 constexpr int kLeastCell = 16;   // samples
@@ -37,27 +37,28 @@ void Skin::forget_all() {
   members_.clear();
   drawn_.clear();
   triangles_ = 0;
-  renamed_ = front_->renamed();
+  point_generation_ = mesher_.state().point_generation;
 }
 
 std::uint32_t Skin::piece_of(std::size_t number) const {
-  const int cell = std::max(std::countr_zero(unsigned(kLeastCell)), patches_.domain().levels() - std::countr_zero(unsigned(kCellsAcross)));
-  const int up = patches_.scale(number) + 2;
-  const Vertex p = patches_.position(number);
+  const int cell = std::max(std::countr_zero(unsigned(kLeastCell)), mesher_.state().domain.levels() - std::countr_zero(unsigned(kCellsAcross)));
+  const int up = mesher_.block(number).scale + 2;
+  const Vertex p = mesher_.block(number).position;
   const auto along = [&](std::int32_t at) { return std::uint32_t(std::uint64_t(at) << up >> cell); };
   return along(p.x) + (kCellsAcross + 1) * (along(p.y) + (kCellsAcross + 1) * along(p.z));
 }
 
 // What the parents of diamonds left for them is no longer there, or there again.
 void Skin::mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const {
-  const int scale = patches_.scale(number), levels = patches_.domain().levels();
-  const Vertex position = patches_.position(number);
+  const FrontState& front = mesher_.state();
+  const int scale = mesher_.block(number).scale, levels = front.domain.levels();
+  const Vertex position = mesher_.block(number).position;
   const auto mark = [&](int of_scale, Vertex at) {
-    if (const auto found = patches_.find(of_scale, at)) dirty[*found] = 1;
+    if (const std::uint32_t found = front.find_number(of_scale, at); found != FrontState::kNone) dirty[found] = 1;
   };
   for (const int slot : set_bits(slots)) {
     const Diamond d(centre_of(scale, position, slot), scale, kTypeOfSlot[slot]);
-    if (d.centre == patches_.domain().root()) {
+    if (d.centre == front.domain.root()) {
       mark(levels, {});
       continue;
     }
@@ -72,11 +73,11 @@ void Skin::mark_parents(std::size_t number, std::uint64_t slots, std::vector<std
 
 // By number of the supercube: whether what it left is to be made again.
 std::vector<std::uint8_t> Skin::find_changes() {
-  const std::size_t count = patches_.supercubes(), before = parts_.size();
+  const std::size_t count = mesher_.state().blocks.size(), before = parts_.size();
   std::vector<std::uint8_t> dirty(count);
-  const auto grow = [names = patches_.names()](auto& items) {  // by less than doubling, for these are most of a viewer's memory
-    if (items.capacity() < names) items.reserve(names + names / 8);
-    items.resize(names);
+  const auto grow = [points = mesher_.state().q.size()](auto& items) {  // by less than doubling, for these are most of a viewer's memory
+    if (items.capacity() < points) items.reserve(points + points / 8);
+    items.resize(points);
   };
   grow(position_);
   grow(surface_);
@@ -92,15 +93,17 @@ std::vector<std::uint8_t> Skin::find_changes() {
     dirty[i] = 1;
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t shown = patches_.shown(i), changed = shown ^ parts_[i].shown;
+    const std::uint64_t shown = mesher_.block(i).shown, changed = shown ^ parts_[i].shown;
     if (changed == 0 && i < before) continue;
     dirty[i] = 1;
     parts_[i].shown = shown;
     mark_parents(i, changed, dirty);
-    patches_.for_each_point(i, [this](std::uint32_t name, const Position& p, Surface surface, bool) {
-      position_[name] = p;
-      surface_[name] = surface;
-    });
+    points_.clear();
+    mesher_.append_points(i, points_);
+    for (const FrontMesher::Point& p : points_) {
+      position_[p.id] = p.position;
+      surface_[p.id] = p.surface;
+    }
   }
   return dirty;
 }
@@ -111,12 +114,12 @@ double Skin::volume_of(const Tet& tet) const {
   return triple_product(from(a), from(b), from(c)) / 6;
 }
 
-int Skin::kind_of(const std::array<std::uint32_t, 3>& points, bool at_border) const {
+int Skin::kind_of(const std::array<PointId, 3>& points, bool at_border) const {
   const Surface s = surface_[points[0]];
   if (s != Surface::inside && surface_[points[1]] == s && surface_[points[2]] == s) return s == Surface::alpha ? 0 : 1;
   if (!at_border) return -1;
-  const Vertex last = patches_.domain().last();
-  const std::array<std::int32_t, 3> far{last.x * FrontPatches::kSteps, last.y * FrontPatches::kSteps, last.z * FrontPatches::kSteps};
+  const Vertex last = mesher_.state().domain.last();
+  const std::array<std::int32_t, 3> far{last.x * FrontMesher::kSteps, last.y * FrontMesher::kSteps, last.z * FrontMesher::kSteps};
   for (int axis = 0; axis < 3; ++axis) {
     const std::int32_t at = position_[points[0]][axis];
     if (position_[points[1]][axis] != at || position_[points[2]][axis] != at) continue;
@@ -127,7 +130,7 @@ int Skin::kind_of(const std::array<std::uint32_t, 3>& points, bool at_border) co
 }
 
 void Skin::add_normals(const std::vector<Triangle>& triangles, int sign) {
-  const auto& spacing = patches_.grid().spacing;
+  const auto& spacing = mesher_.state().grid.spacing;
   for (const Triangle& t : triangles) {
     if (t.kind > 1) continue;
     std::array<Vec3, 3> corners;
@@ -148,33 +151,28 @@ void Skin::remake(std::size_t number) {
   part.triangles.clear();
   part.volume = part.bound = 0;
   tets_.clear();
-  // Volumes in samples / kSteps, cubed, until the end.
-  double half = -1;  // of the last half, if it can change; else below 0
-  std::size_t half_first = 0;
-  const auto end_half = [&](std::size_t end) {
-    double inside = 0;
-    for (; half_first < end; ++half_first) inside += volume_of(tets_[half_first]);
+  halves_.clear();
+  mesher_.append_halves(number, tets_, halves_);
+  std::size_t first = 0;
+  for (const FrontMesher::Half& half : halves_) {
+    double inside = 0;  // volumes in samples / kSteps, cubed
+    for (; first < half.end; ++first) inside += volume_of(tets_[first]);
     part.volume += inside;
-    if (half >= 0) part.bound += std::max(inside, half - inside);
-  };
-  patches_.emit(number, FrontPatches::Themselves{}, tets_, [&](const FrontPatches::Half& h, std::size_t first) {
-    end_half(first);
-    half = -1;
-    if (!h.can_change) return;
-    const auto from = [&h](int k) {
-      return Vec3{double(h.corners[k].x - h.corners[0].x), double(h.corners[k].y - h.corners[0].y), double(h.corners[k].z - h.corners[0].z)};
-    };
-    half = std::abs(triple_product(from(1), from(2), from(3))) / 6 * std::pow(double(FrontPatches::kSteps), 3);
-  });
-  end_half(tets_.size());
+    if (!half.can_change) continue;
+    const auto from = [&c = half.corners](int k) { return Vec3{double(c[k].x - c[0].x), double(c[k].y - c[0].y), double(c[k].z - c[0].z)}; };
+    const double whole = std::abs(triple_product(from(1), from(2), from(3))) / 6 * std::pow(double(FrontMesher::kSteps), 3);
+    part.bound += std::max(inside, whole - inside);
+  }
 
-  const Vertex p = patches_.position(number), last = patches_.domain().last();
-  const auto reaches = [up = patches_.scale(number) + 2](std::int32_t at, std::int32_t end) { return at == 0 || std::int64_t(at + 1) << up >= end; };
+  const Vertex p = mesher_.block(number).position, last = mesher_.state().domain.last();
+  const auto reaches = [up = mesher_.block(number).scale + 2](std::int32_t at, std::int32_t end) {
+    return at == 0 || std::int64_t(at + 1) << up >= end;
+  };
   const bool at_border = reaches(p.x, last.x) || reaches(p.y, last.y) || reaches(p.z, last.z);
-  const auto level = std::uint8_t(patches_.scale(number));
+  const auto level = std::uint8_t(mesher_.block(number).scale);
   for (const Tet& tet : tets_) {
     for (const auto& face : kTetFaces) {
-      const std::array<std::uint32_t, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
+      const std::array<PointId, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
       const int kind = kind_of(points, at_border);
       if (kind >= 0) part.triangles.push_back({points, std::uint8_t(kind), level});
     }
@@ -195,28 +193,28 @@ SkinPiece Skin::piece(std::uint32_t id, bool edges) {
   }
   SkinPiece piece;
   piece.id = id;
-  std::vector<std::uint32_t> names;  // of the vertices
+  std::vector<PointId> points;  // of the vertices
   std::vector<std::uint64_t> pairs;
   for (int kind = 0; kind < kKinds; ++kind) {
     if (by_kind[kind].empty()) continue;
     const int group = std::min(kind, 2);
-    const std::size_t first = names.size();  // of this kind's vertices
+    const std::size_t first = points.size();  // of this kind's vertices
     pairs.clear();
     for (const Triangle* t : by_kind[kind]) {
       std::array<std::uint32_t, 3> corner;
       for (int k = 0; k < 3; ++k) {
-        const std::uint32_t name = t->points[k];
-        // A sparse set (Briggs and Torczon 1993): what is said of a name counts if it is said back.
-        if (there_[name] < first || there_[name] >= names.size() || names[there_[name]] != name) {
-          there_[name] = std::uint32_t(names.size());
-          names.push_back(name);
-          const Position& p = position_[name];
-          SkinVertex v{float(p[0]) / FrontPatches::kSteps, float(p[1]) / FrontPatches::kSteps, float(p[2]) / FrontPatches::kSteps};
+        const PointId point = t->points[k];
+        // A sparse set (Briggs and Torczon 1993): an entry of there_ counts if points has the point at that place.
+        if (there_[point] < first || there_[point] >= points.size() || points[there_[point]] != point) {
+          there_[point] = std::uint32_t(points.size());
+          points.push_back(point);
+          const Position& p = position_[point];
+          SkinVertex v{float(p[0]) / FrontMesher::kSteps, float(p[1]) / FrontMesher::kSteps, float(p[2]) / FrontMesher::kSteps};
           std::array<std::int8_t, 3> n{};
           if (kind > 1) {
             n[(kind - 2) / 2] = kind % 2 == 0 ? -127 : 127;
           } else {
-            const NormalSum& sum = normal_[name];
+            const NormalSum& sum = normal_[point];
             const Vec3 normal = normalized({double(sum[0]), double(sum[1]), double(sum[2])});
             for (int i = 0; i < 3; ++i) n[i] = std::int8_t(std::lrint(127 * normal[i]));
           }
@@ -226,7 +224,7 @@ SkinPiece Skin::piece(std::uint32_t id, bool edges) {
           v.level = t->level;
           piece.vertices.push_back(v);
         }
-        corner[k] = there_[name];
+        corner[k] = there_[point];
         auto& level = piece.vertices[corner[k]].level;
         level = std::min(level, t->level);
       }
@@ -260,7 +258,7 @@ SkinPiece Skin::piece(std::uint32_t id, bool edges) {
 
 Skin::Change Skin::update() {
   Change change;
-  if (front_->renamed() != renamed_ || parts_.empty()) {
+  if (mesher_.state().point_generation != point_generation_ || parts_.empty()) {
     forget_all();
     change.reset = true;
   }
@@ -296,15 +294,15 @@ Skin::Change Skin::all() {
 double Skin::volume() const {
   double sum = 0;
   for (const Part& part : parts_) sum += part.volume;
-  const auto& s = patches_.grid().spacing;
-  return sum * s[0] * s[1] * s[2] / std::pow(double(FrontPatches::kSteps), 3);
+  const auto& s = mesher_.state().grid.spacing;
+  return sum * s[0] * s[1] * s[2] / std::pow(double(FrontMesher::kSteps), 3);
 }
 
 double Skin::volume_bound() const {
   double sum = 0;
   for (const Part& part : parts_) sum += part.bound;
-  const auto& s = patches_.grid().spacing;
-  return sum * s[0] * s[1] * s[2] / std::pow(double(FrontPatches::kSteps), 3);
+  const auto& s = mesher_.state().grid.spacing;
+  return sum * s[0] * s[1] * s[2] / std::pow(double(FrontMesher::kSteps), 3);
 }
 
 std::size_t Skin::memory_bytes() const {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "common/front/front.h"
-#include "common/front/front_patches.h"
+#include "common/front/front_mesher.h"
 #include "common/mesh/normals.h"
 
 namespace intervale {
@@ -38,7 +38,7 @@ struct SkinPiece {
 
 class Skin {
  public:
-  explicit Skin(const Front& front) : patches_(front), front_(&front) {}  // which must outlive it
+  explicit Skin(const Front& front) : mesher_(front.state()) {}  // which must outlive it
 
   struct Change {
     bool reset = false;                  // of what was before nothing stays
@@ -61,16 +61,16 @@ class Skin {
   [[nodiscard]] double volume_bound() const;
   [[nodiscard]] std::size_t memory_bytes() const;
 
-  // Of the mesh's points, by name, and of everything they are made of.
-  [[nodiscard]] const FrontPatches& patches() const { return patches_; }
-  [[nodiscard]] const FrontPatches::Position& position(std::uint32_t name) const { return position_[name]; }
-  [[nodiscard]] Surface surface(std::uint32_t name) const { return surface_[name]; }
+  // What the mesh is made of, and its points.
+  [[nodiscard]] const FrontMesher& mesher() const { return mesher_; }
+  [[nodiscard]] const FrontMesher::Position& position(PointId id) const { return position_[id]; }
+  [[nodiscard]] Surface surface(PointId id) const { return surface_[id]; }
 
  private:
   // kind: 0 alpha, 1 beta, 2 + 2 * axis + (1 at the far side) of the box.
   static constexpr int kKinds = 8;
   struct Triangle {
-    std::array<std::uint32_t, 3> points;
+    std::array<PointId, 3> points;
     std::uint8_t kind = 0, level = 0;
   };
   struct Part {  // what a supercube left
@@ -85,15 +85,14 @@ class Skin {
   void mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const;
   [[nodiscard]] std::uint32_t piece_of(std::size_t number) const;
   void remake(std::size_t number);
-  [[nodiscard]] int kind_of(const std::array<std::uint32_t, 3>& points, bool at_border) const;
+  [[nodiscard]] int kind_of(const std::array<PointId, 3>& points, bool at_border) const;
   void add_normals(const std::vector<Triangle>& triangles, int sign);
   [[nodiscard]] bool is_empty(std::uint32_t piece) const;
-  [[nodiscard]] double volume_of(const FrontPatches::Tet& tet) const;
+  [[nodiscard]] double volume_of(const FrontMesher::Tet& tet) const;
 
-  FrontPatches patches_;
-  const Front* front_;
-  std::uint64_t renamed_ = 0;
-  std::vector<FrontPatches::Position> position_;  // by name
+  FrontMesher mesher_;
+  std::uint64_t point_generation_ = 0;
+  std::vector<FrontMesher::Position> position_;  // by PointId
   std::vector<Surface> surface_;
   std::vector<NormalSum> normal_;                    // by name: of the triangles of the point's own surface
   std::vector<std::uint32_t> there_;                 // number of a point's vertex in what is being assembled, if that says so too
@@ -101,7 +100,10 @@ class Skin {
   std::vector<std::vector<std::uint32_t>> members_;  // of a piece, by id
   std::vector<std::uint8_t> drawn_;                  // whether a piece had triangles, by id
   std::uint64_t triangles_ = 0;
-  std::vector<FrontPatches::Tet> tets_;  // scratch
+  // Room to work in.
+  std::vector<FrontMesher::Point> points_;
+  std::vector<FrontMesher::Tet> tets_;
+  std::vector<FrontMesher::Half> halves_;
 };
 
 }  // namespace intervale

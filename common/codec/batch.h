@@ -1,7 +1,7 @@
 // The layout of a batch: updates on the wire. batch_encoder.h writes it and batch_decoder.h applies it.
 //
 // A batch names supercubes. For each diamond in them that can be split, a flag says whether it is; both sides know which diamonds those are. If the
-// diamond is split, the differences of its side and its cuts follow. Everything is range coded, with contexts that both sides know. Updates stand in
+// diamond is split, the residuals of its side and its cuts follow. Everything is range coded, with contexts that both sides know. Updates stand in
 // the order in which they are applied: scale by scale from coarse to fine; within one scale all of class 0, then class 1, then class 2; then by
 // supercube and slot. PROTOCOL.md has the layout.
 #pragma once
@@ -33,13 +33,13 @@ void for_each_class(std::size_t groups, const Key& key, Visit&& visit) {
 // Whether a diamond that can be split is split: by its class, by whether its vertices lie on different sides (then it is surely relevant, and hardly
 // ever left out), and by the last three such diamonds.
 struct FlagModel {
-  std::array<std::array<std::array<Chance, 8>, 2>, 3> chance;
+  std::array<std::array<std::array<BitModel, 8>, 2>, 3> model;
   std::array<std::array<unsigned, 2>, 3> before{};
 
   template <class Coder>
   bool code(Coder& coder, int cls, bool mixed, bool is_plain, bool value = false) {
     unsigned& last = before[cls][mixed];
-    const bool flag = is_plain ? coder.even_bits(1, unsigned(value)) != 0 : coder.bit(chance[cls][mixed][last], value);
+    const bool flag = is_plain ? coder.raw_bits(1, unsigned(value)) != 0 : coder.bit(model[cls][mixed][last], value);
     last = (2 * last + unsigned(flag)) & 7;
     return flag;
   }

@@ -1,13 +1,13 @@
-// What a diamond knows about its split before it happens: where its centre lies, and where the cuts on the subdivision edges.
+// Predicts a diamond's split from what is around it: the side of its centre, and the cuts on the subdivision edges.
 //
-// All cuts of one surface around one diamond tell of the same few values. A cut at the fraction t of an edge says that the field's distances from the
-// surface's value at the edge's ends are as t to 1 - t; along the spine and the edges around it that gives the vertices' distances in one unit, and
-// these the centre's: its side, and the first cut. Where a diamond's vertices stand around its centre in pairs, the centre is foretold better by the
-// nearest pairs, or by pairs at two distances, than by the spine. The first cut in turn tells the centre's true distance, and so the others, up to
-// their rounding. Where alpha and beta both cut one edge, that is beta - alpha in the same unit, and alpha's cuts predict beta's.
+// All cuts of one surface around one diamond depend on the same few values. A cut at the fraction t of an edge means that the field's distances from
+// the surface's value at the edge's ends are as t to 1 - t. Along the spine and the edges around it that gives the vertices' distances in one unit,
+// and these predict the centre's: its side, and the first cut. Where a diamond's vertices stand around its centre in pairs, the nearest pairs, or
+// pairs at two distances, predict the centre better than the spine does. The first cut in turn determines the centre's true distance, and so the
+// other cuts, up to their rounding. Where alpha and beta both cut one edge, that is beta - alpha in the same unit, and alpha's cuts predict beta's.
 //
-// An update therefore keeps differences from the prediction, which are small. It looks at nothing but the diamond, so the differences are made once
-// and are right in whatever order updates arrive. Arithmetic is plain double precision in a fixed order: every machine predicts alike.
+// An update therefore keeps the residuals of the prediction, which are small. A prediction reads nothing but the diamond, so residuals are computed
+// once and are right in whatever order updates arrive. Arithmetic is plain double precision in a fixed order: every machine predicts alike.
 #pragma once
 
 #include <array>
@@ -63,28 +63,28 @@ class Prediction {
 
   [[nodiscard]] Side side() const { return side_; }
 
-  // Differences of the cuts q from their prediction, modulo 256, and back; count_cuts(centre).all of them. Cuts in order of local vertices, alpha
-  // before beta; differences with each surface's first cut before all others, for its prediction is further off than theirs. Once only.
-  void encode(Side centre, std::span<const std::uint8_t> q, std::uint8_t* differences);
-  void decode(Side centre, std::span<const std::uint8_t> differences, std::uint8_t* q);
+  // Residuals of the cuts q from their prediction, modulo 256, and back; count_cuts(centre).all of them. Cuts in order of local vertices, alpha
+  // before beta; residuals with each surface's first cut before all others, for its prediction is further off than theirs. Once only.
+  void encode(Side centre, std::span<const std::uint8_t> q, std::uint8_t* residuals);
+  void decode(Side centre, std::span<const std::uint8_t> residuals, std::uint8_t* q);
 
  private:
   // Distances of the field from one surface's value, in a unit of the surface's own.
   struct Surface {
     std::uint32_t above = 0;                    // a bit for each vertex
-    std::uint32_t known = 0;                    // a bit for each vertex whose distance can be told; none where the surface keeps off the diamond
-    bool parts_spine = false;                   // its ends lie on different sides
+    std::uint32_t known = 0;                    // a bit for each vertex with a known distance; none where the surface does not cut the diamond
+    bool parts_spine = false;                   // the spine's ends lie on different sides
     std::array<double, kMaxVertices> distance;  // of each vertex known
-    std::array<double, kMaxVertices> doubt;     // of each vertex known: the square of the distance's likely share of error, in steps of 1/256
+    std::array<double, kMaxVertices> variance;  // of each vertex known: of the distance's relative error, in steps of 1/256
     double guess = 1;                           // the distance of all others
     double centre = 0;                          // of the centre: above the value where positive
   };
-  // A distance, and its doubt.
+  // A distance, and the variance of its relative error.
   struct Measure {
-    double distance, doubt;
+    double distance, variance;
   };
-  // What several tell of one distance: the sum of each one's weight times what it tells, and that of the weights.
-  struct Told {
+  // Several estimates of one distance: the sum of each one's weight times the estimate, and the sum of the weights.
+  struct Estimate {
     double sum = 0, weight = 0;
   };
   [[nodiscard]] bool is_above(int s, Side centre) const { return s == 0 ? centre != Side::below : centre == Side::above; }
@@ -93,8 +93,8 @@ class Prediction {
   void measure(int s);
   void measure_from_parted_spine(int s);
   void measure_from_belt(int s);
-  void hear_neighbours(int s, int v, std::uint32_t which, Told& told) const;
-  [[nodiscard]] double foretell_centre(const Surface& surface) const;
+  void add_neighbours(int s, int v, std::uint32_t which, Estimate& estimate) const;
+  [[nodiscard]] double predict_centre(const Surface& surface) const;
   [[nodiscard]] Measure measured(int s, int v) const;
   void find_gap();
   template <class Code>

@@ -1,7 +1,8 @@
-// Bits in as little room as their chances call for: a binary range coder whose chances are learned from the bits themselves.
+// Adaptive binary range coder.
 //
-// G. N. N. Martin, "Range encoding: an algorithm for removing redundancy from a digitised message", 1979; learned chances as in Igor Pavlov's LZMA.
-// Reader and writer share one text: a model's function takes either, hands in the value it wants to write, and gets back the value that is there.
+// G. N. N. Martin, "Range encoding: an algorithm for removing redundancy from a digitised message", 1979; adaptive bit models as in Igor Pavlov's
+// LZMA. Encoder and decoder share each model's code: its function takes either coder and a value. An encoder writes the value and returns it; a
+// decoder ignores it and returns the value read.
 #pragma once
 
 #include <array>
@@ -13,8 +14,8 @@
 
 namespace intervale {
 
-// The chance that a bit is 0, in 1/65536: the mean of the bits so far, of the last few dozen at most.
-class Chance {
+// An estimate of the probability that a bit is 0, in 1/65536: the mean of the bits so far, of the last few dozen at most.
+class BitModel {
  public:
   [[nodiscard]] std::uint32_t of_zero() const { return zero_; }
   void learn(bool bit) {
@@ -38,17 +39,17 @@ class Chance {
 
 class RangeEncoder {
  public:
-  bool bit(Chance& chance, bool value) {
-    const std::uint64_t split = (range_ >> 16) * chance.of_zero();
-    chance.learn(value);
+  bool bit(BitModel& model, bool value) {
+    const std::uint64_t split = (range_ >> 16) * model.of_zero();
+    model.learn(value);
     narrow(value ? split : 0, value ? range_ - split : split);
     return value;
   }
-  unsigned even_bits(int count, unsigned value) {  // all equally likely, highest first
+  unsigned raw_bits(int count, unsigned value) {  // all equally likely, highest first
     for (int i = count; i-- > 0;) narrow((value >> i & 1) != 0 ? range_ >> 1 : 0, (value >> i & 1) != 0 ? range_ - (range_ >> 1) : range_ >> 1);
     return value;
   }
-  // The bytes: a multiple of four. Once only.
+  // Comes back with the bytes, a multiple of four. Call it once, last.
   [[nodiscard]] std::vector<std::uint8_t> finish();
 
  private:
@@ -64,21 +65,21 @@ class RangeEncoder {
   std::vector<std::uint8_t> out_;
 };
 
-// Reads bytes from outside: whatever they are, it gives bits. Never reads beyond them.
+// Decodes bytes from outside: any bytes give some bits. Never reads beyond their end.
 class RangeDecoder {
  public:
   explicit RangeDecoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
     code_ = std::uint64_t(next()) << 32;
     code_ |= next();
   }
-  bool bit(Chance& chance, bool = false) {
-    const std::uint64_t split = (range_ >> 16) * chance.of_zero();
+  bool bit(BitModel& model, bool = false) {
+    const std::uint64_t split = (range_ >> 16) * model.of_zero();
     const bool value = code_ >= split;
-    chance.learn(value);
+    model.learn(value);
     narrow(value ? split : 0, value ? range_ - split : split);
     return value;
   }
-  unsigned even_bits(int count, unsigned = 0) {
+  unsigned raw_bits(int count, unsigned = 0) {
     unsigned value = 0;
     for (; count > 0; --count) {
       const std::uint64_t split = range_ >> 1;
@@ -111,23 +112,23 @@ class RangeDecoder {
   std::uint64_t code_ = 0, range_ = ~std::uint64_t(0);
 };
 
-// A number of a few bits, each bit's chance depending on those above it.
+// A number of a few bits; each bit's model depends on the bits above it.
 template <int Bits>
 struct NumberModel {
-  std::array<Chance, std::size_t(1) << Bits> chance;
+  std::array<BitModel, std::size_t(1) << Bits> model;
 
   template <class Coder>
   unsigned code(Coder& coder, unsigned value = 0) {
     unsigned path = 1;
-    for (int i = Bits; i-- > 0;) path = 2 * path + unsigned(coder.bit(chance[path], (value >> i & 1) != 0));
+    for (int i = Bits; i-- > 0;) path = 2 * path + unsigned(coder.bit(model[path], (value >> i & 1) != 0));
     return path - (1u << Bits);
   }
 };
 
-// A number from 0 to 2^16 - 2 that is mostly small: how many bits n + 1 has, the two below the highest, and the rest as it is.
+// A number n from 0 to 2^16 - 2 that is mostly small: how many bits n + 1 has, the two below the highest, and the rest as raw bits.
 struct SmallNumberModel {
-  std::array<Chance, 16> longer;
-  std::array<std::array<Chance, 4>, 16> below;
+  std::array<BitModel, 16> longer;
+  std::array<std::array<BitModel, 4>, 16> below;
 
   template <class Coder>
   unsigned code(Coder& coder, unsigned value = 0) {
@@ -137,7 +138,7 @@ struct SmallNumberModel {
     unsigned number = 1;
     for (int i = n; i-- > 0;) {
       if (n - i > 2) {
-        number = number << (i + 1) | coder.even_bits(i + 1, (value + 1) & ((2u << i) - 1));
+        number = number << (i + 1) | coder.raw_bits(i + 1, (value + 1) & ((2u << i) - 1));
         break;
       }
       number = 2 * number + unsigned(coder.bit(below[n][number & 3], ((value + 1) >> i & 1) != 0));
@@ -146,9 +147,9 @@ struct SmallNumberModel {
   }
 };
 
-// A difference modulo 256, mostly near 0.
-struct DifferenceModel {
-  Chance differs, negative;
+// A residual modulo 256 that is mostly near 0.
+struct ResidualModel {
+  BitModel differs, negative;
   SmallNumberModel size;  // of what is beyond 1
 
   template <class Coder>

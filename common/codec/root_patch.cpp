@@ -2,19 +2,19 @@
 
 namespace intervale {
 
-std::vector<std::uint8_t> encode_base(const Base& base) {
+std::vector<std::uint8_t> encode_root_patch(const RootPatch& root_patch) {
   std::vector<std::uint8_t> bytes;
-  for (Side s : base.side) bytes.push_back(std::uint8_t(s));
-  for (const Cuts& c : base.cuts) bytes.insert(bytes.end(), c.q, c.q + c.count);
+  for (Side s : root_patch.side) bytes.push_back(std::uint8_t(s));
+  for (const Cuts& c : root_patch.cuts) bytes.insert(bytes.end(), c.q, c.q + c.count);
   return bytes;
 }
 
-Result<Base> decode_base(std::span<const std::uint8_t> bytes, const Domain& domain) {
-  Base base;
-  if (bytes.size() < kRootVertices) return fail("the base is damaged: fewer bytes than the root has corners");
+Result<RootPatch> decode_root_patch(std::span<const std::uint8_t> bytes, const Domain& domain) {
+  RootPatch root_patch;
+  if (bytes.size() < kRootVertices) return fail("the root patch is damaged: fewer bytes than the root has corners");
   for (int i = 0; i < kRootVertices; ++i) {
-    if (bytes[i] > 2) return fail("the base is damaged: a corner's side is none");
-    base.side[i] = Side(bytes[i]);
+    if (bytes[i] > 2) return fail("the root patch is damaged: a corner's side is not 0, 1 or 2");
+    root_patch.side[i] = Side(bytes[i]);
   }
   const Diamond root(domain.root());
   const unsigned edges = Domain::edges(*root.row, domain.tets(root));
@@ -22,14 +22,14 @@ Result<Base> decode_base(std::span<const std::uint8_t> bytes, const Domain& doma
   for (int e = 0; e < kRootEdges; ++e) {
     if (!(edges >> e & 1)) continue;
     const auto [a, b] = edge_ends(e, root.row->belt);
-    base.cuts[e].count = std::uint8_t(cut_count(base.side[a], base.side[b]));
-    for (int i = 0; i < base.cuts[e].count; ++i) {
-      if (next == bytes.size()) return fail("the base is damaged: fewer cuts than its corners call for");
-      base.cuts[e].q[i] = bytes[next++];
+    root_patch.cuts[e].count = std::uint8_t(cut_count(root_patch.side[a], root_patch.side[b]));
+    for (int i = 0; i < root_patch.cuts[e].count; ++i) {
+      if (next == bytes.size()) return fail("the root patch is damaged: fewer cuts than its corners call for");
+      root_patch.cuts[e].q[i] = bytes[next++];
     }
   }
-  if (next != bytes.size()) return fail("the base is damaged: more cuts than its corners call for");
-  return base;
+  if (next != bytes.size()) return fail("the root patch is damaged: more cuts than its corners call for");
+  return root_patch;
 }
 
 }  // namespace intervale

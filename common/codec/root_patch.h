@@ -1,4 +1,4 @@
-// The coarse mesh that every stream starts from: the root's patch (paper, section 6).
+// The root patch: the coarse mesh that every stream starts from (paper, section 6).
 //
 // As bytes: the sides of the root's 8 vertices in local order (0 below, 1 inside, 2 above), then the cuts of those of its 19 edges that belong to a
 // tetrahedron which is not flat, in local order (edge_ends gives each edge's direction), alpha before beta.
@@ -17,14 +17,14 @@ namespace intervale {
 
 inline constexpr int kRootVertices = 8, kRootEdges = 19;
 
-struct Base {
+struct RootPatch {
   std::array<Side, kRootVertices> side{};
   std::array<Cuts, kRootEdges> cuts{};
 };
 
-[[nodiscard]] std::vector<std::uint8_t> encode_base(const Base& base);
+[[nodiscard]] std::vector<std::uint8_t> encode_root_patch(const RootPatch& root_patch);
 
-// The inverse, for bytes from outside: fails unless they are exactly one base of this domain.
-[[nodiscard]] Result<Base> decode_base(std::span<const std::uint8_t> bytes, const Domain& domain);
+// The inverse, for bytes from outside: fails unless they are exactly one root patch of this domain.
+[[nodiscard]] Result<RootPatch> decode_root_patch(std::span<const std::uint8_t> bytes, const Domain& domain);
 
 }  // namespace intervale

@@ -9,20 +9,20 @@
 
 namespace intervale {
 
-// An update as differences from the prediction of its diamond.
+// An update as residuals from the prediction of its diamond.
 struct UpdateView {
-  unsigned side_difference = 0;               // (side - predicted side) modulo 3
-  unsigned first_cuts = 0;                    // so many of the differences are of the first cut of their surface, and come first
-  std::span<const std::uint8_t> differences;  // of each cut on the subdivision edges, modulo 256; see Prediction::encode
+  unsigned side_residual = 0;               // (side - predicted side) modulo 3
+  unsigned first_cuts = 0;                  // so many of the residuals are of the first cut of their surface, and come first
+  std::span<const std::uint8_t> residuals;  // of each cut on the subdivision edges, modulo 256; see Prediction::encode
 };
 
 // The side and cuts of an update, as Front::split takes them. Nothing if it has not as many coefficients as its side calls for.
 [[nodiscard]] inline std::optional<Side> decode_update(const DiamondContext& context, const UpdateView& update, std::uint8_t* cuts) {
   Prediction prediction(context);
-  const Side side = Side((unsigned(prediction.side()) + update.side_difference) % 3);
+  const Side side = Side((unsigned(prediction.side()) + update.side_residual) % 3);
   const auto count = context.count_cuts(side);
-  if (count.all != int(update.differences.size()) || count.first != int(update.first_cuts)) return {};
-  prediction.decode(side, update.differences, cuts);
+  if (count.all != int(update.residuals.size()) || count.first != int(update.first_cuts)) return {};
+  prediction.decode(side, update.residuals, cuts);
   return side;
 }
 

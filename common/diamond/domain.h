@@ -10,6 +10,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 
@@ -60,19 +61,20 @@ class Domain {
   // One bit for each local vertex (kCentre not among them) of a tetrahedron in the mask.
   [[nodiscard]] static unsigned vertices(const DiamondType& row, unsigned tets) {
     unsigned mask = 0;
-    for (; tets != 0; tets &= tets - 1) mask |= row.tet_vertices[std::countr_zero(tets)];
+    for (const int tet : set_bits(tets)) mask |= row.tet_vertices[tet];
     return mask;
   }
 
   // One bit for each edge of a tetrahedron in the mask, in local numbers.
   [[nodiscard]] static unsigned edges(const DiamondType& row, unsigned tets) {
     unsigned mask = 0;
-    for (; tets != 0; tets &= tets - 1) mask |= row.tet_edges[std::countr_zero(tets)];
+    for (const int tet : set_bits(tets)) mask |= row.tet_edges[tet];
     return mask;
   }
 
-  // Splitting it would give back what is there: class 2 with h = 1 whose clamped centre is an end of its spine. Needs no update, and is never split.
-  [[nodiscard]] bool is_idle(const Diamond& d) const {
+  // Whether splitting the diamond would change nothing: class 2 with h = 1 whose clamped centre is an end of its spine. It needs no update, and is
+  // never split.
+  [[nodiscard]] bool is_noop(const Diamond& d) const {
     if (d.row->cls != 2 || d.h != 1) return false;
     const Vertex c = clamp(d.centre);
     return c == clamp(d.vertex(0)) || c == clamp(d.vertex(1));

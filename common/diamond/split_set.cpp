@@ -92,50 +92,50 @@ const std::vector<Need>& needs(Vertex position) {
     for (std::size_t parity = 0; parity < 8; ++parity) all[parity] = needs_of(link_table()[parity]);
     return all;
   }();
-  return table[std::size_t(position.x & 1) | std::size_t(position.y & 1) << 1 | std::size_t(position.z & 1) << 2];
+  return table[parity_of(position)];
 }
 
 }  // namespace
 
-void Readiness::move_to(SupercubeKey key) {
+void SplittableSlots::move_to(SupercubeKey key) {
   around_.move_to(key);
   known_ = 0;
 }
 
-std::uint64_t Readiness::split_slots(int where) {
-  std::uint64_t& slots = slots_[std::size_t(where)];
+std::uint64_t SplittableSlots::split_slots(int where) {
+  std::uint64_t& slots = split_slots_[std::size_t(where)];
   if (!(known_ >> where & 1)) {
     known_ |= std::uint64_t(1) << where;
     if (where >= kCoarser && around_.scale() + 1 == domain_.levels()) {
       slots = ~std::uint64_t(0);  // the corners of the domain
     } else {
-      const Surroundings::Seen& seen = around_.at(where);
-      slots = seen.occupancy == 0 ? 0 : split_.slots(seen.first, seen.occupancy);
+      const SetFinder::Found& found = around_.at(where);
+      slots = found.occupancy == 0 ? 0 : split_.slots(found.first, found.occupancy);
     }
   }
   return slots;
 }
 
-std::uint64_t Readiness::ready_inside() {
+std::uint64_t SplittableSlots::slots_inside() {
   std::uint64_t ready = (std::uint64_t(1) << kSlots) - 1;
   for (const Need& need : needs(around_.position())) {
     if ((need.all & ready) == 0) continue;
-    for (std::uint64_t missing = need.parents & ~split_slots(need.where); missing != 0; missing &= missing - 1) {
-      ready &= ~need.by_parent[std::size_t(std::popcount(need.parents & ((missing & (~missing + 1)) - 1)))];
+    for (const int missing : set_bits(need.parents & ~split_slots(need.where))) {
+      ready &= ~need.by_parent[std::size_t(count_below(need.parents, missing))];
     }
   }
   return ready;
 }
 
-std::uint64_t Readiness::ready() {
+std::uint64_t SplittableSlots::slots() {
   const int scale = around_.scale();
   if (scale >= domain_.levels()) return 0;
-  if (is_interior(domain_, scale, around_.position())) return ready_inside();
+  if (is_interior(domain_, scale, around_.position())) return slots_inside();
   std::uint64_t ready = 0;
   for (int slot = 0; slot < kSlots; ++slot) {
     const Diamond d(centre_of(scale, around_.position(), slot));
     const unsigned tets = domain_.tets(d);
-    if (tets == 0 || domain_.is_idle(d)) continue;
+    if (tets == 0 || domain_.is_noop(d)) continue;
     const DiamondType& row = *d.row;
     const std::uint32_t vertices = Domain::vertices(row, tets);
     const Links& links = around_.links(slot);

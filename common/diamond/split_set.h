@@ -7,7 +7,7 @@
 
 #include "common/diamond/domain.h"
 #include "common/diamond/supercube.h"
-#include "common/diamond/surroundings.h"
+#include "common/diamond/supercube_neighbours.h"
 
 namespace intervale {
 
@@ -37,25 +37,26 @@ class SplitSet {
 };
 
 // Tells which diamonds of a supercube have all their parents split.
-class Readiness {
+class SplittableSlots {
  public:
-  // All must outlive it; `split` is not to change between move_to() and ready().
-  Readiness(const SupercubeSet& set, const Domain& domain, const SplitSet& split) : domain_(domain), split_(split), around_(set) {}
+  // All must outlive it; `split` is not to change between move_to() and slots().
+  SplittableSlots(const SupercubeSet& set, const Domain& domain, const SplitSet& split) : domain_(domain), split_(split), around_(set) {}
 
   void move_to(SupercubeKey key);
 
-  // The slots of diamonds that exist, are not idle, and whose parents are split; whether they are split themselves or not.
-  [[nodiscard]] std::uint64_t ready();
+  // The slots of diamonds that exist, would change when split (Domain::is_noop), and whose parents are split, whether they are split themselves or
+  // not.
+  [[nodiscard]] std::uint64_t slots();
 
  private:
-  // The slots of a supercube around that are split.
+  // The split slots of a neighbour.
   [[nodiscard]] std::uint64_t split_slots(int where);
-  [[nodiscard]] std::uint64_t ready_inside();
+  [[nodiscard]] std::uint64_t slots_inside();
   const Domain& domain_;
   const SplitSet& split_;
-  Surroundings around_;
-  std::array<std::uint64_t, kCorner> slots_{};  // split ones of the supercubes around
-  std::uint64_t known_ = 0;                     // which of those were looked up
+  SetNeighbours around_;
+  std::array<std::uint64_t, kCorner> split_slots_{};  // of the neighbours
+  std::uint64_t known_ = 0;                           // a bit for each that was looked up
 };
 
 }  // namespace intervale

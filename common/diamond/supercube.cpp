@@ -106,9 +106,9 @@ std::optional<SupercubeSet::Supercube> SupercubeSet::find_supercube(int scale, V
   if (scale >= kMaxLevels) return {};
   const SupercubeKey key = supercube_key(scale, position);
   const auto b = find_brick(key & ~SupercubeKey(63));
-  const std::uint64_t bit = std::uint64_t(1) << (key & 63);
-  if (!b || !(bricks_[*b].mask & bit)) return {};
-  return Supercube{*b, bricks_[*b].first_supercube + std::uint32_t(std::popcount(bricks_[*b].mask & (bit - 1))), key};
+  const int i = int(key & 63);
+  if (!b || !(bricks_[*b].mask >> i & 1)) return {};
+  return Supercube{*b, bricks_[*b].first_supercube + std::uint32_t(count_below(bricks_[*b].mask, i)), key};
 }
 
 std::optional<Place> SupercubeSet::find(const Diamond& d) const {

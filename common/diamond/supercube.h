@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/diamond/diamond.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 
@@ -115,13 +116,13 @@ class SupercubeSet {
   void for_each_supercube(std::uint32_t brick, Visit&& visit) const {
     const Brick& b = bricks_[brick];
     std::uint32_t supercube = b.first_supercube;
-    for (std::uint64_t left = b.mask; left != 0; left &= left - 1) visit(supercube++, b.key + unsigned(std::countr_zero(left)));
+    for (const int i : set_bits(b.mask)) visit(supercube++, b.key + unsigned(i));
   }
   // Calls visit(Place) for those of a brick's diamonds whose slots are among `slots`, in order of their numbers.
   template <class Visit>
   void for_each_in_brick(std::uint32_t brick, std::uint64_t slots, Visit&& visit) const {
     for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
-      for (std::uint64_t left = occupancy_[s] & slots; left != 0; left &= left - 1) visit(place_in(brick, s, key, std::countr_zero(left)));
+      for (const int slot : set_bits(occupancy_[s] & slots)) visit(place_in(brick, s, key, slot));
     });
   }
   // ... of one scale and class.
@@ -146,8 +147,7 @@ class SupercubeSet {
   // The number of a supercube's first diamond.
   [[nodiscard]] UpdateIndex first(std::uint32_t brick, std::uint32_t supercube) const { return bricks_[brick].first + first_in_brick_[supercube]; }
   [[nodiscard]] Place place_in(std::uint32_t brick, std::uint32_t supercube, SupercubeKey key, int slot) const {
-    const std::uint64_t before = occupancy_[supercube] & ((std::uint64_t(1) << slot) - 1);
-    return {key, brick, supercube, std::uint32_t(slot), first(brick, supercube) + UpdateIndex(std::popcount(before))};
+    return {key, brick, supercube, std::uint32_t(slot), first(brick, supercube) + UpdateIndex(count_below(occupancy_[supercube], slot))};
   }
 
  private:

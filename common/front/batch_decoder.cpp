@@ -1,12 +1,12 @@
 #include "common/front/batch_decoder.h"
 
-#include <bit>
 #include <string>
 
 #include "common/codec/batch.h"
 #include "common/codec/byte_planes.h"
-#include "common/codec/difference_coder.h"
+#include "common/codec/residual_coder.h"
 #include "common/codec/split_names.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 namespace {
@@ -25,12 +25,12 @@ Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> by
   const char* wrong = nullptr;
   RangeDecoder coder(bytes);
   FlagModel flags;
-  DifferenceCoder differences;
-  differences.is_plain = coder.even_bits(1) != 0;
-  Front::Cursor cursor(front);
+  ResidualCoder residuals;
+  residuals.is_plain = coder.raw_bits(1) != 0;
+  FrontCursor cursor(front.state());
   // Splits the diamond looked at if the batch says so. False if that is the end.
   const auto take = [&](int cls) {
-    const bool is_split = flags.code(coder, cls, cursor.context().is_mixed(), differences.is_plain);
+    const bool is_split = flags.code(coder, cls, cursor.context().is_mixed(), residuals.is_plain);
     if (coder.is_overdrawn()) {
       wrong = "it says too little of what it splits";
       return false;
@@ -40,19 +40,19 @@ Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> by
       wrong = "it has too many updates";
       return false;
     }
-    const DiamondContext& context = cursor.look_closer();
+    const DiamondContext& context = cursor.gather_cuts();
     Prediction prediction(context);
-    const unsigned side_difference = differences.code_side(coder);
-    const Side side = Side((unsigned(prediction.side()) + side_difference) % 3);
+    const unsigned side_residual = residuals.code_side(coder);
+    const Side side = Side((unsigned(prediction.side()) + side_residual) % 3);
     const auto count = context.count_cuts(side);
     std::array<std::uint8_t, kMaxCuts> coded{}, cuts;
-    differences.code_cuts(coder, cls, side_difference, unsigned(count.all), unsigned(count.first), coded.data());
+    residuals.code_cuts(coder, cls, side_residual, unsigned(count.all), unsigned(count.first), coded.data());
     if (coder.is_overdrawn()) {
       wrong = "it has fewer bytes than its updates call for";
       return false;
     }
     prediction.decode(side, std::span(coded).first(std::size_t(count.all)), cuts.data());
-    cursor.split(side, std::span(cuts).first(std::size_t(count.all)), max_tets);
+    front.split(cursor, side, std::span(cuts).first(std::size_t(count.all)), max_tets);
     ++updates;
     return true;
   };
@@ -60,9 +60,8 @@ Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> by
       keys->size(), [&](std::size_t g) { return (*keys)[g]; },
       [&](std::size_t g, int cls) {
         cursor.move_to((*keys)[g]);
-        for (std::uint64_t left = kSlotsOfClass[cls] & ~cursor.split_slots(); left != 0; left &= left - 1) {
-          if (!cursor.find(std::countr_zero(left))) continue;
-          if (!take(cls)) return false;
+        for (const int slot : set_bits(kSlotsOfClass[cls] & ~cursor.here().split)) {
+          if (cursor.find(slot) && !take(cls)) return false;
         }
         return true;
       });

@@ -1,44 +1,62 @@
 #include <string>
 
 #include "common/front/front.h"
+#include "common/util/bits.h"
 
 namespace intervale {
+namespace {
+
+using Block = FrontState::Block;
+using Split = FrontState::Split;
+
+struct Counts {
+  std::uint64_t splits = 0, shown = 0, tets = 0;
+};
+
+// The first violation in one supercube, and what it adds to the counts.
+std::optional<std::string> validate_block(const FrontState& state, const Block& block, FrontCursor& cursor, Counts& counts) {
+  if (state.find_block(block.scale, block.position) != &block) return "a supercube is not found under its scale and position";
+  if ((block.shown & ~block.split) != 0) return "a diamond is shown as split, but is not split";
+  if (state.is_root_block(block)) return {};
+  cursor.move_to(block.scale, block.position);
+  for (const int slot : set_bits(block.split)) {
+    const Vertex c = centre_of(block.scale, block.position, slot);
+    const auto where = " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")";
+    const Split& split = block.of[slot];
+    if (!cursor.gather(slot)) return "a diamond is split before its parents" + where;
+    if (unsigned(split.side()) > 2) return "a side is not below, inside or above" + where;
+    if (split.cut_bits() != cursor.context().cut_bits(split.side())) return "the cuts do not fit the sides" + where;
+    if (std::size_t(split.first) + split.points() > state.q.size()) return "a cut is out of range" + where;
+    ++counts.splits;
+    if (!block.is_shown(slot)) continue;
+    ++counts.shown;
+    if (!cursor.parents_are_shown()) return "a split is shown, but a parent's is hidden" + where;
+    const std::uint32_t sides = cursor.context().sides | std::uint32_t(split.side()) << (2 * kCentre);
+    counts.tets +=
+        count_halves(state.domain, cursor.diamond(), cursor.parts(), sides) - count_tets(state.domain, cursor.diamond(), cursor.parts(), sides);
+  }
+  return {};
+}
+
+std::optional<std::string> compare(const char* what, std::uint64_t counted, std::uint64_t kept) {
+  if (counted == kept) return {};
+  return "the number of " + std::string(what) + " is " + std::to_string(kept) + ", counted are " + std::to_string(counted);
+}
+
+}  // namespace
 
 std::optional<std::string> Front::validate() const {
-  std::uint64_t splits = 0, shown = 0;
-  Cursor cursor(*this);
-  const Diamond root(domain_.root());
-  cursor.move_to(root.scale, {});
+  FrontCursor cursor(state_);
+  const Diamond root(state_.domain.root());
+  cursor.move_to(root);
   if (!cursor.gather(kSlotOfType[root.type])) return "the root is not there";
-  const DiamondContext& context = cursor.context();
-  std::uint64_t tets = count_tets(root, existing(root), context.sides);
-  for (const Block& block : blocks_) {
-    if (find_block(block.scale, block.position) != &block) return "a supercube is filed under another's name";
-    if (block.scale == domain_.levels()) continue;
-    cursor.move_to(block.scale, block.position);
-    for (std::uint64_t left = block.split; left != 0; left &= left - 1) {
-      const int slot = std::countr_zero(left);
-      const Diamond d(centre_of(supercube_key(block.scale, block.position), slot));
-      const auto where = " at (" + std::to_string(d.centre.x) + ", " + std::to_string(d.centre.y) + ", " + std::to_string(d.centre.z) + ")";
-      const Split& split = block.of[slot];
-      if (!cursor.gather(slot)) return "a diamond is split before its parents" + where;
-      if (unsigned(split.side()) > 2) return "a side is none" + where;
-      if ((split.bits & kCutBits) != context.cut_bits(split.side())) return "the cuts do not fit the sides" + where;
-      if (std::size_t(split.centre()) + (split.side() == Side::inside ? 1 : 0) > q_.size()) return "a cut has no place" + where;
-      ++splits;
-      if (!(block.shown >> slot & 1)) continue;
-      ++shown;
-      if (!cursor.parents_are_shown()) return "a split is shown before its parents'" + where;
-      const Existing e = existing(d);
-      const std::uint32_t sides = context.sides | std::uint32_t(split.side()) << (2 * kCentre);
-      tets += count_halves(d, e, sides) - count_tets(d, e, sides);
-    }
-    if ((block.shown & ~block.split) != 0) return "what is not split is shown";
+  Counts counts{0, 0, count_tets(state_.domain, root, cursor.parts(), cursor.context().sides)};
+  for (const Block& block : state_.blocks) {
+    if (auto wrong = validate_block(state_, block, cursor, counts)) return wrong;
   }
-  if (splits != split_count_) return "the split diamonds are miscounted: " + std::to_string(split_count_) + " for " + std::to_string(splits);
-  if (shown != shown_count_) return "the shown splits are miscounted: " + std::to_string(shown_count_) + " for " + std::to_string(shown);
-  if (tets != tet_count_) return "the tetrahedra are miscounted: " + std::to_string(tet_count_) + " for " + std::to_string(tets);
-  return {};
+  if (auto wrong = compare("split diamonds", counts.splits, state_.split_count)) return wrong;
+  if (auto wrong = compare("shown splits", counts.shown, state_.shown_count)) return wrong;
+  return compare("tetrahedra", counts.tets, state_.tet_count);
 }
 
 }  // namespace intervale

@@ -14,7 +14,7 @@ namespace intervale {
   const DiamondContext context = front.context(handle);
   std::array<std::uint8_t, kMaxCuts> cuts;
   const auto side = decode_update(context, update, cuts.data());
-  if (side) front.split(handle, *side, std::span(cuts).first(update.differences.size()));
+  if (side) front.split(handle, *side, std::span(cuts).first(update.residuals.size()));
   return side.has_value();
 }
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/codec/byte_planes.h"
-#include "common/codec/difference_coder.h"
+#include "common/codec/residual_coder.h"
 #include "common/codec/split_names.h"
 
 namespace intervale {
@@ -24,25 +24,25 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
   // Of each group: what can be split when its turn comes, and what of that has vertices on different sides.
   struct Candidates {
     std::uint64_t ready = 0, mixed = 0;
-    std::array<UpdateIndex, 3> update{};        // of each class, the first one
-    std::array<std::uint32_t, 3> difference{};  // and its first difference
+    std::array<UpdateIndex, 3> update{};      // of each class, the first one
+    std::array<std::uint32_t, 3> residual{};  // and its first residual
   };
   std::vector<Candidates> candidates;
   candidates.reserve(groups.size());
-  Readiness readiness(set, volume.domain(), split);
+  SplittableSlots splittable(set, volume.domain(), split);
   for (const SlotGroup& g : groups) {
-    readiness.move_to(g.key);
+    splittable.move_to(g.key);
     Candidates& c = candidates.emplace_back();
-    c.ready = readiness.ready() & (~split.slots(set.first(g.brick, g.supercube), set.occupancy()[g.supercube]) | g.slots);
+    c.ready = splittable.slots() & (~split.slots(set.first(g.brick, g.supercube), set.occupancy()[g.supercube]) | g.slots);
     const bool interior = is_interior(volume.domain(), scale_of_key(g.key), position_of_key(g.key));
     UpdateIndex i = set.first(g.brick, g.supercube);
-    std::uint32_t difference = volume.first_difference(g.brick, g.supercube);
+    std::uint32_t residual = volume.first_residual(g.brick, g.supercube);
     for (int cls = 0; cls < 3; ++cls) {
       c.update[cls] = i;
-      c.difference[cls] = difference;
+      c.residual[cls] = residual;
       for (std::uint64_t left = set.occupancy()[g.supercube] & kSlotsOfClass[cls]; left != 0; left &= left - 1, ++i) {
         const UpdateCode code = volume.codes()[i];
-        difference += code.coefficients();
+        residual += code.coefficients();
         const int slot = std::countr_zero(left);
         if (!(c.ready >> slot & 1)) continue;
         int vertices = diamond_type(kTypeOfSlot[slot]).vertices;
@@ -57,9 +57,9 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
   const auto coded = [&](bool is_plain, std::size_t& plain_bytes) {
     RangeEncoder coder;
     FlagModel flags;
-    DifferenceCoder differences;
-    differences.is_plain = is_plain;
-    coder.even_bits(1, unsigned(is_plain));
+    ResidualCoder residuals;
+    residuals.is_plain = is_plain;
+    coder.raw_bits(1, unsigned(is_plain));
     for_each_class(
         groups.size(), [&](std::size_t g) { return groups[g].key; },
         [&](std::size_t k, int cls) {
@@ -67,21 +67,21 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
           const Candidates& c = candidates[k];
           const std::uint64_t occupancy = set.occupancy()[g.supercube];
           UpdateIndex i = c.update[cls];
-          std::uint32_t difference = c.difference[cls];
+          std::uint32_t residual = c.residual[cls];
           for (std::uint64_t left = (c.ready | occupancy) & kSlotsOfClass[cls]; left != 0; left &= left - 1) {
             const std::uint64_t bit = left & (~left + 1);
             const bool is_named = (g.slots & bit) != 0;
             if ((c.ready & bit) != 0) flags.code(coder, cls, (c.mixed & bit) != 0, is_plain, is_named);
             if ((occupancy & bit) == 0) continue;
             if (is_named) {
-              const UpdateView u = volume.update(i, difference);
+              const UpdateView u = volume.update(i, residual);
               std::array<std::uint8_t, kMaxCuts> cuts;
-              std::copy(u.differences.begin(), u.differences.end(), cuts.begin());
-              differences.code_side(coder, u.side_difference);
-              differences.code_cuts(coder, cls, u.side_difference, unsigned(u.differences.size()), u.first_cuts, cuts.data());
-              plain_bytes += 1 + u.differences.size();
+              std::copy(u.residuals.begin(), u.residuals.end(), cuts.begin());
+              residuals.code_side(coder, u.side_residual);
+              residuals.code_cuts(coder, cls, u.side_residual, unsigned(u.residuals.size()), u.first_cuts, cuts.data());
+              plain_bytes += 1 + u.residuals.size();
             }
-            difference += volume.codes()[i++].coefficients();
+            residual += volume.codes()[i++].coefficients();
           }
           return true;
         });

@@ -4,6 +4,7 @@
 
 #include "common/codec/update.h"
 #include "common/front/split_update.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 namespace {
@@ -17,9 +18,9 @@ tl::unexpected<Error> misfit(Vertex c) {
 
 }  // namespace
 
-Result<Extraction> extract(const Grid& grid, const Base& base, const SupercubeSet& set, const SplitSet& split,
+Result<Extraction> extract(const Grid& grid, const RootPatch& root_patch, const SupercubeSet& set, const SplitSet& split,
                            const std::function<bool(Front&, Front::Handle, const Place&)>& apply, const OnProgress& progress) {
-  Extraction result{Front(grid, base)};
+  Extraction result{Front(grid, root_patch)};
   const auto total = double(split.count());
   std::optional<Vertex> wrong;
   set.for_each_down([&](const Place& p) {
@@ -39,16 +40,21 @@ Result<Extraction> extract(const Grid& grid, const Base& base, const SupercubeSe
 
 Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const OnProgress& progress, const ParallelFor& parallel) {
   if (auto ok = check_lod(lod); !ok) return tl::unexpected(ok.error());
-  const auto base = decode_base(volume.description().base, volume.domain());
-  if (!base) return tl::unexpected(base.error());
+  const auto root_patch = decode_root_patch(volume.description().root_patch, volume.domain());
+  if (!root_patch) return tl::unexpected(root_patch.error());
   const SplitSet chosen = select(volume, lod);
-  Extraction result{Front(volume.description().grid, *base)};
+  Extraction result{Front(volume.description().grid, *root_patch)};
   Front& front = result.front;
   if (!lod.max_tets && !lod.max_updates) {
-    const auto wrong = front.split_all(
-        volume.set(), chosen.groups(volume.set()), [&volume](UpdateIndex i) { return volume.codes()[i].coefficients(); },
-        [&volume](const Place& p, const DiamondContext& context, std::uint8_t* q) { return decode_update(context, volume.update(p), q); }, parallel,
-        progress);
+    const auto updates_of = [&volume](const SlotGroup& g, std::span<UpdateView, kSlots> updates) {
+      UpdateIndex i = volume.set().first(g.brick, g.supercube);
+      std::uint32_t residual = volume.first_residual(g.brick, g.supercube);
+      for (const int slot : set_bits(volume.set().occupancy()[g.supercube])) {
+        updates[std::size_t(slot)] = volume.update(i++, residual);
+        residual += std::uint32_t(updates[std::size_t(slot)].residuals.size());
+      }
+    };
+    const auto wrong = front.split_all(chosen.groups(volume.set()), updates_of, parallel, progress);
     if (wrong) return misfit(*wrong);
     result.updates = front.split_count();
     return result;

@@ -23,7 +23,7 @@ struct Extraction {
                                          const ParallelFor& parallel = serial);
 
 // The mesh after the given updates, which must be closed under parents. apply: splits the diamond of a place, and says whether that could be done.
-[[nodiscard]] Result<Extraction> extract(const Grid& grid, const Base& base, const SupercubeSet& set, const SplitSet& split,
+[[nodiscard]] Result<Extraction> extract(const Grid& grid, const RootPatch& root_patch, const SupercubeSet& set, const SplitSet& split,
                                          const std::function<bool(Front&, Front::Handle, const Place&)>& apply, const OnProgress& progress = {});
 
 }  // namespace intervale

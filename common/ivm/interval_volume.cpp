@@ -26,14 +26,14 @@ std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& pa
   h = hash(std::span<const double>(d.grid.origin), h);
   const double range[2] = {d.range.alpha, d.range.beta};
   h = hash(range, sizeof range, h);
-  h = hash(std::span<const std::uint8_t>(d.base), h);
+  h = hash(std::span<const std::uint8_t>(d.root_patch), h);
   for (const SupercubeSet::Brick& b : parts.set.bricks()) {
     const std::uint64_t brick[2] = {b.key, b.mask};
     h = hash(brick, sizeof brick, h);
   }
   h = hash(parts.set.occupancy(), h);
   h = hash(std::span<const UpdateCode>(parts.codes), h);
-  h = hash(std::span<const std::uint8_t>(parts.differences), h);
+  h = hash(std::span<const std::uint8_t>(parts.residuals), h);
   h = hash(std::span<const float>(parts.error_levels), h);
   return hash(std::span<const Yield>(parts.yields), h);
 }
@@ -75,7 +75,7 @@ IntervalVolume::IntervalVolume(Parts parts)
       domain_(description_.grid.dims),
       set_(std::move(parts.set)),
       codes_(std::move(parts.codes)),
-      differences_(std::move(parts.differences)),
+      residuals_(std::move(parts.residuals)),
       error_levels_(std::move(parts.error_levels)),
       yields_(std::move(parts.yields)),
       reach_(float(diamond_width(description_.grid) / 2)) {
@@ -120,14 +120,13 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   }
   std::uint64_t coefficients = 0;
   for (UpdateCode c : parts.codes) {
-    if (c.side_difference() > 2 || c.coefficients() > kMaxCuts || c.error_level() >= parts.error_levels.size())
-      return fail("an update's code is none");
+    if (c.side_residual() > 2 || c.coefficients() > kMaxCuts || c.error_level() >= parts.error_levels.size()) return fail("an update's code is none");
     coefficients += c.coefficients();
   }
-  if (coefficients != parts.differences.size()) return fail("updates and coefficients do not fit");
+  if (coefficients != parts.residuals.size()) return fail("updates and coefficients do not fit");
   if (coefficients > std::numeric_limits<std::uint32_t>::max()) return fail("more than 2^32 coefficients");
   const Domain domain(d.grid.dims);
-  if (auto base = decode_base(d.base, domain); !base) return tl::unexpected(base.error());
+  if (auto root_patch = decode_root_patch(d.root_patch, domain); !root_patch) return tl::unexpected(root_patch.error());
   parts.description.updates = parts.codes.size();
   parts.description.coefficients = coefficients;
   parts.description.content_hash = content_hash(d, parts);
@@ -135,15 +134,15 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
 }
 
 UpdateView IntervalVolume::update(const Place& p) const {
-  std::uint32_t difference = first_difference(p.brick, p.supercube);
-  for (UpdateIndex i = set_.first(p.brick, p.supercube); i < p.index; ++i) difference += codes_[i].coefficients();
-  return update(p.index, difference);
+  std::uint32_t residual = first_residual(p.brick, p.supercube);
+  for (UpdateIndex i = set_.first(p.brick, p.supercube); i < p.index; ++i) residual += codes_[i].coefficients();
+  return update(p.index, residual);
 }
 
 std::size_t IntervalVolume::memory_bytes() const {
-  return sizeof *this + description_.base.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
+  return sizeof *this + description_.root_patch.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
          brick_level_.size() * 2 + brick_object_error_.size() * 4 + yields_.size() + supercube_level_.size() + first_in_brick_.size() * 2 +
-         differences_.size() + error_levels_.size() * sizeof(float);
+         residuals_.size() + error_levels_.size() * sizeof(float);
 }
 
 }  // namespace intervale

@@ -2,7 +2,7 @@
 //
 // Weiss and De Floriani 2008, section 6. For each relevant diamond it holds what splitting it takes: the side of its centre and the cuts on its
 // subdivision edges, and the saturated error that says when. The paper spends 12 bytes on each and one on each cut; here supercubes (supercube.h)
-// stand for the coordinates and the pointer. Sides and cuts are kept as differences from what the diamond itself predicts (prediction.h): no larger
+// stand for the coordinates and the pointer. Sides and cuts are kept as residuals from what the diamond itself predicts (prediction.h): no larger
 // in memory, and ready for file and wire.
 #pragma once
 
@@ -45,16 +45,16 @@ inline constexpr float kFurthest = 64;  // of what a diamond with h = 1 measures
 
 inline constexpr int kErrorLevels = 512;  // distinct errors at most; each update's is rounded up to one of them
 
-// One update in 16 bits: the difference of the centre's side, how many coefficients it has, and the level of its error.
+// One update in 16 bits: the residual of the centre's side, how many coefficients it has, and the level of its error.
 class UpdateCode {
  public:
   UpdateCode() = default;
   explicit UpdateCode(std::uint16_t bits) : bits_(bits) {}
   // Of `all` coefficients (at most 20), `first` are the first of their surface: none, one (then at most 10 in all) or two.
-  UpdateCode(unsigned side_difference, unsigned all, unsigned first, unsigned error_level)
-      : bits_(std::uint16_t(side_difference | (first == 2 ? all + 9 : all) << 2 | error_level << 7)) {}
+  UpdateCode(unsigned side_residual, unsigned all, unsigned first, unsigned error_level)
+      : bits_(std::uint16_t(side_residual | (first == 2 ? all + 9 : all) << 2 | error_level << 7)) {}
   [[nodiscard]] std::uint16_t bits() const { return bits_; }
-  [[nodiscard]] unsigned side_difference() const { return bits_ & 3u; }
+  [[nodiscard]] unsigned side_residual() const { return bits_ & 3u; }
   [[nodiscard]] unsigned coefficients() const { return counts() > 10 ? counts() - 9 : counts(); }
   [[nodiscard]] unsigned first_cuts() const { return counts() == 0 ? 0 : counts() > 10 ? 2 : 1; }
   [[nodiscard]] unsigned error_level() const { return bits_ >> 7; }
@@ -71,10 +71,10 @@ class IntervalVolume {
   struct Parts {
     Description description;  // updates, coefficients and content_hash are computed
     SupercubeSet set;
-    std::vector<UpdateCode> codes;          // by number of the update
-    std::vector<std::uint8_t> differences;  // all updates' one after the other
-    std::vector<float> error_levels;        // ascending, at most kErrorLevels
-    std::vector<Yield> yields;              // by supercube
+    std::vector<UpdateCode> codes;        // by number of the update
+    std::vector<std::uint8_t> residuals;  // all updates' one after the other
+    std::vector<float> error_levels;      // ascending, at most kErrorLevels
+    std::vector<Yield> yields;            // by supercube
   };
   // Fails where the parts do not fit together; validate() checks the meaning.
   static Result<IntervalVolume> assemble(Parts parts);
@@ -90,7 +90,7 @@ class IntervalVolume {
   [[nodiscard]] unsigned brick_error_level(std::uint32_t brick) const { return brick_level_[brick]; }  // the highest of a brick's updates
   [[nodiscard]] std::span<const float> error_levels() const { return error_levels_; }
   [[nodiscard]] std::span<const UpdateCode> codes() const { return codes_; }
-  [[nodiscard]] std::span<const std::uint8_t> differences() const { return differences_; }
+  [[nodiscard]] std::span<const std::uint8_t> residuals() const { return residuals_; }
   // Levels of error in a byte: of each supercube the highest of its updates.
   [[nodiscard]] std::span<const std::uint8_t> supercube_half_levels() const { return supercube_level_; }
   [[nodiscard]] static std::uint8_t half_of_level(unsigned level) { return std::uint8_t(level / 2); }
@@ -107,13 +107,13 @@ class IntervalVolume {
   [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
   [[nodiscard]] std::span<const Yield> yields() const { return yields_; }
   [[nodiscard]] UpdateView update(const Place& p) const;  // O(1): at most 55 codes are summed
-  // The same, for those who go through a supercube and sum as they go: its first difference, and an update by its own first one.
-  [[nodiscard]] std::uint32_t first_difference(std::uint32_t brick, std::uint32_t supercube) const {
+  // The same, for those who go through a supercube and sum as they go: its first residual, and an update by its own first one.
+  [[nodiscard]] std::uint32_t first_residual(std::uint32_t brick, std::uint32_t supercube) const {
     return brick_first_[brick] + first_in_brick_[supercube];
   }
-  [[nodiscard]] UpdateView update(UpdateIndex i, std::uint32_t difference) const {
+  [[nodiscard]] UpdateView update(UpdateIndex i, std::uint32_t residual) const {
     const UpdateCode code = codes_[i];
-    return {code.side_difference(), code.first_cuts(), std::span(differences_).subspan(difference, code.coefficients())};
+    return {code.side_residual(), code.first_cuts(), std::span(residuals_).subspan(residual, code.coefficients())};
   }
 
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -124,10 +124,10 @@ class IntervalVolume {
   Domain domain_;
   SupercubeSet set_;
   std::vector<UpdateCode> codes_;
-  std::vector<std::uint32_t> brick_first_;     // difference, of each brick
-  std::vector<std::uint16_t> first_in_brick_;  // difference, of each supercube: 64 supercubes have no more than 57344
+  std::vector<std::uint32_t> brick_first_;     // residual, of each brick
+  std::vector<std::uint16_t> first_in_brick_;  // residual, of each supercube: 64 supercubes have no more than 57344
   std::vector<std::uint16_t> brick_level_;     // the highest level of error, of each brick
-  std::vector<std::uint8_t> differences_;
+  std::vector<std::uint8_t> residuals_;
   std::vector<float> error_levels_;
   std::vector<Yield> yields_;                  // by supercube
   std::vector<std::uint8_t> supercube_level_;  // by supercube: half_of_level() of the highest of its updates

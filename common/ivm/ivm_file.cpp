@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "common/codec/byte_planes.h"
-#include "common/codec/difference_coder.h"
+#include "common/codec/residual_coder.h"
 #include "common/util/atomic_file.h"
 #include "common/util/bits.h"
 
@@ -26,9 +26,9 @@ constexpr int kCompression = 9;               // zstd; 19 gains a few percent an
 constexpr unsigned kSlotBytes = 7;            // of an occupancy word: 56 slots
 constexpr std::uint64_t kMaxRatio = 1 << 15;  // zstd's own: a block of 128 KiB in 4 bytes; a range coder's is less
 
-enum Section : std::uint32_t { kMeta, kBase, kErrors, kBricks, kMasks, kOccupancy, kYields, kLevels, kShapes, kDifferences, kSections };
-constexpr const char* kSectionNames[kSections] = {"meta",      "base",   "errors", "bricks", "masks",
-                                                  "occupancy", "yields", "levels", "shapes", "differences"};
+enum Section : std::uint32_t { kMeta, kRootPatch, kErrors, kBricks, kMasks, kOccupancy, kYields, kLevels, kShapes, kResiduals, kSections };
+constexpr const char* kSectionNames[kSections] = {"meta",      "root_patch", "errors", "bricks", "masks",
+                                                  "occupancy", "yields",     "levels", "shapes", "residuals"};
 
 struct Header {
   char magic[8];
@@ -98,13 +98,13 @@ void code_shapes(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> 
 }
 
 template <class Coder>
-void code_differences(Coder& coder, const SupercubeSet& set, std::span<const std::uint8_t> shapes, std::span<std::uint8_t> differences) {
-  DifferenceCoder model;
-  std::uint8_t* next = differences.data();
+void code_residuals(Coder& coder, const SupercubeSet& set, std::span<const std::uint8_t> shapes, std::span<std::uint8_t> residuals) {
+  ResidualCoder model;
+  std::uint8_t* next = residuals.data();
   for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
     set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
       const UpdateCode code(shapes[p.index]);
-      model.code_cuts(coder, class_of_slot(int(p.slot)), code.side_difference(), code.coefficients(), code.first_cuts(), next);
+      model.code_cuts(coder, class_of_slot(int(p.slot)), code.side_residual(), code.coefficients(), code.first_cuts(), next);
       next += code.coefficients();
     });
   }
@@ -147,8 +147,8 @@ Stored stored(const IntervalVolume& volume, Section section) {
       const Meta meta = meta_of(volume);
       return compressed(bytes_of(std::span<const Meta>(&meta, 1)));
     }
-    case kBase:
-      return compressed(volume.description().base);
+    case kRootPatch:
+      return compressed(volume.description().root_patch);
     case kErrors:
       return compressed(bytes_of(volume.error_levels()));
     case kBricks: {
@@ -167,7 +167,7 @@ Stored stored(const IntervalVolume& volume, Section section) {
       return compressed(bytes_of(volume.yields()));
     case kLevels:
     case kShapes:
-    case kDifferences:
+    case kResiduals:
     case kSections:
       break;
   }
@@ -184,9 +184,9 @@ Stored stored(const IntervalVolume& volume, Section section) {
     code_shapes(coder, set, raw);
     return {coder.finish(), raw.size()};
   }
-  std::vector<std::uint8_t> differences(volume.differences().begin(), volume.differences().end());
-  code_differences(coder, set, raw, differences);
-  return {coder.finish(), differences.size()};
+  std::vector<std::uint8_t> residuals(volume.residuals().begin(), volume.residuals().end());
+  code_residuals(coder, set, raw, residuals);
+  return {coder.finish(), residuals.size()};
 }
 
 std::uint64_t table_checksum(std::span<const std::byte> table) {
@@ -325,12 +325,12 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   }
   const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},  {kOccupancy, meta.supercubes * kSlotBytes},
                                                         {kYields, meta.supercubes}, {kLevels, 2 * meta.updates},
-                                                        {kShapes, meta.updates},    {kDifferences, meta.coefficients}};
+                                                        {kShapes, meta.updates},    {kResiduals, meta.coefficients}};
   for (const auto& [section, bytes] : expected) {
     if (auto ok = is_size(section, bytes); !ok) return tl::unexpected(ok.error());
   }
   Result<std::vector<std::uint8_t>> raw[kLevels];
-  for (int s = kBase; s < int(kLevels); ++s) {
+  for (int s = kRootPatch; s < int(kLevels); ++s) {
     raw[s] = read(all, entries[s]);
     if (!raw[s]) return tl::unexpected(raw[s].error());
   }
@@ -343,7 +343,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
     slots += std::popcount(word);
   }
   if (slots != meta.updates) return fail("updates and supercubes do not fit");
-  d.base = std::move(*raw[kBase]);
+  d.root_patch = std::move(*raw[kRootPatch]);
   parts.error_levels.resize(raw[kErrors]->size() / sizeof(float));
   if (!parts.error_levels.empty()) std::memcpy(parts.error_levels.data(), raw[kErrors]->data(), raw[kErrors]->size());
   for (const std::uint8_t step : *raw[kYields]) parts.yields.emplace_back(step);
@@ -361,15 +361,15 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   std::uint64_t coefficients = 0;
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const UpdateCode code(std::uint16_t(shapes[i] | levels[i] << 7));
-    if (code.side_difference() > 2 || code.coefficients() > kMaxCuts) return fail("an update's code is none");
+    if (code.side_residual() > 2 || code.coefficients() > kMaxCuts) return fail("an update's code is none");
     parts.codes.push_back(code);
     coefficients += code.coefficients();
   }
   if (coefficients != meta.coefficients) return fail("updates and coefficients do not fit");
-  parts.differences.resize(meta.coefficients);
-  RangeDecoder difference_coder(coded(kDifferences));
-  code_differences(difference_coder, parts.set, shapes, parts.differences);
-  if (!difference_coder.is_spent()) return does_not_decompress(entries[kDifferences]);
+  parts.residuals.resize(meta.coefficients);
+  RangeDecoder residual_coder(coded(kResiduals));
+  code_residuals(residual_coder, parts.set, shapes, parts.residuals);
+  if (!residual_coder.is_spent()) return does_not_decompress(entries[kResiduals]);
   auto volume = IntervalVolume::assemble(std::move(parts));
   if (volume && volume->description().content_hash != meta.content_hash) return fail("the contents are not those that were written (content hash)");
   return volume;

@@ -20,9 +20,9 @@ Result<void> validate(const IntervalVolume& volume) {
   const SupercubeSet& set = volume.set();
   const auto error_levels = volume.error_levels();
   if (description.max_error != (error_levels.empty() ? 0.0 : double(error_levels.back()))) return fail("the largest error is not that of any update");
-  const auto base = decode_base(description.base, domain);
-  if (!base) return tl::unexpected(base.error());
-  Front front(description.grid, *base);
+  const auto root_patch = decode_root_patch(description.root_patch, domain);
+  if (!root_patch) return tl::unexpected(root_patch.error());
+  Front front(description.grid, *root_patch);
   std::optional<Error> wrong;
   set.for_each_down([&](const Place& p) {
     if (wrong) return;

@@ -15,10 +15,10 @@ enum class Surface : std::uint8_t { inside = 0, alpha = 1, beta = 2 };
 
 // A vector whose new elements are not set to anything until they are written: a large mesh is written once, by many threads.
 template <class T>
-struct Unset : std::allocator<T> {
+struct DefaultInit : std::allocator<T> {
   template <class U>
   struct rebind {
-    using other = Unset<U>;
+    using other = DefaultInit<U>;
   };
   template <class U>
   void construct(U* p) {
@@ -30,7 +30,7 @@ struct Unset : std::allocator<T> {
   }
 };
 template <class T>
-using MeshArray = std::vector<T, Unset<T>>;
+using MeshArray = std::vector<T, DefaultInit<T>>;
 
 // Points in world coordinates, each used by a tetrahedron and given once; tetrahedra as four point indices, positively oriented:
 // (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).

@@ -38,13 +38,13 @@ struct Description {
   std::uint64_t updates = 0;       // relevant diamonds
   std::uint64_t coefficients = 0;  // cuts on their subdivision edges
   FullMesh full;
-  std::uint64_t content_hash = 0;  // equal for equal contents, whatever the name
-  std::vector<std::uint8_t> base;  // the sides of the 8 corners and the cuts on the root's edges; see base.h
+  std::uint64_t content_hash = 0;        // equal for equal contents, whatever the name
+  std::vector<std::uint8_t> root_patch;  // the sides of the 8 corners and the cuts on the root's edges; see root_patch.h
   friend bool operator==(const Description&, const Description&) = default;
 };
 
-// Checks a description from outside: sides within bounds, the box finite and not flat, a range, numbers that can be. The base is checked by
-// decode_base.
+// Checks a description from outside: sides within bounds, the box finite and not flat, a range, numbers that can be. The root patch is checked by
+// decode_root_patch.
 [[nodiscard]] Result<void> check_description(const Description& description);
 
 }  // namespace intervale

@@ -5,8 +5,7 @@
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <boost/unordered/unordered_flat_set.hpp>
 
-#include "common/diamond/links.h"
-#include "common/diamond/surroundings.h"
+#include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/batch_encoder.h"
 #include "common/ivm/refinement.h"
 
@@ -23,8 +22,8 @@ constexpr std::uint32_t kMaxVisited = 1 << 16;  // supercubes and updates visite
 
 // The batch under construction.
 struct StreamPlan::BatchBuilder {
-  Surroundings around;              // of the supercube visited
-  std::vector<Surroundings> above;  // of ancestors, by scale
+  SetNeighbours around;              // of the supercube visited
+  std::vector<SetNeighbours> above;  // of ancestors, by scale
   std::vector<SlotGroup> groups;
   boost::unordered_flat_map<std::uint32_t, std::uint32_t> group_of;  // by supercube
   boost::unordered_flat_set<std::uint32_t> bricks;
@@ -33,7 +32,7 @@ struct StreamPlan::BatchBuilder {
   std::uint32_t visited = 0;  // supercubes and updates
 
   BatchBuilder(const IntervalVolume& volume, std::size_t max_payload)
-      : around(volume.set()), above(kMaxLevels, Surroundings(volume.set())), max_bytes(max_payload) {}
+      : around(volume.set()), above(kMaxLevels, SetNeighbours(volume.set())), max_bytes(max_payload) {}
   SlotGroup* find(std::uint32_t supercube) {
     if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
     const auto found = group_of.find(supercube);
@@ -74,34 +73,23 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
 
 bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   const SupercubeSet& set = volume_->set();
-  const auto find = [&set](SupercubeKey key) { return set.find_supercube(scale_of_key(key), position_of_key(key)); };
   for (const SlotGroup& g : groups) {
-    const auto found = find(g.key);
+    const auto found = set.find_supercube(scale_of_key(g.key), position_of_key(g.key));
     if (!found || (g.slots & ~set.occupancy()[found->supercube]) != 0) return false;
   }
-  const auto has_sent_child = [&](const Diamond& d) {
-    for (int k = 0; k < d.row->children && d.has_children(); ++k) {
-      const Vertex c = d.child(k);
-      if ((c.x | c.y | c.z) < 0) continue;
-      const auto child = set.find(c);
-      if (child && sent_.contains(child->index)) return true;
-    }
-    return false;
-  };
-  for_each_finest_first(groups, [&](const SlotGroup& g, std::uint64_t slots) {
-    const auto found = *find(g.key);
-    Pending& pending = pending_[found.brick];
-    for (std::uint64_t left = slots; left != 0; left &= left - 1) {
-      const Place place = set.place_in(found.brick, found.supercube, g.key, std::countr_zero(left));
-      if (!sent_.contains(place.index) || has_sent_child(Diamond(set.centre(place)))) continue;
-      sent_.erase(place.index);
-      --sent_count_;
-      ++pending.unsent;
-      const unsigned level = volume_->error_level(place.index);
-      pending.level = std::max(pending.level, std::uint16_t(level));
-      pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(found.supercube, scale_of_key(g.key), level)));
-      half_levels_[found.supercube] = std::max(half_levels_[found.supercube], volume_->half_of_level(level));
-    }
+  SetNeighbours around(set);
+  const auto sent_slots = [this](const SetFinder::Found& found) { return found.occupancy == 0 ? 0 : sent_.slots(found.first, found.occupancy); };
+  merge_finest_first(groups, around, sent_slots, [&](const SlotGroup& g, int slot) {
+    const SetFinder::Found& here = around.at(kHere);
+    const UpdateIndex i = here.index(slot);
+    sent_.erase(i);
+    --sent_count_;
+    Pending& pending = pending_[here.brick];
+    ++pending.unsent;
+    const unsigned level = volume_->error_level(i);
+    pending.level = std::max(pending.level, std::uint16_t(level));
+    pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(here.supercube, scale_of_key(g.key), level)));
+    half_levels_[here.supercube] = std::max(half_levels_[here.supercube], volume_->half_of_level(level));
   });
   return true;
 }
@@ -163,16 +151,16 @@ StreamPlan::Remaining StreamPlan::remaining() const {
 // Adds an update after its missing ancestors. around: of its supercube; those of the ancestors are cached in the
 // builder, since the next update is near by. False if the batch is full first; even then the batch is closed under
 // parents.
-bool StreamPlan::add_with_ancestors(const Place& place, Surroundings& around, BatchBuilder& builder) {
+bool StreamPlan::add_with_ancestors(const Place& place, SetNeighbours& around, BatchBuilder& builder) {
   const Links& links = around.links(int(place.slot));
   const int parents = diamond_type(kTypeOfSlot[place.slot]).parents;
   for (int k = 0; k < parents; ++k) {
     const Link link = links.vertex[links.parent[k]];
     around.move_to(place.key);  // an ancestor of the same scale may have moved it
-    const Surroundings::Seen& seen = around.at(link.where);
-    if (!seen.has(link.slot) || sent_.contains(seen.number(link.slot))) continue;
-    const Place parent = seen.place(link.slot);
-    Surroundings& above = builder.above[std::size_t(scale_of_key(parent.key))];
+    const SetFinder::Found& found = around.at(link.where);
+    if (!found.has(link.slot) || sent_.contains(found.index(link.slot))) continue;
+    const Place parent = found.place(link.slot);
+    SetNeighbours& above = builder.above[std::size_t(scale_of_key(parent.key))];
     above.move_to(parent.key);
     if (!add_with_ancestors(parent, above, builder)) return false;
   }

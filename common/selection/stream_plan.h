@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "common/diamond/split_set.h"
-#include "common/diamond/surroundings.h"
+#include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ranking.h"
 #include "common/view/lod.h"
@@ -100,7 +100,7 @@ class StreamPlan {
   bool visit_brick(std::uint32_t brick, BatchBuilder& builder);
   std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent, BatchBuilder& builder);
   bool add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest);
-  bool add_with_ancestors(const Place& place, Surroundings& around, BatchBuilder& builder);
+  bool add_with_ancestors(const Place& place, SetNeighbours& around, BatchBuilder& builder);
   bool add(const Place& place, BatchBuilder& builder);
 
   std::shared_ptr<const IntervalVolume> volume_;

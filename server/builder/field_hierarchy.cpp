@@ -10,6 +10,7 @@
 #include <limits>
 #include <tuple>
 
+#include "common/diamond/supercube_neighbours.h"
 #include "common/patch/tet_cases.h"
 #include "common/util/bits.h"
 #include "server/builder/error_levels.h"
@@ -131,6 +132,16 @@ std::uint64_t leaves(const TetCases& cases, const Domain& domain, const Diamond&
   return n;
 }
 
+// A bit for each child that is in the set.
+unsigned children_in_set(SetNeighbours& neighbours, int slot) {
+  unsigned some = 0, bit = 1;
+  for (const Link link : neighbours.children(slot)) {
+    if (neighbours.at(link.where).has(link.slot)) some |= bit;
+    bit <<= 1;
+  }
+  return some;
+}
+
 float round_up(double error) {
   if (error >= std::numeric_limits<float>::max()) return std::numeric_limits<float>::max();
   const float f = float(error);
@@ -194,14 +205,18 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
     const auto [begin, end] = set_.of_scale(scale);
     for (int cls = scale > 0 ? 2 : 1; cls >= 0; --cls) {
       tbb::parallel_for(begin, end, [&](std::uint32_t brick) {
+        SetNeighbours neighbours(set_);
         set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
           const std::uint64_t slots = set_.occupancy()[s] & kSlotsOfClass[cls];
           if (slots == 0) return;
-          const SupercubeChildren children(set_, key);
+          neighbours.move_to(key);
           UpdateIndex next = set_.first(brick, s) + UpdateIndex(std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots));
           for (const int slot : set_bits(slots)) {
             float& error = errors[next++];
-            for (const int child : set_bits(children.of(slot))) error = std::max(error, errors[children.number_of(slot, child)]);
+            for (const Link link : neighbours.children(slot)) {
+              const SetFinder::Found& found = neighbours.at(link.where);
+              if (found.has(link.slot)) error = std::max(error, errors[found.index(link.slot)]);
+            }
           }
         });
       });
@@ -240,16 +255,16 @@ double FieldHierarchy::value(Vertex v) const {
 
 Side FieldHierarchy::side(Vertex v) const { return side_of(value(v), range_); }
 
-Base FieldHierarchy::base() const {
+RootPatch FieldHierarchy::root_patch() const {
   const Diamond root(domain_.root());
   const unsigned edges = Domain::edges(*root.row, domain_.tets(root));
-  Base base;
-  for (int v = 0; v < kRootVertices; ++v) base.side[v] = side(root.vertex(v));
+  RootPatch root_patch;
+  for (int v = 0; v < kRootVertices; ++v) root_patch.side[v] = side(root.vertex(v));
   for (int e = 0; e < kRootEdges; ++e) {
     const auto [a, b] = edge_ends(e, root.row->belt);
-    if (edges >> e & 1) base.cuts[e] = cuts_between(value(root.vertex(a)), value(root.vertex(b)), range_);
+    if (edges >> e & 1) root_patch.cuts[e] = cuts_between(value(root.vertex(a)), value(root.vertex(b)), range_);
   }
-  return base;
+  return root_patch;
 }
 
 DiamondContext FieldHierarchy::context(const Diamond& d) const {
@@ -276,7 +291,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
   d.grid = volume_.grid;
   d.range = range_;
   d.refine = refine_;
-  d.base = encode_base(base());
+  d.root_patch = encode_root_patch(root_patch());
   parts.set = set_;
   parts.error_levels = choose_error_levels(errors_, kErrorLevels);
   d.max_error = parts.error_levels.empty() ? 0.0 : double(parts.error_levels.back());
@@ -285,7 +300,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
   const LevelFinder level_of(parts.error_levels);
   // Each brick's by themselves; then all in one.
   struct Part {
-    std::vector<std::uint8_t> differences;
+    std::vector<std::uint8_t> residuals;
     FullMesh full;
     std::vector<Vertex> moved;  // inside, where clamping takes centres that lie outside the box
   };
@@ -294,9 +309,10 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
     const Field<T> field{samples, domain_.last()};
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()), [&](std::uint32_t b) {
       Part& part = by_brick[b];
+      SetNeighbours neighbours(set_);
       set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
         const SupercubeDiamonds diamonds(outlines_, key);
-        const SupercubeChildren children(set_, key);
+        neighbours.move_to(key);
         UpdateIndex next = set_.first(b, s);
         for (const int slot : set_bits(set_.occupancy()[s])) {
           const Diamond diamond = diamonds.diamond(slot);
@@ -308,10 +324,11 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
           const std::size_t n = cuts_of(f, c, range_, cuts.data());
           Prediction prediction(c);
           prediction.encode(centre, std::span(cuts).first(n), coded.data());
-          part.differences.insert(part.differences.end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
+          part.residuals.insert(part.residuals.end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
           parts.codes[next] = UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first),
                                          unsigned(level_of(errors_[next])));
-          part.full.tets += leaves(cases, domain_, diamond, outline, c.sides | std::uint32_t(centre) << (2 * kCentre), children.of(slot));
+          part.full.tets +=
+              leaves(cases, domain_, diamond, outline, c.sides | std::uint32_t(centre) << (2 * kCentre), children_in_set(neighbours, slot));
           ++next;
           if (centre != Side::inside) continue;
           if (domain_.contains(diamond.centre))
@@ -333,7 +350,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
   }
   std::size_t total = 0;
   for (const Part& part : by_brick) {
-    total += part.differences.size();
+    total += part.residuals.size();
     d.full.vertices += part.full.vertices;
     d.full.tets += part.full.tets;
     moved.insert(moved.end(), part.moved.begin(), part.moved.end());
@@ -349,9 +366,9 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
       if (outline.tets >> i & 1) d.full.tets += patch_tets(cases, domain_, root, outline, sides, root.row->tet(i), root.row->shape[i]);
     }
   }
-  parts.differences.reserve(total);
+  parts.residuals.reserve(total);
   for (Part& part : by_brick) {
-    parts.differences.insert(parts.differences.end(), part.differences.begin(), part.differences.end());
+    parts.residuals.insert(parts.residuals.end(), part.residuals.begin(), part.residuals.end());
     part = {};
   }
   return IntervalVolume::assemble(std::move(parts));

@@ -35,7 +35,7 @@ class FieldHierarchy {
   [[nodiscard]] const SupercubeSet& set() const { return set_; }         // the relevant diamonds
   [[nodiscard]] float error(UpdateIndex i) const { return errors_[i]; }  // saturated over relevant children, rounded up to a float
   [[nodiscard]] Side side(Vertex v) const;                               // of any vertex
-  [[nodiscard]] Base base() const;
+  [[nodiscard]] RootPatch root_patch() const;
 
   // What a diamond of a front knows before its split, and the cuts on its subdivision edges in the order in which Front::split takes them.
   [[nodiscard]] DiamondContext context(const Diamond& d) const;

@@ -53,7 +53,7 @@ class Outlines {
     }
     o.vertices = Domain::vertices(*d.row, o.tets);
     o.edges = Domain::edges(*d.row, o.tets);
-    o.splits = o.tets != 0 && !domain.is_idle(d);
+    o.splits = o.tets != 0 && !domain.is_noop(d);
     return o;
   }
 

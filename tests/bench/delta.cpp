@@ -113,7 +113,7 @@ class TypedDelta final : public Delta {
         const Index index = index_of(d.centre);
         if (index == kNowhere) return;
         const unsigned tets = domain_.tets(d);
-        if (tets == 0 || domain_.is_idle(d)) return;
+        if (tets == 0 || domain_.is_noop(d)) return;
         Node& node = nodes_[index];
         node.error = round_up(error_of(d, Outlines::outline_of(domain_, d)));
         node.min = node.max = sample(d.centre);
@@ -146,22 +146,22 @@ class TypedDelta final : public Delta {
     return mode == Refine::boundary ? low != high : low != Side::above && high != Side::below;
   }
 
-  [[nodiscard]] Base base(const Range& range) const {
+  [[nodiscard]] RootPatch root_patch(const Range& range) const {
     const Diamond root(domain_.root());
     const unsigned edges = Domain::edges(*root.row, domain_.tets(root));
-    Base base;
-    for (int v = 0; v < kRootVertices; ++v) base.side[v] = side_of(double(sample(root.vertex(v))), range);
+    RootPatch root_patch;
+    for (int v = 0; v < kRootVertices; ++v) root_patch.side[v] = side_of(double(sample(root.vertex(v))), range);
     for (int e = 0; e < kRootEdges; ++e) {
       const auto [a, b] = edge_ends(e, root.row->belt);
-      if (edges >> e & 1) base.cuts[e] = cuts_between(double(sample(root.vertex(a))), double(sample(root.vertex(b))), range);
+      if (edges >> e & 1) root_patch.cuts[e] = cuts_between(double(sample(root.vertex(a))), double(sample(root.vertex(b))), range);
     }
-    return base;
+    return root_patch;
   }
 
   template <Refine mode>
   [[nodiscard]] Refined refine_as(const Range& range, double error, Walk walk) const {
     const double threshold = error > 0 ? error : -0.5;  // at 0 every relevant diamond, also those without an error
-    Refined refined{Front(grid_, base(range))};
+    Refined refined{Front(grid_, root_patch(range))};
     const auto wanted = [&](Index i) { return is_wanted<mode>(nodes_[i], range, threshold); };
     if (walk == Walk::diamonds) {
       refine_diamonds(refined, range, wanted);
@@ -189,7 +189,7 @@ class TypedDelta final : public Delta {
       if (wanted(index)) next.push_back({centre, index});
     };
     reach(domain_.root(), index_of(domain_.root()));
-    Front::Cursor cursor(refined.front);
+    FrontCursor cursor(refined.front.state());
     while (!next.empty()) {
       now.swap(next);
       next.clear();
@@ -200,7 +200,7 @@ class TypedDelta final : public Delta {
         cursor.move_to(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
         if (!cursor.gather(kSlotOfType[d.type])) throw std::logic_error(kTooSoon);
         const Update u = update(d, interior, range);
-        cursor.split(u.side, std::span(u.cuts).first(u.count));
+        refined.front.split(cursor, u.side, std::span(u.cuts).first(u.count));
         for_each_child(d, interior, reach);
       }
       refined.updates += now.size();
@@ -244,7 +244,7 @@ class TypedDelta final : public Delta {
       word.wanted |= bit;
     };
     reach(domain_.root(), index_of(domain_.root()));
-    Front::Cursor cursor(refined.front);
+    FrontCursor cursor(refined.front.state());
     for (int scale = domain_.levels() - 1; scale >= 0; --scale) {
       Level& level = levels[std::size_t(scale)];
       for (const std::uint64_t cls : kSlotsOfClass) {
@@ -258,7 +258,7 @@ class TypedDelta final : public Delta {
             const Diamond& d = cursor.diamond();
             const bool interior = domain_.is_interior(d);
             const Update u = update(d, interior, range);
-            cursor.split(u.side, std::span(u.cuts).first(u.count));
+            refined.front.split(cursor, u.side, std::span(u.cuts).first(u.count));
             ++refined.updates;
             for_each_child(d, interior, reach);
           }

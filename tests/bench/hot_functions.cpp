@@ -26,7 +26,7 @@ struct Fixture {
   Case c = *sample_case("gyroid", kSize);
   FieldHierarchy hierarchy{*c.volume, {c.range, c.refine, {}}};
   std::shared_ptr<const IntervalVolume> sigma = std::make_shared<const IntervalVolume>(*hierarchy.compact());
-  Base base = *decode_base(sigma->description().base, sigma->domain());
+  RootPatch root_patch = *decode_root_patch(sigma->description().root_patch, sigma->domain());
   std::vector<Place> places;                        // of all updates, coarse to fine
   std::vector<std::vector<std::uint8_t>> payloads;  // of the whole stream
 
@@ -72,7 +72,7 @@ void decode_prediction(benchmark::State& state) {
     for (std::size_t i = 0; i < f.places.size(); ++i) {
       const UpdateView u = f.sigma->update(f.places[i]);
       Prediction prediction(contexts[i]);
-      prediction.decode(Side((unsigned(prediction.side()) + u.side_difference) % 3), u.differences, cuts.data());
+      prediction.decode(Side((unsigned(prediction.side()) + u.side_residual) % 3), u.residuals, cuts.data());
       benchmark::DoNotOptimize(cuts);
     }
   }
@@ -83,7 +83,7 @@ BENCHMARK(decode_prediction)->Unit(benchmark::kMillisecond);
 void apply_batches(benchmark::State& state) {
   const auto& f = fixture();
   for (auto _ : state) {
-    Front front(f.c.volume->grid, f.base);
+    Front front(f.c.volume->grid, f.root_patch);
     for (const auto& payload : f.payloads) benchmark::DoNotOptimize(apply_batch(front, payload).has_value());
   }
   count_items(state, f.places.size());

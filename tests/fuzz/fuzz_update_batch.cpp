@@ -22,7 +22,7 @@ const std::vector<std::vector<Front>>& clients() {
       const auto queue = in_order(v, select(v, {}), {});
       auto& stages = made.emplace_back();
       for (std::size_t stage = 0; stage < kStages; ++stage) {
-        Front& front = stages.emplace_back(v.description().grid, *decode_base(v.description().base, v.domain()));
+        Front& front = stages.emplace_back(v.description().grid, *decode_root_patch(v.description().root_patch, v.domain()));
         if (!apply_batch(front, testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages)))) std::abort();
       }
     }

@@ -40,11 +40,11 @@ class FrontLaws : public ::testing::TestWithParam<unsigned> {
 
 TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
   const IntervalVolume sigma = testing::build(volume, {.range = range});
-  const Base base = *decode_base(sigma.description().base, sigma.domain());
+  const RootPatch root_patch = *decode_root_patch(sigma.description().root_patch, sigma.domain());
   const testing::Canonical expected = canonical(extract(sigma, {})->front.mesh());
   for (unsigned trial = 0; trial < 3; ++trial) {
     std::mt19937 random(GetParam() * 10 + trial);
-    Front front(volume.grid, base);
+    Front front(volume.grid, root_patch);
     std::vector<Place> waiting;
     sigma.set().for_each_down([&](const Place& p) { waiting.push_back(p); });
     std::size_t steps = 0;
@@ -72,9 +72,9 @@ TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
 
 TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
   const IntervalVolume sigma = testing::build(volume, {.range = range});
-  const Base base = *decode_base(sigma.description().base, sigma.domain());
+  const RootPatch root_patch = *decode_root_patch(sigma.description().root_patch, sigma.domain());
   std::mt19937 random(GetParam());
-  Front front(volume.grid, base);
+  Front front(volume.grid, root_patch);
   const testing::Canonical coarse = canonical(front.mesh());
   std::set<UpdateIndex> split;
   std::vector<Place> places;
@@ -83,7 +83,7 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
   const auto afresh = [&] {  // the mesh of this split set, made afresh
     SplitSet set(sigma.size());
     for (UpdateIndex i : split) set.insert(i);
-    return canonical(extract(volume.grid, base, sigma.set(), set, [&](Front& fresh, Front::Handle handle, const Place& p) {
+    return canonical(extract(volume.grid, root_patch, sigma.set(), set, [&](Front& fresh, Front::Handle handle, const Place& p) {
                        return apply_update(fresh, handle, sigma.update(p));
                      })->front.mesh());
   };
@@ -124,7 +124,7 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
 // What is hidden is no part of the mesh; what comes back is as it was.
 TEST_P(FrontLaws, HidingIsLeavingOut) {
   const IntervalVolume sigma = testing::build(volume, {.range = range});
-  const Base base = *decode_base(sigma.description().base, sigma.domain());
+  const RootPatch root_patch = *decode_root_patch(sigma.description().root_patch, sigma.domain());
   Front front = extract(sigma, {})->front;
   const testing::Canonical full = canonical(front.mesh());
   std::vector<Place> all;
@@ -132,7 +132,7 @@ TEST_P(FrontLaws, HidingIsLeavingOut) {
   SplitSet shown(sigma.size());
   for (const Place& p : all) shown.insert(p.index);
   const auto afresh = [&] {
-    return canonical(extract(volume.grid, base, sigma.set(), shown, [&](Front& fresh, Front::Handle handle, const Place& p) {
+    return canonical(extract(volume.grid, root_patch, sigma.set(), shown, [&](Front& fresh, Front::Handle handle, const Place& p) {
                        return apply_update(fresh, handle, sigma.update(p));
                      })->front.mesh());
   };
@@ -188,7 +188,7 @@ INSTANTIATE_TEST_SUITE_P(Random, FrontLaws, ::testing::Range(1u, 25u));
 TEST(Front, RefusesWhatCannotBeSplit) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
-  const Front front(volume.grid, *decode_base(sigma.description().base, sigma.domain()));
+  const Front front(volume.grid, *decode_root_patch(sigma.description().root_patch, sigma.domain()));
   EXPECT_TRUE(front.find({4, 4, 4}));
   for (const Vertex v : {Vertex{0, 0, 0}, Vertex{8, 8, 8}, Vertex{2, 2, 2}, Vertex{-4, 4, 4}, Vertex{4, 4, 1 << 30}}) EXPECT_FALSE(front.find(v));
 }
@@ -202,7 +202,7 @@ TEST(Front, TheBudgetIsNeverPassed) {
     const auto extracted = extract(sigma, lod);
     ASSERT_TRUE(extracted);
     EXPECT_LE(extracted->front.tet_count(),
-              std::max<std::uint64_t>(most, Front(volume.grid, *decode_base(sigma.description().base, sigma.domain())).tet_count()));
+              std::max<std::uint64_t>(most, Front(volume.grid, *decode_root_patch(sigma.description().root_patch, sigma.domain())).tet_count()));
     EXPECT_EQ(broken_law(extracted->front.mesh(), volume.grid), "");
     Lod updates;
     updates.max_updates = most;

@@ -133,7 +133,7 @@ TEST_P(Property, EveryLevelOfDetailIsRight) {
       const double threshold = error_of(lod, sigma->description().max_error);
       const SplitSet from_delta = select(delta.set(), [&](const Place& p) { return threshold == 0 || double(sigma->error(p.index)) > threshold; });
       EXPECT_EQ(from_delta, split);
-      const auto again = extract(g, delta.base(), delta.set(), from_delta, [&](Front& front, Front::Handle handle, const Place& p) {
+      const auto again = extract(g, delta.root_patch(), delta.set(), from_delta, [&](Front& front, Front::Handle handle, const Place& p) {
         const Diamond d(delta.set().centre(p));
         const DiamondContext known = delta.context(d), held = front.context(handle);
         EXPECT_EQ(known.cut, held.cut) << "the field and the front know the same of a diamond";
@@ -192,7 +192,7 @@ TEST_P(Property, BoxesThatDoNotNestKeepTheGuaranteeAtSamples) {
       }
     }
   }
-  // A cut is rounded to a step of its edge: 1/256 of the difference of values there, at most of the whole span.
+  // A cut is rounded to a step of its edge: 1/256 of the residual of values there, at most of the whole span.
   double low = kInf, high = -kInf;
   for (std::size_t i = 0; i < covered.size(); ++i) {
     const double f = testing::sample(trial.volume, int(i % g.dims[0]), int(i / g.dims[0] % g.dims[1]), int(i / g.dims[0] / g.dims[1]));

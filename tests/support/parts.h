@@ -9,7 +9,7 @@ inline IntervalVolume::Parts parts_of(const IntervalVolume& v) {
   return {v.description(),
           v.set(),
           {v.codes().begin(), v.codes().end()},
-          {v.differences().begin(), v.differences().end()},
+          {v.residuals().begin(), v.residuals().end()},
           {v.error_levels().begin(), v.error_levels().end()},
           {v.yields().begin(), v.yields().end()}};
 }

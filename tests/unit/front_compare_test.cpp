@@ -76,8 +76,8 @@ INSTANTIATE_TEST_SUITE_P(Random, FrontParts, ::testing::Range(1u, 13u));
 TEST(FrontCompare, OneOtherCutIsAnotherFront) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
-  const Base base = decode_base(sigma.description().base, sigma.domain()).value();
-  Front one(volume.grid, base), other(volume.grid, base);
+  const RootPatch root_patch = decode_root_patch(sigma.description().root_patch, sigma.domain()).value();
+  Front one(volume.grid, root_patch), other(volume.grid, root_patch);
   ASSERT_TRUE(one.is_part_of(other));
   bool differs = false;
   sigma.set().for_each_down([&](const Place& place) {
@@ -96,22 +96,22 @@ TEST(FrontCompare, OneOtherCutIsAnotherFront) {
   EXPECT_TRUE(differs);
 }
 
-TEST(FrontCompare, OtherGridsAndBasesAreOtherFronts) {
+TEST(FrontCompare, OtherGridsAndRootPatchesAreOtherFronts) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
   const Front front = front_of(sigma, {});
   Grid moved = volume.grid;
   moved.origin[0] += 1;
-  const Base base = decode_base(sigma.description().base, sigma.domain()).value();
-  EXPECT_FALSE(Front(moved, base).is_part_of(front));
+  const RootPatch root_patch = decode_root_patch(sigma.description().root_patch, sigma.domain()).value();
+  EXPECT_FALSE(Front(moved, root_patch).is_part_of(front));
   const IntervalVolume wider = testing::build(volume, {.range = {-10, 10}});  // all of it is inside
-  EXPECT_FALSE(Front(volume.grid, decode_base(wider.description().base, wider.domain()).value()).is_part_of(front));
+  EXPECT_FALSE(Front(volume.grid, decode_root_patch(wider.description().root_patch, wider.domain()).value()).is_part_of(front));
 }
 
 TEST(FrontCompare, WhatTheCoarserNeedsIsNotMerged) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
-  Front root(volume.grid, decode_base(sigma.description().base, sigma.domain()).value());
+  Front root(volume.grid, decode_root_patch(sigma.description().root_patch, sigma.domain()).value());
   const Front full = front_of(sigma, {});
   EXPECT_TRUE(root.coarsen_to(full));  // nothing to merge
   EXPECT_EQ(root.split_count(), 0u);

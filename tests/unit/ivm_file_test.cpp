@@ -44,9 +44,9 @@ void expect_equal(const IntervalVolume& a, const IntervalVolume& b) {
     const auto q = b.set().find(a.set().centre(p));
     ASSERT_TRUE(q);
     const UpdateView u = a.update(p), v = b.update(*q);
-    EXPECT_EQ(u.side_difference, v.side_difference);
+    EXPECT_EQ(u.side_residual, v.side_residual);
     EXPECT_EQ(u.first_cuts, v.first_cuts);
-    EXPECT_TRUE(std::ranges::equal(u.differences, v.differences));
+    EXPECT_TRUE(std::ranges::equal(u.residuals, v.residuals));
     EXPECT_EQ(a.error(p.index), b.error(q->index));
   });
 }
@@ -180,7 +180,7 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
   using Parts = IntervalVolume::Parts;
   const IntervalVolume sigma = small_volume();
   ASSERT_GT(sigma.error_levels().size(), 3u);
-  ASSERT_GT(sigma.description().base.size(), 8u);
+  ASSERT_GT(sigma.description().root_patch.size(), 8u);
   const struct {
     const char* what;
     void (*spoil)(Parts&);
@@ -190,12 +190,12 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
       {"too many codes", [](Parts& p) { p.codes.emplace_back(); }},
       {"no codes", [](Parts& p) { p.codes.clear(); }},
       {"no set", [](Parts& p) { p.set = SupercubeSet(); }},
-      {"a coefficient too few", [](Parts& p) { p.differences.pop_back(); }},
-      {"a coefficient too many", [](Parts& p) { p.differences.push_back(0); }},
+      {"a coefficient too few", [](Parts& p) { p.residuals.pop_back(); }},
+      {"a coefficient too many", [](Parts& p) { p.residuals.push_back(0); }},
       {"a code that takes too many coefficients",
        [](Parts& p) {
          const UpdateCode most(std::uint16_t(31 << 2));
-         p.differences.resize(p.differences.size() + most.coefficients() - p.codes[0].coefficients());
+         p.residuals.resize(p.residuals.size() + most.coefficients() - p.codes[0].coefficients());
          p.codes[0] = most;
        }},
       {"a code of side 3", [](Parts& p) { p.codes[0] = UpdateCode(std::uint16_t(p.codes[0].bits() | 3)); }},
@@ -207,10 +207,10 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
       {"an error that is no number", [](Parts& p) { p.error_levels[1] = std::numeric_limits<float>::quiet_NaN(); }},
       {"no errors", [](Parts& p) { p.error_levels.clear(); }},
       {"too many errors", [](Parts& p) { p.error_levels.resize(kErrorLevels + 1, p.error_levels.back()); }},
-      {"a base too short", [](Parts& p) { p.description.base.pop_back(); }},
-      {"a base too long", [](Parts& p) { p.description.base.push_back(0); }},
-      {"no base", [](Parts& p) { p.description.base.clear(); }},
-      {"a base with a corner on no side", [](Parts& p) { p.description.base[0] = 3; }},
+      {"a root patch too short", [](Parts& p) { p.description.root_patch.pop_back(); }},
+      {"a root patch too long", [](Parts& p) { p.description.root_patch.push_back(0); }},
+      {"no root patch", [](Parts& p) { p.description.root_patch.clear(); }},
+      {"a root patch with a corner on no side", [](Parts& p) { p.description.root_patch[0] = 3; }},
       {"a side of 1 sample", [](Parts& p) { p.description.grid.dims[1] = 1; }},
       {"a negative side", [](Parts& p) { p.description.grid.dims[2] = -9; }},
       {"a side that is too long", [](Parts& p) { p.description.grid.dims[0] = kMaxSide + 1; }},
@@ -248,7 +248,7 @@ TEST(Assemble, PartsThatFitButMeanNothingAreNotValid) {
   EXPECT_TRUE(refused([](auto& p) { p.codes[0] = UpdateCode(std::uint16_t(p.codes[0].bits() & 127)); }))
       << "the root's error is its descendants' least";
   for (UpdateIndex i = 0; i < sigma.size(); i += 7) {
-    const unsigned turned = (sigma.codes()[i].side_difference() + 1) % 3;
+    const unsigned turned = (sigma.codes()[i].side_residual() + 1) % 3;
     EXPECT_TRUE(refused([&](auto& p) { p.codes[i] = UpdateCode(std::uint16_t((p.codes[i].bits() & ~3) | turned)); })) << "side of update " << i;
   }
 }

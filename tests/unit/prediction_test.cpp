@@ -45,17 +45,17 @@ TEST(Prediction, CutsAreCountedByTheirSurfaces) {
   });
 }
 
-TEST(Prediction, DifferencesGiveBackTheCutsOfAField) {
+TEST(Prediction, ResidualsGiveBackTheCutsOfAField) {
   for_each_diamond([](const DiamondContext& c, Side centre, const std::vector<std::uint8_t>& cuts) {
-    std::vector<std::uint8_t> differences(cuts.size()), again(cuts.size());
-    Prediction(c).encode(centre, cuts, differences.data());
-    Prediction(c).decode(centre, differences, again.data());
+    std::vector<std::uint8_t> residuals(cuts.size()), again(cuts.size());
+    Prediction(c).encode(centre, cuts, residuals.data());
+    Prediction(c).decode(centre, residuals, again.data());
     EXPECT_EQ(again, cuts);
   });
 }
 
-// Differences may come from outside: whatever they are, and whatever a context holds, they are the differences of the cuts that they give.
-TEST(Prediction, AnyDifferencesGiveCutsThatGiveThemBack) {
+// Residuals may come from outside: whatever they are, and whatever a context holds, they are the residuals of the cuts that they give.
+TEST(Prediction, AnyResidualsGiveCutsThatGiveThemBack) {
   std::mt19937 random(7);
   for (int round = 0; round < 20000; ++round) {
     DiamondContext c;
@@ -72,11 +72,11 @@ TEST(Prediction, AnyDifferencesGiveCutsThatGiveThemBack) {
       if (beta_cuts(c.side(a), c.side(b))) c.cut[e][1] = place();
     }
     const Side centre = Side(random() % 3);
-    std::vector<std::uint8_t> differences(std::size_t(c.count_cuts(centre).all)), cuts(differences.size()), again(differences.size());
-    for (auto& d : differences) d = std::uint8_t(random());
-    Prediction(c).decode(centre, differences, cuts.data());
+    std::vector<std::uint8_t> residuals(std::size_t(c.count_cuts(centre).all)), cuts(residuals.size()), again(residuals.size());
+    for (auto& d : residuals) d = std::uint8_t(random());
+    Prediction(c).decode(centre, residuals, cuts.data());
     Prediction(c).encode(centre, cuts, again.data());
-    EXPECT_EQ(again, differences);
+    EXPECT_EQ(again, residuals);
   }
 }
 
@@ -93,11 +93,11 @@ TEST(Prediction, LinearFieldsAreForetold) {
     const Diamond d(delta.set().centre(p));
     const DiamondContext c = delta.context(d);
     const auto q = delta.cuts(d);
-    std::vector<std::uint8_t> differences(q.size());
+    std::vector<std::uint8_t> residuals(q.size());
     Prediction prediction(c);
     sides += prediction.side() != delta.side(d.centre);
-    prediction.encode(delta.side(d.centre), q, differences.data());
-    for (const std::uint8_t v : differences) far += std::min<int>(v, 256 - v) > 8;
+    prediction.encode(delta.side(d.centre), q, residuals.data());
+    for (const std::uint8_t v : residuals) far += std::min<int>(v, 256 - v) > 8;
     cuts += q.size();
     ++updates;
   });

@@ -27,7 +27,7 @@ Description some_description() {
   d.coefficients = 99;
   d.full = {1u << 31, 1ull << 40};
   d.content_hash = 0xfedcba9876543210;
-  d.base = {1, 2, 3, 255};
+  d.root_patch = {1, 2, 3, 255};
   return d;
 }
 
@@ -136,7 +136,7 @@ TEST(Codec, LimitsHold) {
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(Open{std::string(kMaxName + 1, 'x'), "", 0}))));
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(Open{"x", std::string(kMaxText + 1, 'x'), 0}))));
   Opened opened{some_description(), {}};
-  opened.description.base.resize(kMaxBase + 1);
+  opened.description.root_patch.resize(kMaxRootPatch + 1);
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(opened))));
   EXPECT_TRUE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, 0, 0, Bytes(kMaxBatchPayload)}))));
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, 0, 0, Bytes(kMaxBatchPayload + 1)}))));

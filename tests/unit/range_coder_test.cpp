@@ -15,10 +15,10 @@ namespace {
 template <class Coder>
 std::vector<unsigned> code_all(Coder& coder, const std::vector<unsigned>& values) {
   std::vector<unsigned> got;
-  Chance flag;
+  BitModel flag;
   NumberModel<7> number;
   SmallNumberModel small;
-  DifferenceModel difference;
+  ResidualModel residual;
   for (const unsigned v : values) {
     switch (got.empty() ? 0 : got.back() % 5) {
       case 0:
@@ -31,10 +31,10 @@ std::vector<unsigned> code_all(Coder& coder, const std::vector<unsigned>& values
         got.push_back(small.code(coder, v % 65535));
         break;
       case 3:
-        got.push_back(difference.code(coder, std::uint8_t(v)));
+        got.push_back(residual.code(coder, std::uint8_t(v)));
         break;
       default:
-        got.push_back(coder.even_bits(9, v % 512));
+        got.push_back(coder.raw_bits(9, v % 512));
     }
   }
   return got;
@@ -70,19 +70,19 @@ TEST(RangeCoder, GivesBackWhatWasWritten) {
   }
 }
 
-TEST(RangeCoder, EveryDifferenceAndEverySmallNumberComesBack) {
+TEST(RangeCoder, EveryResidualAndEverySmallNumberComesBack) {
   RangeEncoder encoder;
   {
-    DifferenceModel difference;
+    ResidualModel residual;
     SmallNumberModel small;
-    for (unsigned v = 0; v < 256; ++v) difference.code(encoder, std::uint8_t(v));
+    for (unsigned v = 0; v < 256; ++v) residual.code(encoder, std::uint8_t(v));
     for (unsigned v = 0; v < 65535; ++v) small.code(encoder, v);
   }
   const auto bytes = encoder.finish();
   RangeDecoder decoder(bytes);
-  DifferenceModel difference;
+  ResidualModel residual;
   SmallNumberModel small;
-  for (unsigned v = 0; v < 256; ++v) ASSERT_EQ(difference.code(decoder), v);
+  for (unsigned v = 0; v < 256; ++v) ASSERT_EQ(residual.code(decoder), v);
   for (unsigned v = 0; v < 65535; ++v) ASSERT_EQ(small.code(decoder), v);
   EXPECT_TRUE(decoder.is_spent());
 }
@@ -91,12 +91,12 @@ TEST(RangeCoder, EveryDifferenceAndEverySmallNumberComesBack) {
 TEST(RangeCoder, RunsComeBackAndCostNextToNothing) {
   for (const bool first : {false, true}) {
     RangeEncoder encoder;
-    Chance chance;
+    BitModel chance;
     for (int i = 0; i < 100000; ++i) encoder.bit(chance, first != (i % 10000 == 9999));
     const auto bytes = encoder.finish();
     EXPECT_LT(bytes.size(), 60u);
     RangeDecoder decoder(bytes);
-    Chance again;
+    BitModel again;
     for (int i = 0; i < 100000; ++i) ASSERT_EQ(decoder.bit(again), first != (i % 10000 == 9999));
     EXPECT_TRUE(decoder.is_spent());
   }
@@ -105,7 +105,7 @@ TEST(RangeCoder, RunsComeBackAndCostNextToNothing) {
 TEST(RangeCoder, BitsCostWhatTheirChancesCallFor) {
   std::mt19937 random(1);
   RangeEncoder encoder;
-  Chance chance;
+  BitModel chance;
   const int count = 200000;
   for (int i = 0; i < count; ++i) encoder.bit(chance, random() % 10 == 0);
   const double entropy = -(0.1 * std::log2(0.1) + 0.9 * std::log2(0.9)) * count / 8;
@@ -128,7 +128,7 @@ TEST(RangeCoder, BytesBehindTheEndAreNoticed) {
 TEST(RangeCoder, EvenBitsTakeTheirOwnRoom) {
   std::mt19937 random(2);
   RangeEncoder encoder;
-  for (int i = 0; i < 100000; ++i) encoder.even_bits(8, i % 3 == 0 ? 255 : unsigned(random() % 256));
+  for (int i = 0; i < 100000; ++i) encoder.raw_bits(8, i % 3 == 0 ? 255 : unsigned(random() % 256));
   EXPECT_LE(encoder.finish().size(), 100008u);
 }
 

@@ -43,7 +43,7 @@ TEST_P(SplitSets, SlotsAreThoseOfTheUpdatesInIt) {
 }
 
 // In the keys' order, which is what it is made for, and in any other.
-TEST_P(SplitSets, SurroundingsAreWhatIsFound) {
+TEST_P(SplitSets, NeighboursAreTheSupercubesFoundByTheirPlaces) {
   const SupercubeSet& set = volume_.set();
   std::vector<SupercubeKey> keys;
   for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
@@ -51,24 +51,23 @@ TEST_P(SplitSets, SurroundingsAreWhatIsFound) {
   }
   for (const bool shuffled : {false, true}) {
     if (shuffled) std::shuffle(keys.begin(), keys.end(), random_);
-    Surroundings around(set);
+    SetNeighbours around(set);
     for (const SupercubeKey key : keys) {
       around.move_to(key);
-      for (int where = 0; where < kCorner; ++where) {
-        const auto [scale, position] = supercube_at(where, scale_of_key(key), position_of_key(key));
-        const bool outside = (position.x | position.y | position.z) < 0;
-        const auto found = outside ? std::nullopt : set.find_supercube(scale, position);
-        const Surroundings::Seen& seen = around.at(where);
+      for (int where = 0; where < kNeighbours; ++where) {
+        const SupercubePlace there = neighbour_at(where, scale_of_key(key), position_of_key(key));
+        const auto found = there.exists() ? set.find_supercube(there.scale, there.position) : std::nullopt;
+        const SetFinder::Found& seen = around.at(where);
         ASSERT_EQ(seen.occupancy != 0, found.has_value());
         if (!found) continue;
         ASSERT_EQ(seen.key, found->key);
         ASSERT_EQ(seen.brick, found->brick);
         ASSERT_EQ(seen.supercube, found->supercube);
         ASSERT_EQ(seen.occupancy, set.occupancy()[found->supercube]);
-        for (unsigned slot = 0; slot < unsigned(kSlots); ++slot) {
+        for (int slot = 0; slot < kSlots; ++slot) {
           if (!seen.has(slot)) continue;
-          const Place p = set.place_in(found->brick, found->supercube, found->key, int(slot));
-          ASSERT_EQ(seen.number(slot), p.index);
+          const Place p = set.place_in(found->brick, found->supercube, found->key, slot);
+          ASSERT_EQ(seen.index(slot), p.index);
           ASSERT_EQ(seen.place(slot).index, p.index);
         }
       }
@@ -83,22 +82,22 @@ TEST_P(SplitSets, ReadyIsWhatAFrontCanSplit) {
   for (const double share : {0.0, 0.01, 0.1, 0.6, 1.0}) {
     const SplitSet split = some_of(volume_, share, random_);
     const auto extraction =
-        extract(d.grid, *decode_base(d.base, volume_.domain()), set, split, [&](Front& front, Front::Handle handle, const Place& p) {
+        extract(d.grid, *decode_root_patch(d.root_patch, volume_.domain()), set, split, [&](Front& front, Front::Handle handle, const Place& p) {
           const DiamondContext context = front.context(handle);
           Prediction prediction(context);
           const UpdateView u = volume_.update(p);
-          const Side side = Side((unsigned(prediction.side()) + u.side_difference) % 3);
+          const Side side = Side((unsigned(prediction.side()) + u.side_residual) % 3);
           std::array<std::uint8_t, kMaxCuts> cuts;
-          prediction.decode(side, u.differences, cuts.data());
-          front.split(handle, side, std::span(cuts).first(u.differences.size()));
+          prediction.decode(side, u.residuals, cuts.data());
+          front.split(handle, side, std::span(cuts).first(u.residuals.size()));
           return true;
         });
     ASSERT_TRUE(extraction);
-    Readiness readiness(set, volume_.domain(), split);
+    SplittableSlots splittable(set, volume_.domain(), split);
     for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
       set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
-        readiness.move_to(key);
-        const std::uint64_t ready = readiness.ready(), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
+        splittable.move_to(key);
+        const std::uint64_t ready = splittable.slots(), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
         ASSERT_EQ(is_split & ~ready, 0u) << "the ancestors of what is split are split";
         for (int slot = 0; slot < kSlots; ++slot) {
           const bool can_be = extraction->front.find(centre_of(key, slot)).has_value();

@@ -181,10 +181,10 @@ TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
       {"an infinite origin", [](Description& d) { d.grid.origin[0] = -kInf; }},
       {"an origin that is no number", [](Description& d) { d.grid.origin[2] = kNan; }},
       {"a far corner beyond all numbers", [](Description& d) { d.grid.spacing[1] = std::numeric_limits<double>::max(); }},
-      {"no base", [](Description& d) { d.base.clear(); }},
-      {"a base too short", [](Description& d) { d.base.pop_back(); }},
-      {"a base too long", [](Description& d) { d.base.push_back(0); }},
-      {"a base with a corner on no side", [](Description& d) { d.base[7] = 3; }},
+      {"no root patch", [](Description& d) { d.root_patch.clear(); }},
+      {"a root patch too short", [](Description& d) { d.root_patch.pop_back(); }},
+      {"a root patch too long", [](Description& d) { d.root_patch.push_back(0); }},
+      {"a root patch with a corner on no side", [](Description& d) { d.root_patch[7] = 3; }},
       {"a range upside down",
        [](Description& d) {
          d.range = {1, 0};
@@ -207,7 +207,7 @@ TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
 TEST(StreamClient, TheLargestBoxCostsNothingBeforeItsFirstUpdate) {
   Description d;
   d.grid.dims = {kMaxSide, kMaxSide, kMaxSide};
-  d.base.assign(8, 1);
+  d.root_patch.assign(8, 1);
   const StreamClient client = started(d);
   EXPECT_EQ(client.tet_count(), 6u);
   EXPECT_EQ(broken(client), "");

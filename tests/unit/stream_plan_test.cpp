@@ -53,7 +53,7 @@ class Receiver {
  public:
   explicit Receiver(std::shared_ptr<const IntervalVolume> volume)
       : volume_(std::move(volume)),
-        front_(volume_->description().grid, *decode_base(volume_->description().base, volume_->domain())),
+        front_(volume_->description().grid, *decode_root_patch(volume_->description().root_patch, volume_->domain())),
         sent_(volume_->size()) {}
 
   void set_lod(const Lod& lod) {

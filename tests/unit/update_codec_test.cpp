@@ -30,7 +30,7 @@ std::vector<IntervalVolume> volumes() {
   return all;
 }
 
-Front root_of(const IntervalVolume& v) { return Front(v.description().grid, *decode_base(v.description().base, v.domain())); }
+Front root_of(const IntervalVolume& v) { return Front(v.description().grid, *decode_root_patch(v.description().root_patch, v.domain())); }
 
 std::vector<UpdateIndex> queue_of(const IntervalVolume& v) { return in_order(v, select(v, Lod{}), {}); }
 

@@ -1,4 +1,4 @@
-#include "common/codec/difference_coder.h"
+#include "common/codec/residual_coder.h"
 
 #include <gtest/gtest.h>
 
@@ -28,11 +28,11 @@ std::vector<Update> some_updates(unsigned seed) {
   return updates;
 }
 
-TEST(DifferenceCoder, GivesBackWhatWasWrittenPlainOrNot) {
+TEST(ResidualCoder, GivesBackWhatWasWrittenPlainOrNot) {
   for (const bool is_plain : {false, true}) {
     const auto updates = some_updates(1);
     RangeEncoder encoder;
-    DifferenceCoder to;
+    ResidualCoder to;
     to.is_plain = is_plain;
     std::size_t bytes = 0;
     for (Update u : updates) {
@@ -45,7 +45,7 @@ TEST(DifferenceCoder, GivesBackWhatWasWrittenPlainOrNot) {
       EXPECT_LE(coded.size(), bytes + 8);
     }
     RangeDecoder decoder(coded);
-    DifferenceCoder from;
+    ResidualCoder from;
     from.is_plain = is_plain;
     for (const Update& u : updates) {
       ASSERT_EQ(from.code_side(decoder), u.side);

@@ -1,4 +1,4 @@
-#include "common/diamond/links.h"
+#include "common/diamond/supercube_neighbours.h"
 
 #include <gtest/gtest.h>
 
@@ -7,18 +7,14 @@
 namespace intervale {
 namespace {
 
-// Links lead to what arithmetic on centres says, for supercubes of all parities in the middle of a domain.
-TEST(Links, LeadToVerticesChildrenAndEdges) {
+// Links name the same diamonds as arithmetic on centres, for supercubes of all parities in the middle of a domain.
+TEST(SupercubeNeighbours, LeadToVerticesChildrenAndEdges) {
   const int scale = 2;
   for (unsigned parity = 0; parity < 8; ++parity) {
     const Vertex position{4 + std::int32_t(parity & 1), 6 + std::int32_t(parity >> 1 & 1), 2 + std::int32_t(parity >> 2)};
     const auto target = [&](Link link) {
-      if (link.where >= kCorner && link.where < kFiner) {
-        const int w = link.where - kCorner;
-        return Vertex{(position.x + (w & 1)) << (scale + 2), (position.y + (w >> 1 & 1)) << (scale + 2), (position.z + (w >> 2)) << (scale + 2)};
-      }
-      const SupercubePlace there = supercube_at(link.where, scale, position);
-      return centre_of(there.scale, there.position, link.slot);
+      const SupercubePlace there = neighbour_at(link.where, scale, position);
+      return centre_of(there.scale, there.position, link.slot | there.slot);
     };
     for (int slot = 0; slot < kSlots; ++slot) {
       const Diamond d(centre_of(scale, position, slot));
@@ -38,7 +34,7 @@ TEST(Links, LeadToVerticesChildrenAndEdges) {
   }
 }
 
-TEST(Links, OnlyASupercubeAllOfWhoseDiamondsAreInsideIsInterior) {
+TEST(SupercubeNeighbours, OnlyASupercubeAllOfWhoseDiamondsAreInsideIsInterior) {
   const Domain domain({40, 33, 70});
   for (int scale = 0; scale < domain.levels(); ++scale) {
     for (std::int32_t x = 0; x < 18; ++x) {

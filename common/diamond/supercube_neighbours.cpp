@@ -1,4 +1,4 @@
-#include "common/diamond/links.h"
+#include "common/diamond/supercube_neighbours.h"
 
 #include <cassert>
 #include <memory>
@@ -89,6 +89,51 @@ const LinkTable& link_table() {
     return made;
   }();
   return *table;
+}
+
+SupercubePlace neighbour_at(int where, int scale, Vertex p) {
+  if (where < kCoarser) return {scale, {p.x + where % 3 - 1, p.y + where / 3 % 3 - 1, p.z + where / 9 - 1}};
+  if (where >= kFiner) {
+    const int w = where - kFiner;
+    return {scale - 1, {2 * p.x + w % 3 - 1, 2 * p.y + w / 3 % 3 - 1, 2 * p.z + w / 9 - 1}};
+  }
+  const int w = where < kCorner ? where - kCoarser : where - kCorner, x = w & 1, y = w >> 1 & 1, z = w >> 2;
+  if (where < kCorner) return {scale + 1, {(p.x >> 1) + x, (p.y >> 1) + y, (p.z >> 1) + z}};
+  const Vertex v{(p.x + x) << (scale + 2), (p.y + y) << (scale + 2), (p.z + z) << (scale + 2)};
+  const int of_v = scale_of(v), up = of_v + 2;
+  if (of_v == kOriginScale) return {kOriginScale, {}};
+  return {of_v, {v.x >> up, v.y >> up, v.z >> up}, kSlotOfType[type_of(v, of_v)]};
+}
+
+void SetFinder::move_to(int scale, Vertex position) {
+  const Vertex brick{position.x >> 2, position.y >> 2, position.z >> 2};
+  if (scale == scale_ && brick == brick_) return;
+  scale_ = scale;
+  brick_ = brick;
+  same_.fill(kUnknown);
+  coarser_.fill(kUnknown);
+  finer_is_reset_ = false;
+}
+
+std::uint32_t& SetFinder::brick_at(int where, Vertex at) {
+  if (where < kCoarser) return same_[std::size_t(at.x - brick_.x + 1 + 3 * (at.y - brick_.y + 1) + 9 * (at.z - brick_.z + 1))];
+  if (where < kCorner) return coarser_[std::size_t(at.x - (brick_.x >> 1) + 2 * (at.y - (brick_.y >> 1)) + 4 * (at.z - (brick_.z >> 1)))];
+  if (!finer_is_reset_) finer_.fill(kUnknown);
+  finer_is_reset_ = true;
+  return finer_[std::size_t(at.x - 2 * brick_.x + 1 + 4 * (at.y - 2 * brick_.y + 1) + 16 * (at.z - 2 * brick_.z + 1))];
+}
+
+SetFinder::Found SetFinder::find(int where, const SupercubePlace& place) {
+  const Vertex p = place.position, at{p.x >> 2, p.y >> 2, p.z >> 2};
+  std::uint32_t looked_up = kUnknown;  // bricks around a corner are not kept
+  std::uint32_t& brick = where >= kCorner && where < kFiner ? looked_up : brick_at(where, at);
+  if (brick == kUnknown) brick = set_.find_brick(place.scale, at).value_or(kNone);
+  if (brick == kNone) return none();
+  const unsigned bit = parity_of(p) | parity_of({p.x >> 1, p.y >> 1, p.z >> 1}) << 3;
+  const SupercubeSet::Brick& b = set_.bricks()[brick];
+  if (!(b.mask >> bit & 1)) return none();
+  const std::uint32_t s = b.first_supercube + std::uint32_t(count_below(b.mask, int(bit)));
+  return {b.key + bit, set_.occupancy()[s], brick, s, set_.first(brick, s)};
 }
 
 }  // namespace intervale

@@ -1,0 +1,201 @@
+// The supercubes around one, where its diamonds' vertices, parents, edges and children are found: one table, and one lookup.
+//
+// Every vertex of a diamond is itself the centre of a diamond that was split before, or a corner of the domain. Every edge came into being when the
+// younger of its ends was inserted: it is one of that diamond's subdivision edges. So a diamond finds everything around it in its vertices' updates.
+// Where those are kept follows from the diamond's slot and from the parity of its supercube's position: in one of the 27 supercubes of the same
+// scale, in one of 8 of the next coarser scale, or, for a vertex that is 0 modulo 4h, at one of the 8 corners of the supercube. Children are of the
+// same scale, or in one of 27 supercubes of the next finer one.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include "common/diamond/diamond.h"
+#include "common/diamond/domain.h"
+#include "common/diamond/supercube.h"
+#include "common/util/bits.h"
+
+namespace intervale {
+
+// The number of a neighbour, seen from a supercube at position P whose cells are 4h wide.
+//   kSame + (x + 1) + 3 (y + 1) + 9 (z + 1):  the supercube at P + (x, y, z), of the same scale; x, y, z in {-1, 0, 1}
+//   kCoarser + x + 2 y + 4 z:                 the one at P / 2 + (x, y, z), of the next coarser scale; x, y, z in {0, 1}
+//   kCorner + x + 2 y + 4 z:                  the one that holds the grid vertex at 4h (P + (x, y, z)), of whatever scale; x, y, z in {0, 1}
+//   kFiner + (x + 1) + 3 (y + 1) + 9 (z + 1): the one at 2 P + (x, y, z), of the next finer scale; x, y, z in {-1, 0, 1}
+inline constexpr int kSame = 0, kCoarser = 27, kCorner = 35, kFiner = 43, kNeighbours = 70;
+inline constexpr int kHere = 13;  // the supercube itself
+
+// A diamond around another one.
+struct Link {
+  std::uint8_t where = 0;  // the neighbour that holds it
+  std::uint8_t slot = 0;   // in that supercube; 0 for a corner, whose slot depends on the supercube's position
+};
+
+// What is around the diamond in one slot.
+struct Links {
+  std::array<Link, kMaxVertices> vertex{};         // by local vertex
+  std::array<std::uint8_t, kMaxParents> parent{};  // local numbers of those vertices that are parents
+  struct Edge {
+    std::uint8_t owner = 0;  // local number of the younger end
+    std::uint8_t other = 0;  // the older end's local number in the owner's diamond
+    std::uint8_t flip = 0;   // 255 if the edge's first end is the older one, so that q of each cut must be inverted; else 0
+  };
+  std::array<Edge, kMaxEdges> edge{};      // by local edge
+  std::array<Link, kMaxChildren> child{};  // by number of the child
+};
+
+// Row for a slot of a supercube whose position has the parities p = (x & 1) + 2 (y & 1) + 4 (z & 1). Computed at first use.
+using LinkTable = std::array<std::array<Links, kSlots>, 8>;
+[[nodiscard]] const LinkTable& link_table();
+[[nodiscard]] inline unsigned parity_of(Vertex position) {
+  return unsigned(position.x & 1) | unsigned(position.y & 1) << 1 | unsigned(position.z & 1) << 2;
+}
+
+// A neighbour. Outside the domain the position or the scale is negative.
+struct SupercubePlace {
+  int scale = 0;
+  Vertex position;
+  int slot = 0;  // of a corner's vertex
+  [[nodiscard]] bool exists() const { return (scale | position.x | position.y | position.z) >= 0; }
+};
+inline constexpr int kOriginScale = 32;  // scale_of((0, 0, 0)): that corner of the domain is in no supercube
+[[nodiscard]] SupercubePlace neighbour_at(int where, int scale, Vertex position);
+
+// Whether all diamonds of a supercube lie inside the box: they reach from h before its corner to 4 h behind.
+[[nodiscard]] inline bool is_interior(const Domain& domain, int scale, Vertex p) {
+  const auto corner = [scale](std::int32_t cells, std::int32_t more) { return (cells * 4 + more) * (std::int32_t(1) << scale); };
+  return domain.contains({corner(p.x, -1), corner(p.y, -1), corner(p.z, -1)}) && domain.contains({corner(p.x, 4), corner(p.y, 4), corner(p.z, 4)});
+}
+
+// Looks up the neighbours of one supercube at a time, each at most once until it moves. Finder says how supercubes are found:
+//   Found                      what is known of one
+//   void move_to(scale, position)
+//   Found find(where, place)   of the neighbour `where` of the supercube last moved to; place: where that is. Not called outside the domain.
+//   Found none()               for what is not there
+//   void set_here(found)       only if SupercubeNeighbours::set_here is called
+//   bool kImmutable            whether what it finds never changes, so that moving to the same supercube keeps what was found
+template <class Finder>
+class SupercubeNeighbours {
+ public:
+  using Found = typename Finder::Found;
+  template <class... Arguments>
+  explicit SupercubeNeighbours(Arguments&&... arguments) : finder_(std::forward<Arguments>(arguments)...) {}
+
+  void move_to(SupercubeKey key) {
+    if constexpr (Finder::kImmutable) {
+      if (key == key_) return;
+    }
+    move_to(scale_of_key(key), position_of_key(key));
+    key_ = key;
+  }
+  void move_to(int scale, Vertex position) {
+    key_ = ~SupercubeKey(0);
+    scale_ = scale;
+    position_ = position;
+    links_ = &link_table()[parity_of(position)];
+    known_ = {};
+    finder_.move_to(scale, position);
+  }
+  [[nodiscard]] int scale() const { return scale_; }
+  [[nodiscard]] Vertex position() const { return position_; }
+  [[nodiscard]] const Links& links(int slot) const { return (*links_)[std::size_t(slot)]; }
+  [[nodiscard]] std::span<const Link> children(int slot) const {
+    return std::span(links(slot).child).first(diamond_type(kTypeOfSlot[std::size_t(slot)]).children);
+  }
+
+  // Valid until it moves.
+  [[nodiscard]] const Found& at(int where) {
+    if (!(known_[std::size_t(where) / 64] >> (where % 64) & 1)) look_up(where);
+    return found_[std::size_t(where)];
+  }
+  struct Diamond {
+    const Found& supercube;
+    int slot;
+  };
+  [[nodiscard]] Diamond at(Link link) {
+    const Found& found = at(int(link.where));
+    return {found, link.slot | corner_slot_[link.where]};
+  }
+  // Replaces what was found of the supercube itself, which has since come into being.
+  void set_here(const Found& found) {
+    finder_.set_here(found);
+    known_[0] |= std::uint64_t(1) << kHere;
+    found_[kHere] = found;
+  }
+
+ private:
+  void look_up(int where) {
+    known_[std::size_t(where) / 64] |= std::uint64_t(1) << (where % 64);
+    const SupercubePlace place = neighbour_at(where, scale_, position_);
+    corner_slot_[std::size_t(where)] = std::uint8_t(place.slot);
+    found_[std::size_t(where)] = place.exists() ? finder_.find(where, place) : finder_.none();
+  }
+
+  Finder finder_;
+  SupercubeKey key_ = ~SupercubeKey(0);
+  int scale_ = 0;
+  Vertex position_;
+  const std::array<Links, kSlots>* links_ = nullptr;
+  std::array<std::uint64_t, 2> known_{};  // a bit for each neighbour looked up
+  std::array<Found, kNeighbours> found_{};
+  std::array<std::uint8_t, kNeighbours> corner_slot_{};  // of a corner's vertex; 0 elsewhere
+};
+
+// Finds the supercubes of a set. Bricks that were found stay known while it moves within one brick, so it is fastest along ascending keys.
+class SetFinder {
+ public:
+  static constexpr bool kImmutable = true;
+  // A supercube of the set; occupancy is 0 if it is not in the set.
+  struct Found {
+    SupercubeKey key = 0;
+    std::uint64_t occupancy = 0;
+    std::uint32_t brick = 0, supercube = 0;
+    UpdateIndex first = 0;  // number of its first diamond
+    [[nodiscard]] bool has(int slot) const { return (occupancy >> slot & 1) != 0; }
+    [[nodiscard]] UpdateIndex index(int slot) const { return first + UpdateIndex(count_below(occupancy, slot)); }
+    [[nodiscard]] Place place(int slot) const { return {key, brick, supercube, std::uint32_t(slot), index(slot)}; }
+  };
+
+  explicit SetFinder(const SupercubeSet& set) : set_(set) {}  // which must outlive it
+  void move_to(int scale, Vertex position);
+  [[nodiscard]] Found find(int where, const SupercubePlace& place);
+  [[nodiscard]] static Found none() { return {}; }
+
+ private:
+  static constexpr std::uint32_t kUnknown = ~std::uint32_t(0), kNone = kUnknown - 1;
+  [[nodiscard]] std::uint32_t& brick_at(int where, Vertex in_bricks);
+
+  const SupercubeSet& set_;
+  int scale_ = -1;                          // of the brick last moved to
+  Vertex brick_;                            // its position, in bricks
+  std::array<std::uint32_t, 27> same_{};    // bricks around that one
+  std::array<std::uint32_t, 8> coarser_{};  // and of the next coarser scale, from its own half position on
+  std::array<std::uint32_t, 64> finer_{};   // and of the next finer one, from one before its double position on
+  bool finer_is_reset_ = false;
+};
+using SetNeighbours = SupercubeNeighbours<SetFinder>;
+
+// Which of the diamonds named can be merged, finest first: calls merge(group, slot) for each that is split and by then has no split child. A child is
+// one by its place, whether it was handed tetrahedra or not, so that a client's front and its server's plan agree. groups: keys strictly ascending.
+// split_slots(Found): of a supercube.
+template <class Finder, class SplitSlots, class Merge>
+void merge_finest_first(std::span<const SlotGroup> groups, SupercubeNeighbours<Finder>& around, const SplitSlots& split_slots, const Merge& merge) {
+  const auto has_split_child = [&](int slot) {
+    for (const Link link : around.children(slot)) {
+      const auto child = around.at(link);
+      if (split_slots(child.supercube) >> child.slot & 1) return true;
+    }
+    return false;
+  };
+  for_each_finest_first(groups, [&](const SlotGroup& group, std::uint64_t slots) {
+    around.move_to(group.key);
+    for (const int slot : set_bits(slots & split_slots(around.at(kHere)))) {
+      if (!has_split_child(slot)) merge(group, slot);
+    }
+  });
+}
+
+}  // namespace intervale

@@ -1,0 +1,100 @@
+// Looks at the diamonds of a front, one supercube at a time: what of a diamond exists, its vertices' splits, and the cuts on its edges.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "common/codec/prediction.h"
+#include "common/diamond/diamond.h"
+#include "common/diamond/supercube_neighbours.h"
+#include "common/front/diamond_parts.h"
+#include "common/front/front_state.h"
+
+namespace intervale {
+
+// Finds the blocks of a front. Never null: for a supercube without splits a block without any.
+class BlockFinder {
+ public:
+  static constexpr bool kImmutable = false;
+  using Found = const FrontState::Block*;
+  explicit BlockFinder(const FrontState& state) : state_(state) {}
+  void move_to(int scale, Vertex position) { here_ = state_.find_block(scale, position); }
+  void set_here(Found block) { here_ = block; }
+  [[nodiscard]] Found find(int where, const SupercubePlace& place) const;
+  [[nodiscard]] static Found none();
+
+ private:
+  const FrontState& state_;
+  Found here_ = nullptr;  // null if there is none
+};
+
+// Sees the state as it was when the cursor last moved, and splits that Front::split made through this cursor since. One thread at a time.
+class FrontCursor {
+ public:
+  using Block = FrontState::Block;
+  using Split = FrontState::Split;
+
+  explicit FrontCursor(const FrontState& state) : state_(state), neighbours_(state) {}  // which must outlive it
+
+  void move_to(SupercubeKey supercube) { move_to(scale_of_key(supercube), position_of_key(supercube)); }
+  void move_to(int scale, Vertex position);  // position: a diamond's centre >> (scale + 2)
+  void move_to(const Diamond& d);            // to its supercube
+
+  // Finds the diamond in a slot if it exists and all its vertices' diamonds are split: if it is split, or in the front with all its tetrahedra. The
+  // functions below are of the diamond found last.
+  bool gather(int slot);
+  // The same, if it can be split now.
+  bool find(int slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
+
+  [[nodiscard]] const Diamond& diamond() const { return *diamond_; }
+  [[nodiscard]] int slot() const { return slot_; }
+  [[nodiscard]] const DiamondParts& parts() const { return parts_; }
+  [[nodiscard]] const Links& links() const { return neighbours_.links(slot_); }
+  [[nodiscard]] const Split& split_of(int vertex) const { return split_[std::size_t(vertex)]; }  // of the vertex's diamond
+  [[nodiscard]] const DiamondContext& context() const { return context_; }                       // its cuts may be those of another diamond
+  const DiamondContext& gather_cuts();                                                           // the same, with its own cuts
+  [[nodiscard]] bool is_split() { return here().is_split(slot_); }
+  [[nodiscard]] bool is_shown() { return here().is_shown(slot_); }
+  [[nodiscard]] bool is_noop() const { return parts_.straddles && state_.domain.is_noop(*diamond_); }
+  [[nodiscard]] bool parents_are_shown();
+  // Whether the diamond handed tetrahedra to a child whose split is in `slots`: &Block::split or &Block::shown.
+  [[nodiscard]] bool has_child_in(std::uint64_t Block::*slots);
+  // How many tetrahedra the mesh gains by this split of it; less than 0 if it loses some.
+  [[nodiscard]] std::int64_t added_tets(const Split& split) const;
+
+  // Of the supercube: its block, and the diamond that a link of one of its slots leads to.
+  [[nodiscard]] const Block& here() { return *neighbours_.at(kHere); }
+  struct Neighbour {
+    const Block& block;
+    int slot;
+    [[nodiscard]] bool is_split() const { return block.is_split(slot); }
+    [[nodiscard]] bool is_shown() const { return block.is_shown(slot); }
+    [[nodiscard]] const Split& split() const { return block.of[std::size_t(slot)]; }
+  };
+  [[nodiscard]] Neighbour at(Link link) {
+    const auto found = neighbours_.at(link);
+    return {*found.supercube, found.slot};
+  }
+  [[nodiscard]] const Links& links(int slot) const { return neighbours_.links(slot); }
+  [[nodiscard]] std::span<const Link> children(int slot) const { return neighbours_.children(slot); }
+  [[nodiscard]] int scale() const { return neighbours_.scale(); }
+  [[nodiscard]] Vertex position() const { return neighbours_.position(); }
+  // Takes note of the supercube's block, which was added since the cursor moved there.
+  void set_here(const Block& block) { neighbours_.set_here(&block); }
+
+ private:
+  [[nodiscard]] bool parents_are_split(int slot);
+
+  const FrontState& state_;
+  SupercubeNeighbours<BlockFinder> neighbours_;
+  bool is_interior_ = false;  // all diamonds of the supercube are inside the box
+  int slot_ = 0;
+  std::optional<Diamond> diamond_;
+  DiamondParts parts_;
+  std::array<Split, kMaxVertices> split_;  // of each vertex that exists
+  DiamondContext context_;
+};
+
+}  // namespace intervale

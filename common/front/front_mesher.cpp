@@ -1,0 +1,199 @@
+#include "common/front/front_mesher.h"
+
+#include <bit>
+#include <memory>
+
+#include "common/util/bits.h"
+
+namespace intervale {
+
+FrontMesher::Corners FrontMesher::corners_of(const TetShape& s) {
+  Corners corners;
+  for (int c = 0; c < kPatchCorners; ++c) corners[c] = c < 4 ? s.vertex[c] : std::uint8_t(kCutsFrom + 2 * s.edge[(c - 4) / 2] + (c & 1));
+  return corners;
+}
+
+const FrontMesher::HalfCorners& FrontMesher::half_corners() {
+  static const std::unique_ptr<const HalfCorners> table = [] {
+    auto made = std::make_unique<HalfCorners>();
+    for (int slot = 0; slot < kSlots; ++slot) {
+      const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+      for (int t = 0; t < row.tets; ++t) {
+        for (int end = 0; end < 2; ++end) (*made)[slot][t][end] = corners_of(row.half_shape[t][end]);
+      }
+    }
+    return made;
+  }();
+  return *table;
+}
+
+// On an axis that clamps, at or beyond the last sample. Only edges with such an end can share their place with another edge.
+bool FrontMesher::is_on_border(Vertex v) const {
+  const std::int32_t n = 1 << state_.domain.levels();
+  const Vertex last = state_.domain.last();
+  return (last.x < n && v.x >= last.x) || (last.y < n && v.y >= last.y) || (last.z < n && v.z >= last.z);
+}
+
+bool FrontMesher::is_at_border(std::size_t number) const {
+  const std::int32_t reach = 4 << block(number).scale;
+  const Vertex p = block(number).position;
+  return is_on_border({(p.x + 1) * reach, (p.y + 1) * reach, (p.z + 1) * reach});
+}
+
+void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) const {
+  // The domain's corner (0, 0, 0), the oldest vertex, owns no edge.
+  if (const FrontState::Split& origin = state_.origin.of[0]; number == 0 && origin.side() == Side::inside) {
+    points.push_back({origin.centre(), {}, Surface::inside, false});
+  }
+  const FrontState::Block& block = state_.blocks[number];
+  const bool at_border = is_at_border(number);
+  for (const int slot : set_bits(block.shown)) {
+    const Diamond d(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]);
+    const FrontState::Split& split = block.of[slot];
+    const Vertex c = at_border ? state_.domain.clamp(d.centre) : d.centre;
+    const bool on_border = at_border && is_on_border(d.centre);
+    PointId id = split.first;
+    for (const int bit : set_bits(split.cut_bits())) {
+      const Vertex end = d.vertex(bit / 2), v = at_border ? state_.domain.clamp(end) : end;
+      const std::int32_t t = 2 * state_.q[id] + 1;
+      points.push_back({id,
+                        {c.x * kSteps + (v.x - c.x) * t, c.y * kSteps + (v.y - c.y) * t, c.z * kSteps + (v.z - c.z) * t},
+                        (bit & 1) == 0 ? Surface::alpha : Surface::beta,
+                        on_border || (at_border && is_on_border(end))});
+      ++id;
+    }
+    if (split.side() == Side::inside) points.push_back({id, {c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, on_border});
+  }
+}
+
+void FrontMesher::append_runs(std::size_t number, std::vector<Run>& runs) const {
+  if (number == 0) runs.push_back({state_.origin.of[0].first, state_.origin.of[0].points()});
+  for (const int slot : set_bits(block(number).shown)) {
+    const FrontState::Split& split = block(number).of[slot];
+    runs.push_back({split.first, split.points()});
+  }
+}
+
+void FrontMesher::append_removed_runs(std::size_t number, std::vector<Run>& runs) const {
+  if (state_.is_root_block(block(number))) return;
+  FrontCursor cursor(state_);
+  cursor.move_to(block(number).scale, block(number).position);
+  for (const int slot : set_bits(block(number).shown)) {
+    const Links& links = cursor.links(slot);
+    const Links::Edge spine = links.edge[0];
+    const FrontState::Split& owner = cursor.at(links.vertex[spine.owner]).split();
+    runs.push_back({owner.cut(2 * spine.other), std::uint32_t(std::popcount(owner.cuts_to(spine.other)))});
+  }
+}
+
+void FrontMesher::append(const Output& out, std::size_t number) const {
+  if (state_.is_root_block(block(number))) {
+    append_root(out);
+    return;
+  }
+  if (block(number).shown == 0) return;
+  FrontCursor cursor(state_);
+  cursor.move_to(block(number).scale, block(number).position);
+  for (const int slot : set_bits(block(number).shown)) {
+    unsigned unsplit = 0, bit = 1;  // a bit for each child whose split is not shown
+    for (const Link link : cursor.children(slot)) {
+      if (!cursor.at(link).is_shown()) unsplit |= bit;
+      bit <<= 1;
+    }
+    if (unsplit != 0 && cursor.gather(slot)) append_children(out, cursor, unsplit);
+  }
+}
+
+void FrontMesher::append_root(const Output& out) const {
+  const Diamond root(state_.domain.root());
+  FrontCursor cursor(state_);
+  cursor.move_to(root);
+  if (!cursor.gather(kSlotOfType[root.type]) || cursor.is_shown()) return;
+  PointsAround points;
+  gather_points(cursor, out.numbers, points);
+  for (const int t : set_bits(cursor.parts().tets)) {
+    const TetShape shape = tet_shape(state_.domain, root, cursor.parts(), t);
+    append_patch(out, shape, corners_of(shape), cursor.context().sides, points);
+    if (out.halves != nullptr) {
+      out.halves->push_back({state_.domain.positions(root, root.row->tet(t)), cursor.context().is_mixed(), out.tets.size()});
+    }
+  }
+}
+
+void FrontMesher::gather_points(const FrontCursor& cursor, std::span<const std::uint32_t> numbers, PointsAround& points) {
+  const auto number_of = [numbers](PointId id) { return numbers.empty() ? id : numbers[id]; };
+  const DiamondContext& context = cursor.context();
+  for (int v = 0; v < context.row->vertices; ++v) {
+    if (context.has(v) && context.side(v) == Side::inside) points[v] = number_of(cursor.split_of(v).centre());
+  }
+  if (!context.is_mixed()) return;
+  const Links& links = cursor.links();
+  for (const int e : set_bits(cursor.parts().edges)) {
+    const Links::Edge edge = links.edge[e];
+    const FrontState::Split& owner = cursor.split_of(edge.owner);
+    const unsigned surfaces = owner.cuts_to(edge.other);
+    if (surfaces == 0) continue;
+    PointId id = owner.cut(2 * edge.other);
+    if (surfaces & 1) points[kCutsFrom + 2 * e] = number_of(id++);
+    if (surfaces & 2) points[kCutsFrom + 2 * e + 1] = number_of(id);
+  }
+}
+
+// Of the split diamond that the cursor found last, the halves that it left to some of its children, a bit each.
+void FrontMesher::append_children(const Output& out, FrontCursor& cursor, unsigned children) const {
+  const FrontState::Split& split = cursor.here().of[cursor.slot()];
+  const bool is_empty = split.cut_bits() == 0 && split.side() != Side::inside;  // all on one side, and not inside
+  if (is_empty && out.halves == nullptr) return;
+  const Diamond& d = cursor.diamond();
+  const DiamondParts& parts = cursor.parts();
+  const std::uint32_t sides = cursor.context().sides | std::uint32_t(split.side()) << (2 * kCentre);
+  PointsAround points;
+  gather_points(cursor, out.numbers, points);
+  const auto number_of = [&out](PointId id) { return out.numbers.empty() ? id : out.numbers[id]; };
+  PointId id = split.first;
+  for (const int bit : set_bits(split.cut_bits())) points[kCutsFrom + 2 * kSubdivision + bit] = number_of(id++);
+  if (split.side() == Side::inside) points[kCentre] = number_of(id);
+  const auto& corners = half_corners_[cursor.slot()];
+  const Ring ring(sides, d.row->belt);
+  for (const int k : set_bits(children)) {
+    const bool child_can_change = out.halves != nullptr && d.has_children() && can_change(d.child(k));
+    for (const Duet::Half& half : d.row->child[k].half) {
+      if (!(parts.tets >> half.tet & 1)) continue;
+      const bool has_patch = cases_.count(ring.half(half.tet, half.end)) != 0;
+      if (!has_patch && out.halves == nullptr) continue;
+      if (parts.straddles && !half_exists(state_.domain, d, half.tet, half.end)) continue;
+      if (has_patch && !parts.straddles) {
+        append_patch(out, d.row->half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points);
+      } else if (has_patch) {
+        const TetShape shape = half_shape(state_.domain, d, parts, half.tet, half.end);
+        append_patch(out, shape, corners_of(shape), sides, points);
+      }
+      if (out.halves == nullptr) continue;
+      auto local = d.row->tet(half.tet);
+      local[1 - half.end] = kCentre;
+      out.halves->push_back({state_.domain.positions(d, local), child_can_change, out.tets.size()});
+    }
+  }
+}
+
+bool FrontMesher::can_change(Vertex centre) const {
+  const Diamond d(centre);
+  FrontCursor cursor(state_);
+  cursor.move_to(d);
+  return cursor.gather(kSlotOfType[d.type]) && !cursor.is_noop() && cursor.context().is_mixed();
+}
+
+// The patch of one tetrahedron.
+void FrontMesher::append_patch(const Output& out, const TetShape& shape, const Corners& corners, std::uint32_t sides,
+                               const PointsAround& points) const {
+  const auto tets = cases_.tets(shape.order, shape_sides(shape, sides));
+  const int second = shape.flip ? 3 : 2, third = shape.flip ? 2 : 3;
+  const std::size_t from = out.tets.size();
+  out.tets.resize(from + tets.size());
+  Tet* to = out.tets.data() + from;
+  for (const auto& tet : tets) {
+    *to++ = {points[corners[tet[0]]], points[corners[tet[1]]], points[corners[tet[second]]], points[corners[tet[third]]]};
+  }
+}
+
+}  // namespace intervale

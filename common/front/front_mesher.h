@@ -1,0 +1,93 @@
+// The mesh of a front, supercube by supercube: the halves that split diamonds leave to children that are not split, each cut into its patch.
+//
+// The tetrahedra that a supercube's splits leave stay the same until splits in it, or children of them, are shown or hidden. So a mesh that changes
+// is updated by those supercubes alone. Points keep their ids, too, until FrontState::point_generation changes.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/front/front_cursor.h"
+#include "common/front/front_state.h"
+#include "common/mesh/mesh.h"
+#include "common/patch/tet_cases.h"
+
+namespace intervale {
+
+class FrontMesher {
+ public:
+  explicit FrontMesher(const FrontState& state) : state_(state) {}  // which must outlive it, and may change between calls
+
+  using Tet = std::array<PointId, 4>;            // positively oriented
+  using Position = std::array<std::int32_t, 3>;  // in 1 / kSteps of a sample: every cut of every edge is a whole number there
+  static constexpr std::int32_t kSteps = 512;
+  struct Point {
+    PointId id = 0;
+    Position position{};
+    Surface surface = Surface::inside;
+    bool on_border = false;  // on a far face of the box, where clamping moves vertices
+  };
+  struct Run {  // points with the ids [first, first + count)
+    PointId first = 0;
+    std::uint32_t count = 0;
+  };
+  // Half of a tetrahedron that a split left.
+  struct Half {
+    std::array<Vertex, 4> corners;  // in samples
+    bool can_change = false;        // its diamond can be split, and has vertices on different sides
+    std::size_t end = 0;            // its patch ends before this tetrahedron, and begins where the half before it ends
+  };
+
+  // Supercubes have the numbers of their blocks: 0, 1, ... in the order in which they were added. Number 0 has the domain's corners; what they leave
+  // is the root's patch. All functions below append what one supercube's splits left, and leave what is there.
+  [[nodiscard]] const FrontState& state() const { return state_; }
+  [[nodiscard]] const FrontState::Block& block(std::size_t number) const { return state_.blocks[number]; }
+
+  // The points that its shown splits brought.
+  void append_points(std::size_t number, std::vector<Point>& points) const;
+  // The same points, as runs.
+  void append_runs(std::size_t number, std::vector<Run>& runs) const;
+  // The points that its shown splits removed: the cuts of the edges that they split.
+  void append_removed_runs(std::size_t number, std::vector<Run>& runs) const;
+  // Its tetrahedra. numbers: of each point the number that stands for it; if empty, the points' ids.
+  void append_tets(std::size_t number, std::vector<Tet>& tets, std::span<const std::uint32_t> numbers = {}) const {
+    append({tets, nullptr, numbers}, number);
+  }
+  // Its tetrahedra, and the halves that they are in, those without any too.
+  void append_halves(std::size_t number, std::vector<Tet>& tets, std::vector<Half>& halves) const { append({tets, &halves, {}}, number); }
+
+  // Whether diamonds of this supercube reach the far faces of the box.
+  [[nodiscard]] bool is_at_border(std::size_t number) const;
+
+ private:
+  // The mesh points around one diamond: those of its vertices, then each edge's cut by alpha and by beta.
+  static constexpr int kCutsFrom = kMaxVertices + 1;
+  using PointsAround = std::array<std::uint32_t, kCutsFrom + 2 * (kMaxEdges + kMaxVertices)>;
+  // Where among the points around a diamond the corners of a tetrahedron's patch are.
+  using Corners = std::array<std::uint8_t, kPatchCorners>;
+  using HalfCorners = std::array<std::array<std::array<Corners, 2>, kMaxTets>, kSlots>;  // of the halves of all types' tetrahedra
+  struct Output {
+    std::vector<Tet>& tets;
+    std::vector<Half>* halves;  // may be null
+    std::span<const std::uint32_t> numbers;
+  };
+  static Corners corners_of(const TetShape& s);
+  static const HalfCorners& half_corners();
+  static void gather_points(const FrontCursor& cursor, std::span<const std::uint32_t> numbers, PointsAround& points);
+
+  [[nodiscard]] bool is_on_border(Vertex v) const;
+  void append(const Output& out, std::size_t number) const;
+  void append_root(const Output& out) const;
+  void append_children(const Output& out, FrontCursor& cursor, unsigned children) const;
+  void append_patch(const Output& out, const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points) const;
+  [[nodiscard]] bool can_change(Vertex centre) const;
+
+  const FrontState& state_;
+  const TetCases& cases_ = tet_cases();
+  const HalfCorners& half_corners_ = half_corners();
+};
+
+}  // namespace intervale
