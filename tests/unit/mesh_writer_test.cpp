@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <random>
 #include <set>
+#include <span>
 #include <sstream>
 #include <string>
 
@@ -438,12 +440,50 @@ TEST(MeshWriter, AFullDiskIsAnErrorAndLeavesNothing) {
   }
 }
 
-TEST(MeshWriter, GlbRefusesCoordinatesBeyondFloats) {
+Mesh tetrahedron_with(double coordinate) {
+  return {{{0, 0, 0}, {coordinate, 0, 0}, {0, 1, 0}, {0, 0, 1}}, MeshArray<Surface>(4, Surface::inside), {{0, 1, 2, 3}}};
+}
+
+TEST(MeshWriter, NoFormatHoldsCoordinatesThatAreNotFinite) {
   const TempDir folder;
-  Mesh mesh{{{0, 0, 0}, {1e300, 0, 0}, {0, 1, 0}, {0, 0, 1}}, MeshArray<Surface>(4, Surface::inside), {{0, 1, 2, 3}}};
-  EXPECT_FALSE(write_mesh(folder / "m.glb", mesh));
-  EXPECT_FALSE(std::filesystem::exists(folder / "m.glb"));
-  EXPECT_TRUE(write_mesh(folder / "m.vtp", mesh));
+  for (const char* name : {"m.vtu", "m.vtp", "m.ply", "m.stl", "m.obj", "m.glb"})
+    for (const double coordinate : {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+      const auto written = write_mesh(folder / name, tetrahedron_with(coordinate));
+      ASSERT_FALSE(written) << name;
+      EXPECT_EQ(written.error().message, "cannot write '" + (folder / name).string() + "': a coordinate is not finite");
+      EXPECT_FALSE(std::filesystem::exists(folder / name));
+    }
+}
+
+TEST(MeshWriter, StlAndGlbRefuseCoordinatesBeyondFloats) {
+  const TempDir folder;
+  for (const char* name : {"m.vtu", "m.vtp", "m.ply", "m.obj"}) EXPECT_TRUE(write_mesh(folder / name, tetrahedron_with(1e300))) << name;
+  for (const char* name : {"m.stl", "m.glb"}) {
+    EXPECT_FALSE(write_mesh(folder / name, tetrahedron_with(1e300))) << name;
+    EXPECT_FALSE(std::filesystem::exists(folder / name));
+  }
+}
+
+TEST(MeshWriter, ASinkGetsTheBytesOfTheFile) {
+  const TempDir folder;
+  const auto mesh = block(3, 4);
+  for (const char* name : {"m.vtu", "m.vtp", "m.ply", "m.stl", "m.obj", "m.glb"}) {
+    std::string bytes;
+    ASSERT_TRUE(write_mesh(name, mesh, [&](std::span<const std::byte> more) -> Result<void> {
+      bytes.append(reinterpret_cast<const char*>(more.data()), more.size());
+      return {};
+    }));
+    ASSERT_TRUE(write_mesh(folder / name, mesh));
+    EXPECT_EQ(bytes, contents_of(folder / name)) << name;
+  }
+}
+
+TEST(MeshWriter, TheErrorOfASinkIsTheErrorOfTheWriter) {
+  for (const char* name : {"m.vtu", "m.glb"}) {
+    const auto written = write_mesh(name, block(2, 1), [](std::span<const std::byte>) -> Result<void> { return fail("the sink is full"); });
+    ASSERT_FALSE(written);
+    EXPECT_EQ(written.error().message, "the sink is full");
+  }
 }
 
 }  // namespace

@@ -14,7 +14,6 @@
 #include "client/view/skin.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
-#include "client/web/core/memory_file.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/mesh_digest.h"
 
@@ -190,11 +189,14 @@ class Viewer {
     return tets;
   }
 
-  // The mesh as a file of the format that this path ends in: its bytes, or a text that says why there are none.
+  // The mesh as a file of the format of this path's extension: its bytes, or a text that says why there are none.
   [[nodiscard]] val save(const std::string& path) const {
-    const auto written = write_mesh(path, session_.mesh()->mesh());
-    if (!written) return val(written.error().message);
-    return buffer_of(take_committed_file());
+    std::vector<std::byte> file;
+    const auto written = write_mesh(path, session_.mesh()->mesh(), [&](std::span<const std::byte> bytes) -> Result<void> {
+      file.insert(file.end(), bytes.begin(), bytes.end());
+      return {};
+    });
+    return written ? buffer_of(file) : val(written.error().message);
   }
   std::string digest() const { return mesh_digest(session_.mesh()->mesh()); }
 

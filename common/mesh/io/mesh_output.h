@@ -1,34 +1,31 @@
-// Inside the mesh writers: numbers and text into an AtomicFile, with one check at the end.
+// Inside the mesh writers: numbers and text into a ByteSink, with one check at the end.
 #pragma once
 
 #include <array>
 #include <bit>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <span>
+#include <string>
 #include <string_view>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
 #include "common/mesh/boundary.h"
+#include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/mesh.h"
-#include "common/util/atomic_file.h"
 #include "common/util/decimal.h"
+#include "common/util/vec3.h"
 
 namespace intervale {
 
 static_assert(std::endian::native == std::endian::little, "every binary mesh format here is little endian and written as the machine holds it");
 
-// The first error is kept and everything after it ignored, until commit() hands it back: a writer of a format reads as the format does.
+// What the writer of a format writes to. The first error is kept and everything after it ignored, so that the writer need not look.
 class MeshOutput {
  public:
-  static Result<MeshOutput> create(const std::filesystem::path& path) {
-    auto file = AtomicFile::create(path);
-    if (!file) return tl::unexpected<Error>(file.error());
-    return MeshOutput(std::move(*file));
-  }
+  // path: for errors. Both outlive the MeshOutput.
+  MeshOutput(const std::filesystem::path& path, const ByteSink& sink) : path_(path), sink_(sink) {}
 
   // The bytes of a number or of an array of numbers. T has no padding.
   template <class T>
@@ -52,27 +49,32 @@ class MeshOutput {
     text(intervale::decimal(value, digits));
   }
 
-  void fail(std::string message) {
-    if (result_) result_ = intervale::fail(std::move(message));
+  // why: what of the mesh does not fit the format.
+  void fail(const std::string& why) {
+    if (result_) result_ = intervale::fail("cannot write '" + path_.string() + "': " + why);
   }
 
-  Result<void> commit() { return result_ ? file_.commit() : result_; }
+  [[nodiscard]] Result<void> result() const { return result_; }
 
  private:
-  explicit MeshOutput(AtomicFile file) : file_(std::move(file)) {}
   void append(std::span<const std::byte> bytes) {
-    if (result_ && !bytes.empty()) result_ = file_.write(bytes);
+    if (result_ && !bytes.empty()) result_ = sink_(bytes);
   }
-  AtomicFile file_;
+  const std::filesystem::path& path_;
+  const ByteSink& sink_;
   Result<void> result_;
 };
 
-// One function a format. Each makes, fills and commits the file.
-Result<void> write_vtu(const std::filesystem::path& path, const Mesh& mesh);
-Result<void> write_vtp(const std::filesystem::path& path, const Mesh& mesh, const BoundaryMesh& boundary);
-Result<void> write_ply(const std::filesystem::path& path, const Mesh& mesh, const BoundaryMesh& boundary);
-Result<void> write_stl(const std::filesystem::path& path, const Mesh& mesh, const BoundaryMesh& boundary);
-Result<void> write_obj(const std::filesystem::path& path, const Mesh& mesh, const BoundaryMesh& boundary);
-Result<void> write_glb(const std::filesystem::path& path, const Mesh& mesh, const BoundaryMesh& boundary);
+[[nodiscard]] inline std::array<float, 3> narrowed(const Vec3& v) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+
+// One function a format. The coordinates are finite as the format holds them.
+void write_vtu(MeshOutput& out, const Mesh& mesh);
+void write_vtp(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary);
+void write_ply(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary);
+void write_stl(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary);
+void write_obj(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary);
+void write_glb(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary);
 
 }  // namespace intervale

@@ -1,27 +1,34 @@
 #include "common/mesh/io/mesh_writer.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <string>
 
 #include "common/mesh/io/mesh_output.h"
+#include "common/util/atomic_file.h"
 
 namespace intervale {
 namespace {
 
-using SurfaceWriter = Result<void> (*)(const std::filesystem::path&, const Mesh&, const BoundaryMesh&);
+using SurfaceWriter = void (*)(MeshOutput&, const Mesh&, const BoundaryMesh&);
 
 struct Format {
   const char* extension;
+  double largest;               // coordinate, in magnitude
   SurfaceWriter write_surface;  // null: the format holds tetrahedra
 };
 
+constexpr double kDouble = std::numeric_limits<double>::max(), kFloat = std::numeric_limits<float>::max();
+
 constexpr std::array<Format, 6> kFormats{{
-    {".vtu", nullptr},
-    {".vtp", write_vtp},
-    {".ply", write_ply},
-    {".stl", write_stl},
-    {".obj", write_obj},
-    {".glb", write_glb},
+    {".vtu", kDouble, nullptr},
+    {".vtp", kDouble, write_vtp},
+    {".ply", kDouble, write_ply},
+    {".stl", kFloat, write_stl},
+    {".obj", kDouble, write_obj},
+    {".glb", kFloat, write_glb},
 }};
 
 Result<const Format*> format_of(const std::filesystem::path& path) {
@@ -38,10 +45,29 @@ Result<void> check_mesh_path(const std::filesystem::path& path) {
   return format_of(path).map([](const Format*) {});
 }
 
-Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh) {
+Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, const ByteSink& sink) {
   const auto format = format_of(path);
   if (!format) return tl::unexpected<Error>(format.error());
-  return (*format)->write_surface ? (*format)->write_surface(path, mesh, boundary_mesh(mesh)) : write_vtu(path, mesh);
+  const auto [extension, largest, write_surface] = **format;
+  MeshOutput out(path, sink);
+  for (const auto& point : mesh.points)
+    for (const double coordinate : point)
+      if (!(std::abs(coordinate) <= largest)) {  // NaN too
+        out.fail(std::isfinite(coordinate) ? "a coordinate is too large for the format's 32-bit floats; write .vtp" : "a coordinate is not finite");
+        return out.result();
+      }
+  if (write_surface)
+    write_surface(out, mesh, boundary_mesh(mesh));
+  else
+    write_vtu(out, mesh);
+  return out.result();
+}
+
+Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh) {
+  if (auto checked = check_mesh_path(path); !checked) return checked;
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected<Error>(file.error());
+  return write_mesh(path, mesh, [&](std::span<const std::byte> bytes) { return file->write(bytes); }).and_then([&] { return file->commit(); });
 }
 
 }  // namespace intervale

@@ -1,6 +1,5 @@
 // glTF 2.0, binary container (Khronos Group, glTF 2.0 Specification, section 4): one buffer, float32 positions, then uint32 indices.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <string>
 
@@ -14,8 +13,6 @@ constexpr int kFloat = 5126, kUnsignedInt = 5125, kArrayBuffer = 34962, kElement
 constexpr std::uint64_t kHeadBytes = 12, kChunkHeadBytes = 8;
 
 using Position = std::array<float, 3>;
-
-Position narrowed(const std::array<double, 3>& v) { return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}; }
 
 // A float's exact value: validators compare the bounds with the positions bit by bit.
 std::string json(const Position& v) {
@@ -43,14 +40,13 @@ std::string document(std::uint64_t points, std::uint64_t triangles, const Positi
 
 }  // namespace
 
-Result<void> write_glb(const std::filesystem::path& path, const Mesh& mesh, const BoundaryMesh& boundary) {
+void write_glb(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary) {
   Position low, high;
   low.fill(std::numeric_limits<float>::max());
   high.fill(std::numeric_limits<float>::lowest());
   for (const auto point : boundary.points) {
     const auto position = narrowed(mesh.points[point]);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!std::isfinite(position[axis])) return fail("cannot write '" + path.string() + "': glTF's floats cannot hold the coordinates; write .vtp");
       low[axis] = std::min(low[axis], position[axis]);
       high[axis] = std::max(high[axis], position[axis]);
     }
@@ -60,12 +56,8 @@ Result<void> write_glb(const std::filesystem::path& path, const Mesh& mesh, cons
   const std::uint64_t binary_bytes = boundary.points.size() * sizeof(Position) + boundary.triangles.size() * 12;
   const std::uint64_t total = kHeadBytes + kChunkHeadBytes + text.size() + (binary_bytes > 0 ? kChunkHeadBytes + binary_bytes : 0);
   if (total > std::numeric_limits<std::uint32_t>::max())
-    return fail("cannot write '" + path.string() + "': the surface takes " + std::to_string(total) +
-                " bytes, and .glb ends at 4 GiB; write .vtp or .ply");
+    return out.fail("the surface takes " + std::to_string(total) + " bytes, and .glb ends at 4 GiB; write .vtp or .ply");
 
-  auto created = MeshOutput::create(path);
-  if (!created) return tl::unexpected<Error>(created.error());
-  auto& out = *created;
   out.number(kMagic);
   out.number(kVersion);
   out.number(static_cast<std::uint32_t>(total));
@@ -78,7 +70,6 @@ Result<void> write_glb(const std::filesystem::path& path, const Mesh& mesh, cons
     for (const auto point : boundary.points) out.number(narrowed(mesh.points[point]));
     out.numbers(boundary.triangles);
   }
-  return out.commit();
 }
 
 }  // namespace intervale

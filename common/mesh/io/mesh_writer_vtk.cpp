@@ -81,30 +81,22 @@ void write_cells(MeshOutput& out, const Cells& cells) {
 
 }  // namespace
 
-Result<void> write_vtu(const std::filesystem::path& path, const Mesh& mesh) {
-  auto created = MeshOutput::create(path);
-  if (!created) return tl::unexpected<Error>(created.error());
-  auto& out = *created;
+void write_vtu(MeshOutput& out, const Mesh& mesh) {
   write_head(out, "UnstructuredGrid", "NumberOfCells=\"" + std::to_string(mesh.tets.size()) + "\"", mesh, mesh.points.size(),
              [](std::uint64_t i) { return i; });
   out.text("<Cells>\n");
   write_cells(out, mesh.tets);
   write_array(out, R"(type="UInt8" Name="types")", mesh.tets.size(), [](std::uint64_t) { return std::uint8_t{kTetraCell}; });
   out.text("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
-  return out.commit();
 }
 
-Result<void> write_vtp(const std::filesystem::path& path, const Mesh& mesh, const BoundaryMesh& boundary) {
-  auto created = MeshOutput::create(path);
-  if (!created) return tl::unexpected<Error>(created.error());
-  auto& out = *created;
+void write_vtp(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary) {
   const auto polys =
       "NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" + std::to_string(boundary.triangles.size()) + "\"";
   write_head(out, "PolyData", polys, mesh, boundary.points.size(), [&](std::uint64_t i) { return boundary.points[i]; });
   out.text("<Polys>\n");
   write_cells(out, boundary.triangles);
   out.text("</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n");
-  return out.commit();
 }
 
 }  // namespace intervale
