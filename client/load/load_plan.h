@@ -31,7 +31,7 @@ struct LoadPlan {
   LoadClock::duration duration{};
   LoadClock::duration ramp{};           // the clients' starts are spread over it evenly
   std::optional<std::uint64_t> rate;    // bytes a second that a client reads, at least 1024; off: as fast as they come
-  std::optional<std::uint64_t> window;  // most credit that a client has outstanding; see Grants
+  std::optional<std::uint64_t> window;  // most credit that a client has outstanding; see CreditWindow
   LoadClock::duration patience{};       // to be connected, for the WebSocket's handshake and for closing: each
   bool verify = false;                  // apply what comes
   Budget budget;                        // each client's, if it applies

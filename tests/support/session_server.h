@@ -11,8 +11,8 @@
 #include "client/core/client_session.h"
 #include "protocol/codec.h"
 #include "server/serve/access.h"
+#include "server/serve/atomic_shared_ptr.h"
 #include "server/serve/catalogue.h"
-#include "server/serve/replaceable.h"
 #include "server/serve/session_state.h"
 
 namespace intervale::testing {
@@ -24,7 +24,7 @@ class SessionServer {
   SessionServer(const std::shared_ptr<const IntervalVolume>& volume, Client& client) : client_(client) {
     Catalogue catalogue;
     EXPECT_TRUE(catalogue.add(volume));
-    catalogue_.set(std::make_shared<const Catalogue>(std::move(catalogue)));
+    catalogue_.store(std::make_shared<const Catalogue>(std::move(catalogue)));
     client_.connected(now_);
   }
 
@@ -33,7 +33,7 @@ class SessionServer {
     while (messages > 0) {
       ASSERT_NO_FATAL_FAILURE(take_messages());
       auto message = state_.next(2048);
-      if (!message && state_.working()) continue;
+      if (!message && state_.has_work()) continue;
       if (!message) return;
       now_ += std::chrono::milliseconds(1);
       const auto event = client_.receive(protocol::encode(*message), now_);
@@ -57,7 +57,7 @@ class SessionServer {
     }
   }
 
-  Replaceable<Catalogue> catalogue_;
+  AtomicSharedPtr<Catalogue> catalogue_;
   SessionState state_{catalogue_, Scope::everything()};
   Client& client_;
   std::vector<protocol::ClientMessage> received_;
