@@ -1,4 +1,4 @@
-// The commands of intervale-client, each in a file of its own.
+// The commands of intervale-client, one file each.
 #pragma once
 
 #include "common/program/program.h"

@@ -31,8 +31,8 @@ struct FetchCommand {
   bool json = false;
 };
 
-// What a mesh's volume was lately: found anew as often as takes a tenth of the time.
-class VolumeSoFar {
+// The volume of a growing mesh, for the progress line. It is computed again only as often as takes a tenth of the time.
+class RecentVolume {
  public:
   double of(const StreamClient& client) {
     const auto now = Clock::now();
@@ -53,7 +53,7 @@ Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& op
   Progress progress("receiving " + printable(url.name));
   FetchEvents events;
   events.on_notice = [&progress](const std::string& notice) { progress.note(notice); };
-  events.on_batch = [&progress, volume = VolumeSoFar()](const StreamClient& client, const FetchStats& stats) mutable {
+  events.on_batch = [&progress, volume = RecentVolume()](const StreamClient& client, const FetchStats& stats) mutable {
     if (!progress.is_seen()) return;
     const ClientSession::Stats& session = stats.session;
     const std::string left = session.remaining_pixels > 0 ? fmt::format("error {:.3g} px, {:.4g}", session.remaining_pixels, session.remaining_error)
@@ -95,7 +95,7 @@ Result<void> run(const FetchCommand& options) {
   auto url = parse_url(options.url);
   if (!url) return tl::unexpected(url.error());
   url->access = options.access;
-  if (url->name.empty()) return misuse("which data set? " + url->server() + "/NAME is wanted; see intervale-client list " + url->server());
+  if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
@@ -119,11 +119,11 @@ Result<void> run(const FetchCommand& options) {
 
 void add_fetch_command(Program& program) {
   const auto options = std::make_shared<FetchCommand>();
-  CLI::App& command = program.add_command("fetch", "Receives a mesh, and writes it or draws it", [options] { return run(*options); });
+  CLI::App& command = program.add_command("fetch", "Receives a mesh, and writes or draws it", [options] { return run(*options); });
   command.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
   command
       .add_option_function<std::string>(
-          "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
+          "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
       ->type_name("MESH");
   add_lod_options(command, options->fetch.lod);
   add_picture_options(command, options->picture);
@@ -131,7 +131,7 @@ void add_fetch_command(Program& program) {
   command
       .add_option_function<unsigned>(
           "--reconnect", [options](unsigned seconds) { options->fetch.reconnect = std::chrono::seconds(seconds); },
-          "How long to try to reach a lost server again, with what came so far (default 30; 0: not at all)")
+          "How long to try to reach a lost server again, to resume (default 30; 0: not at all)")
       ->type_name("SECONDS");
   add_digest_flag(command, options->digest);
   add_access_options(command, options->access);

@@ -20,10 +20,10 @@ struct ListOptions {
 
 constexpr int kMaxDepth = 16;
 
-// What is nested deeper than any answer of ours is left out: to print it takes a call for each level.
+// Drops what is nested deeper than any answer of our server: printing it would recurse once for each level.
 bool is_shallow(int depth, nlohmann::ordered_json::parse_event_t /*event*/, const nlohmann::ordered_json& /*value*/) { return depth < kMaxDepth; }
 
-// What a server says goes to a terminal: no control characters.
+// The text goes to a terminal: no control characters of the server's.
 std::string shown(const nlohmann::ordered_json& value) { return printable(value.is_string() ? value.get<std::string>() : value.dump()); }
 
 std::string line_of(const nlohmann::ordered_json& dataset) {
@@ -39,10 +39,10 @@ Result<void> list(const ListOptions& options) {
   auto url = parse_url(options.url);
   if (!url) return tl::unexpected(url.error());
   url->access = options.access;
-  if (!url->name.empty()) return misuse("list takes a server, without a data set's name: " + url->server());
+  if (!url->name.empty()) return misuse("list expects a server without the name of a data set: " + url->server());
   const auto body = http_get(*url, "/api/datasets");
   if (!body) return tl::unexpected(body.error());
-  // The parser throws on what is no JSON, at() on JSON of another shape: both come from outside, so both end here.
+  // The parser throws on invalid JSON, and at() on JSON of another shape. Both are bad input from outside.
   try {
     const auto answer = nlohmann::ordered_json::parse(*body, &is_shallow);
     if (options.json) return print_json(answer);
@@ -50,7 +50,7 @@ Result<void> list(const ListOptions& options) {
     for (const auto& dataset : answer.at("datasets")) text += line_of(dataset);
     return print(text.empty() ? "no data sets\n" : text);
   } catch (const nlohmann::json::exception&) {
-    return fail(url->authority() + " is not an intervale server of this version: its list of data sets makes no sense");
+    return fail(url->authority() + " is not an intervale server of this version: its list of data sets is invalid");
   }
 }
 

@@ -1,4 +1,4 @@
-// How long to wait before a lost server is tried again.
+// Pauses between attempts to reach a lost server.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,8 @@
 
 namespace intervale {
 
-// From 0.1 s doubling to 3 s, each cut by up to a half at random, so that many clients of one server do not come back all at once.
+// From 0.1 s, doubling up to 3 s, each shortened by up to a half at random: the many clients of a server that restarts
+// must not connect all at once.
 class Backoff {
  public:
   explicit Backoff(std::uint64_t seed) : random_(seed) {}

@@ -12,17 +12,19 @@
 namespace intervale {
 namespace {
 
-constexpr double kWorthIt = 1.1;  // what is shown instead of something else matters more by this: a view that trembles does not change the mesh
+// A split takes the place of another one only if it is more important by this factor. So a trembling camera does not
+// change the mesh.
+constexpr double kHysteresis = 1.1;
 
-// Splits of a supercube.
+// The splits of one supercube.
 struct Group {
   double importance = 0;
   SupercubeKey key = 0;
   std::uint64_t slots = 0;
 };
 
-// What matters most first; of those that matter alike, coarse ones.
-std::vector<Group> in_order(const std::vector<SlotGroup>& splits, const Importance& importance) {
+// The most important first; of equally important ones, the coarse ones first.
+std::vector<Group> by_importance(const std::vector<SlotGroup>& splits, const Importance& importance) {
   std::vector<Group> groups;
   for (const SlotGroup& g : splits) groups.push_back({importance(g.key), g.key, g.slots});
   std::sort(groups.begin(), groups.end(),
@@ -30,8 +32,8 @@ std::vector<Group> in_order(const std::vector<SlotGroup>& splits, const Importan
   return groups;
 }
 
-// A diamond's place by its centre: its supercube, and its slot there.
-Front::Handle place_of(const Diamond& d) {
+// The supercube of a diamond, and its slot there.
+Front::Handle handle_of(const Diamond& d) {
   const int up = d.scale + 2;
   return {supercube_key(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up}), kSlotOfType[d.type]};
 }
@@ -44,14 +46,14 @@ void for_each_parent(Front::Handle handle, const Visit& visit) {
     if ((c.x | c.y | c.z) < 0) continue;
     const Diamond parent(c);
     if (parent.row->cls == 3) continue;  // a corner of the domain
-    visit(place_of(parent));
+    visit(handle_of(parent));
   }
 }
 
 class Balance {
  public:
   Balance(Front& front, std::uint64_t max_tets, const Importance& importance)
-      : front_(front), max_tets_(max_tets), groups_(in_order(front.splits(), importance)), end_(groups_.size()) {
+      : front_(front), max_tets_(max_tets), groups_(by_importance(front.splits(), importance)), end_(groups_.size()) {
     for (std::size_t g = 0; g < end_; ++g) place_.emplace(groups_[g].key, g);
   }
 
@@ -59,7 +61,7 @@ class Balance {
     fit();
     show_what_fits();
     if (front_.tet_count() <= max_tets_) return;
-    // Making room can take some: a coarse patch may have more tetrahedra than what it takes the place of.
+    // Hiding can add tetrahedra: a coarse patch may have more than the fine ones that it replaces.
     wanted_.clear();
     end_ = groups_.size();
     fit();
@@ -76,12 +78,13 @@ class Balance {
       const std::uint64_t hidden = groups_[g].slots & ~front_.shown_slots(groups_[g].key);
       for (std::uint64_t left = hidden; left != 0; left &= left - 1) {
         wanted_.clear();
-        if (!show({groups_[g].key, std::countr_zero(left)}, groups_[g].importance / kWorthIt)) return;
+        if (!show({groups_[g].key, std::countr_zero(left)}, groups_[g].importance / kHysteresis)) return;
       }
     }
   }
 
-  // Shows a split and its ancestors; what matters less than `worth` and is not one of them makes room. False if there is none.
+  // Shows a split and its ancestors. Splits less important than `worth` that are not among these make room. False if
+  // there is not enough room.
   bool show(Front::Handle handle, double worth) {
     wanted_.push_back(handle);
     if (!front_.is_hidden(handle)) return true;
@@ -94,7 +97,8 @@ class Balance {
     return true;
   }
 
-  // Hides a split if none of its children is shown, and then its ancestors that waited for that: those that matter less.
+  // Hides a split if none of its children is shown; then its parents, if they are less important and only this child
+  // kept them shown.
   bool hide(Front::Handle handle) {
     if (std::find(wanted_.begin(), wanted_.end(), handle) != wanted_.end() || !front_.hide(handle)) return false;
     for_each_parent(handle, [&](Front::Handle parent) {
@@ -104,7 +108,8 @@ class Balance {
     return true;
   }
 
-  // Hides what it can of the last supercube that has something to hide and matters less than `worth`. False if there is none.
+  // Of the least important supercube with anything to hide, hides all that it can. False if each such supercube is at
+  // least as important as `worth`.
   bool hide_least(double worth) {
     for (; end_ > 0 && groups_[end_ - 1].importance < worth; --end_) {
       const SupercubeKey key = groups_[end_ - 1].key;
@@ -121,10 +126,11 @@ class Balance {
 
   Front& front_;
   std::uint64_t max_tets_;
-  std::vector<Group> groups_;                                   // what matters most first
-  boost::unordered_flat_map<SupercubeKey, std::size_t> place_;  // of a group among them
-  std::size_t end_ = 0;                                         // from here on all is hidden that could be
-  std::vector<Front::Handle> wanted_;                           // a split to be shown, and those of its ancestors that were looked at
+  std::vector<Group> groups_;                                   // the most important first
+  boost::unordered_flat_map<SupercubeKey, std::size_t> place_;  // of a supercube in groups_
+  std::size_t end_ = 0;                                         // everything from here on that can be hidden is hidden
+  // The split to be shown, and its ancestors seen so far: not to be hidden.
+  std::vector<Front::Handle> wanted_;
 };
 
 }  // namespace
@@ -139,7 +145,8 @@ void balance(Front& front, std::uint64_t max_tets, const Importance& importance)
 
 std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, std::size_t max_supercubes, const Importance& importance) {
   const std::vector<SlotGroup> splits = front.splits();
-  boost::unordered_flat_map<SupercubeKey, std::uint64_t> left, chosen;  // slots: what is not chosen yet, and what is
+  // Slots of the splits not chosen yet; of the others.
+  boost::unordered_flat_map<SupercubeKey, std::uint64_t> left, chosen;
   for (const SlotGroup& g : splits) left.emplace(g.key, g.slots);
   const auto is_left = [&left](Front::Handle h) {
     const auto found = left.find(h.supercube);
@@ -150,12 +157,12 @@ std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, 
     bool any = false;
     for (int k = 0; k < d.row->children && d.has_children() && !any; ++k) {
       const Vertex c = d.child(k);
-      any = (c.x | c.y | c.z) >= 0 && is_left(place_of(Diamond(c)));
+      any = (c.x | c.y | c.z) >= 0 && is_left(handle_of(Diamond(c)));
     }
     return any;
   };
-  // A parent that waited for its last child, and matters less, follows it at once.
-  const std::vector<Group> groups = in_order(splits, importance);
+  // Once the last child of a less important parent is chosen, the parent follows at once.
+  const std::vector<Group> groups = by_importance(splits, importance);
   boost::unordered_flat_map<SupercubeKey, std::size_t> place;
   for (std::size_t g = 0; g < groups.size(); ++g) place.emplace(groups[g].key, g);
   std::size_t now = groups.size();

@@ -1,7 +1,8 @@
 // Which of the updates that a client has are in its mesh.
 //
-// As ROAM's two queues (Duchaineau et al. 1997): what matters most of what is hidden is shown, and what matters least of what is shown makes room for
-// it. A client does not know what errors updates mend. It takes the size of their diamonds on its screen for it.
+// As ROAM's two queues (Duchaineau et al., "ROAMing Terrain: Real-time Optimally Adapting Meshes", 1997): the most
+// important hidden splits are shown, and the least important shown ones make room for them. A client does not know the
+// errors of its updates, so the size of their diamonds on the screen stands for their importance.
 #pragma once
 
 #include <cstddef>
@@ -14,18 +15,20 @@
 
 namespace intervale {
 
-// How much the splits in a supercube matter; above 0.
+// The importance of the splits in a supercube; above 0.
 using Importance = std::function<double(SupercubeKey)>;
 
-// What a diamond of the supercube measures on the camera's screen, in pixels, less beside the picture. camera: one that check_lod lets pass.
+// The size of the supercube's diamonds on the camera's screen, in pixels; less outside the picture. camera: one that
+// check_lod accepts.
 [[nodiscard]] Importance size_on_screen(const Camera& camera, const Grid& grid);
 
-// Hides and shows splits of a front until its mesh has max_tets tetrahedra at most, and, as far as that allows, those splits that matter most and
-// their ancestors. No mesh on the way is larger than that, or than the one before it. O(n log n) in the front's supercubes.
+// Hides and shows splits of a front until its mesh has at most max_tets tetrahedra and, as far as that allows, the most
+// important splits with their ancestors. Each mesh on the way has at most max_tets tetrahedra, or fewer than the mesh
+// before it. O(n log n) in the front's supercubes.
 void balance(Front& front, std::uint64_t max_tets, const Importance& importance);
 
-// Splits of a front that matter least, as many as `count` and in no more than max_supercubes, with no child that is not among them: what
-// Front::forget undoes all of. Keys ascending.
+// The least important splits of a front: `count` of them, or those of max_supercubes supercubes if these have fewer.
+// All children of a split in the result are in it too, so Front::forget undoes every one. Keys ascending.
 [[nodiscard]] std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, std::size_t max_supercubes,
                                                      const Importance& importance);
 

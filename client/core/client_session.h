@@ -52,7 +52,8 @@ class ClientSession {
     std::string server = "the server";            // its name in errors
     std::optional<std::uint64_t> max_bytes = {};  // of all messages received; only an Opened may exceed it
     std::optional<std::uint64_t> window = {};     // the most credit outstanding; off: adapts to the connection
-    bool has_mesh = true;                         // false: batches are counted but not decoded, and no session is resumed
+    // False: batches are counted but not decoded, and no session is resumed.
+    bool has_mesh = true;
   };
 
   struct Stats {

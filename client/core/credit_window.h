@@ -41,7 +41,8 @@ class CreditWindow {
   // Measurements of the connection. Of the round trips of a session the least counts.
   void note_round_trip(Clock::duration time) { round_trip_ = std::min(round_trip_, time); }
   void note_batch(std::uint64_t cost, Clock::time_point now);
-  void note_pause() { measured_since_.reset(); }  // nothing more is on its way: the time until the next batch does not count
+  // Nothing more is on its way: the time until the next batch does not count.
+  void note_pause() { measured_since_.reset(); }
 
   // The session is over: credit that was not spent returns to the budget.
   void end_session() {
@@ -50,7 +51,8 @@ class CreditWindow {
     round_trip_ = kMaxRoundTrip;
     note_pause();
   }
-  [[nodiscard]] bool is_exhausted() const { return budget_left_ == 0 && outstanding_ < protocol::kMinCredit; }  // no batch will come
+  // No batch will come.
+  [[nodiscard]] bool is_exhausted() const { return budget_left_ == 0 && outstanding_ < protocol::kMinCredit; }
   [[nodiscard]] std::uint64_t window() const { return window_; }
 
  private:

@@ -26,7 +26,7 @@ Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uin
   const std::uint64_t before = updates();
   const auto applied = apply_batch(front_, payload, budget_.max_tets);
   if (!applied) return tl::unexpected(applied.error());
-  if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than there is room for");
+  if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than the room that the view names");
   rebalance();
   return {};
 }

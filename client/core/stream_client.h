@@ -1,4 +1,4 @@
-// The client's side of a stream, without I/O: descriptions and batches in, a mesh out. It never sees the field.
+// A mesh that grows with the batches of a stream. No I/O; the client never has the field.
 #pragma once
 
 #include <cstdint>
@@ -15,42 +15,47 @@
 
 namespace intervale {
 
-// What a client keeps at most.
+// The most that a client keeps.
 struct Budget {
-  std::uint64_t max_tets = ~std::uint64_t(0);     // in its mesh
-  std::uint64_t max_updates = ~std::uint64_t(0);  // in the mesh and beside it; some 30 bytes each. The server is to be told, as View::room.
+  std::uint64_t max_tets = ~std::uint64_t(0);  // in its mesh
+  // In the mesh or hidden, some 30 bytes each; the server learns it as View::room.
+  std::uint64_t max_updates = ~std::uint64_t(0);
   friend bool operator==(const Budget&, const Budget&) = default;
 };
 
 class StreamClient {
  public:
-  // Takes a description from outside: everything in it is checked. The mesh is then the root's patch.
+  // Checks everything in a description from outside. The mesh is then the patch of the root.
   static Result<StreamClient> start(Description description, const Budget& budget = {});
 
-  // Applies one batch: the payload of a Batch, and the epoch of the view that it is for. After every successful call the mesh is conforming. A
-  // payload that is damaged, or does not fit what came so far, is an error, and this object must not be used again. Where the mesh has no room for
-  // more below max_tets, what comes is kept; in the mesh stays what came first, or once look() was called, what matters most.
+  // Applies one batch: the payload of a Batch, and the epoch of its view. The mesh is conforming after each successful
+  // call. A payload that is damaged, or does not fit the batches before it, is an error; this object must not be used
+  // again then. Updates that the mesh has no room for within max_tets are kept, but hidden: those that came last or,
+  // once look() was called, the least important ones.
   Result<void> apply(std::span<const std::uint8_t> payload, std::uint64_t epoch = 0);
 
-  // Where the mesh is seen from, from now on. camera: one that check_lod lets pass.
+  // Where the mesh is seen from now on. camera: one that check_lod accepts.
   void look(const Camera& camera);
 
-  // From now on, max_tets; from the first answer to the view of this epoch on, max_updates too if that is fewer than before.
+  // Takes effect at once; but a lower max_updates only with the first answer to the view of this epoch, since the
+  // server fills the old one until it has that view.
   void set_budget(const Budget& budget, std::uint64_t epoch);
 
-  // What the View of this epoch is to forget, so that a quarter of max_updates is free for what it wants: what matters least, of no more than
-  // max_supercubes. Nothing while so much is free, or while the answer to an earlier one has not come, or before look(). It is kept until
-  // arrived(epoch): what is on its way was made for a client that has it.
+  // The least important updates, of at most max_supercubes supercubes: what the View of this epoch is to forget so that
+  // a quarter of max_updates is free for what it wants. Empty while so much is free, before the answer to an earlier
+  // View that forgets, and before look(). The updates stay until arrived(epoch): batches on their way were encoded for
+  // a client that has them.
   [[nodiscard]] std::vector<SlotGroup> give_up(std::uint64_t epoch, std::size_t max_supercubes);
-  // A Done of this epoch has come, or a Batch: apply() does the same.
+  // A Done or a Batch of this epoch has arrived. apply() does the same.
   void arrived(std::uint64_t epoch);
 
-  [[nodiscard]] bool over_budget() const;       // not all that came is in the mesh
-  [[nodiscard]] std::uint64_t updates() const;  // that came so far
+  // Some updates are hidden, or the patch of the root alone exceeds max_tets.
+  [[nodiscard]] bool over_budget() const;
+  [[nodiscard]] std::uint64_t updates() const;  // in the mesh or hidden
   [[nodiscard]] std::uint64_t updates_in_mesh() const;
-  [[nodiscard]] std::uint64_t tet_count() const;  // of the mesh now; O(1)
+  [[nodiscard]] std::uint64_t tet_count() const;  // O(1)
   [[nodiscard]] const Description& description() const;
-  // What another session is to resume with; see Front::splits. What was to be given up in the last one stays.
+  // The updates that another session resumes with; see Front::splits. None of them is given up any more.
   [[nodiscard]] std::vector<SlotGroup> resume() {
     forget_.clear();
     return front_.splits();
@@ -70,9 +75,9 @@ class StreamClient {
     std::uint64_t epoch = 0, max_updates = 0;
   };
   std::optional<LessRoom> less_room_;
-  Importance importance_;          // of what is looked at; none before
-  std::vector<SlotGroup> forget_;  // with the first answer to the view of this epoch
-  std::uint64_t forget_epoch_ = 0;
+  Importance importance_;           // empty before look()
+  std::vector<SlotGroup> forget_;   // to be forgotten with the first answer to
+  std::uint64_t forget_epoch_ = 0;  // ... the view of this epoch
 };
 
 }  // namespace intervale

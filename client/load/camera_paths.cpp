@@ -12,9 +12,9 @@ using Vector = std::array<double, 3>;
 
 constexpr double kTurnSeconds = 20;
 constexpr double kZoomSeconds = 10;    // there and back
-constexpr double kNearest = 0.05;      // to a point looked at; in radii of the box
-constexpr double kSteepest = 1.0;      // of an orbit above or below the box's middle, radians
-constexpr double kMargin = 1.05;       // around a box that is in sight as a whole
+constexpr double kNearest = 0.05;      // least distance from a point looked at, in radii of the box
+constexpr double kSteepest = 1.0;      // greatest elevation of an orbit, in radians
+constexpr double kMargin = 1.05;       // around a box that is in the picture as a whole
 constexpr std::uint64_t kPerView = 8;  // random numbers that a view may take
 
 Vector along(const Vector& from, const Vector& direction, double distance) {
@@ -31,17 +31,17 @@ struct Ball {
   }
 };
 
-// How far from the middle of a ball of radius 1 a camera sees all of it, in both directions of its picture.
+// The distance from the centre of a ball of radius 1 at which the camera sees all of it, in width and in height.
 double distance_to_see_all(const Camera& camera) {
-  const double up = camera.fov * std::numbers::pi / 360;  // half of what it sees
+  const double up = camera.fov * std::numbers::pi / 360;  // half of the angle of view
   const double aside = std::atan(std::tan(up) * camera.viewport[0] / camera.viewport[1]);
   return kMargin / std::sin(std::min(up, aside));
 }
 
-// Any direction but those close to the line of sight would do: the vertical one where possible.
+// Any direction that is not close to the line of sight works: the vertical one if possible.
 Vector up_for(const Vector& direction) { return std::abs(direction[1]) < 0.9 ? Vector{0, 1, 0} : Vector{0, 0, 1}; }
 
-// Evenly spread over the sphere.
+// A direction, spread evenly over the sphere for height and turn in [0, 1].
 Vector direction_of(double height, double turn) {
   const double y = 2 * height - 1;
   const double angle = 2 * std::numbers::pi * turn;
@@ -63,7 +63,8 @@ void orbit(Camera& camera, const CameraPath& path, const Ball& ball, double seco
 }
 
 void zoom(Camera& camera, const CameraPath& path, const Ball& ball, double seconds) {
-  // A point on one of the six sides; it is approached from outside, in steps of equal ratio, so that the screen changes as much with each.
+  // A point on one of the six sides, approached from outside. The distance shrinks by equal ratios, so that each step
+  // changes the picture equally.
   Vector point{};
   for (std::size_t i = 0; i < 3; ++i) point[i] = std::lerp(path.box.min[i], path.box.max[i], random_fraction(path.seed, i));
   const auto side = std::size_t(6 * random_fraction(path.seed, 3));
@@ -88,7 +89,7 @@ void jump(Camera& camera, const CameraPath& path, const Ball& ball, std::uint64_
 
 }  // namespace
 
-// Sebastiano Vigna, splitmix64: enough for angles, and the same everywhere, which the standard's distributions are not.
+// Sebastiano Vigna, splitmix64. Good enough for angles, and the same on every platform, unlike std distributions.
 double random_fraction(std::uint64_t seed, std::uint64_t number) {
   std::uint64_t x = seed * 0xd1342543de82ef95u + (number + 1) * 0x9e3779b97f4a7c15u;
   x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;

@@ -1,4 +1,4 @@
-// Where the clients of a load look from: pure functions of a seed and the number of a view.
+// The cameras of the clients of a load: pure functions of a seed and the number of a view.
 #pragma once
 
 #include <array>
@@ -10,10 +10,10 @@
 namespace intervale {
 
 enum class Scenario : std::uint8_t {
-  full,   // no camera: one view of error 0, the whole stream
-  orbit,  // around the box's centre at a seeded height, the whole box in sight: one turn in 20 s
-  zoom,   // from where the whole box is in sight to a seeded point on its surface and back, in 10 s
-  jump,   // from anywhere outside, far or close, at any point of the box, anew with each view
+  full,   // no camera: one view with error 0, which is the whole stream
+  orbit,  // around the centre of the box at a seeded height, with the whole box in the picture: one turn in 20 s
+  zoom,   // from where the whole box is in the picture to a seeded point on its surface and back, in 10 s
+  jump,   // with each view to a random place outside, far or near, looking at a random point of the box
 };
 
 struct CameraPath {
@@ -22,13 +22,14 @@ struct CameraPath {
   std::array<int, 2> viewport{1920, 1080};
   double pixel_error = 2;
   double views_per_second = 5;
-  std::uint64_t seed = 0;  // a client's own: it decides angles, points and distances
+  std::uint64_t seed = 0;  // of one client; it determines angles, points and distances
 };
 
-// View number 0, 1, 2, … of the path. Equal arguments give equal levels of detail, on every machine to rounding; all of them pass check_lod.
+// View number 0, 1, 2, … of the path. Equal arguments give equal levels of detail, up to rounding on other machines.
+// check_lod accepts all of them.
 [[nodiscard]] Lod view_of(const CameraPath& path, std::uint64_t number);
 
-// A number that looks random, in [0, 1). Equal for equal arguments.
+// A pseudo-random number in [0, 1), equal for equal arguments.
 [[nodiscard]] double random_fraction(std::uint64_t seed, std::uint64_t number);
 
 }  // namespace intervale

@@ -231,7 +231,8 @@ void LoadClient::report() {
 
 std::optional<StreamClient> LoadClient::take_mesh() {
   const Description* description = session_.description();
-  if (description && description->content_hash != plan_.description.content_hash) return {};  // nothing to compare it with
+  // Nothing to compare it with.
+  if (description && description->content_hash != plan_.description.content_hash) return {};
   return std::move(session_).take_mesh();
 }
 

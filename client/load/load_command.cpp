@@ -25,8 +25,8 @@ struct LoadCommand {
   bool json = false;
 };
 
-// "3 of 50 clients failed (cannot connect …)": what makes this a failure, or nothing.
-Result<void> verdict(const LoadReport& report) {
+// An error if clients failed, with the most frequent reason, or if meshes differ.
+Result<void> check_report(const LoadReport& report) {
   const LoadStats& stats = report.stats;
   if (stats.failed > 0) {
     const auto most = std::ranges::max_element(stats.errors, {}, [](const auto& error) { return error.second; });
@@ -41,14 +41,14 @@ Result<void> run(const LoadCommand& options) {
   auto url = parse_url(options.url);
   if (!url) return tl::unexpected(url.error());
   url->access = options.access;
-  if (url->name.empty()) return misuse("which data set? " + url->server() + "/NAME is wanted; see intervale-client list " + url->server());
+  if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
   const auto report = run_load(*url, options.load);
   if (!report) return tl::unexpected(report.error());
   if (auto printed = options.json ? print_json(to_json(*report)) : print(to_text(*report)); !printed) return printed;
-  return verdict(*report);
+  return check_report(*report);
 }
 
-// The parser reads "nan" and "inf" as numbers, and wraps -1 around for those that cannot be negative: this refuses all of them.
+// Refuses "nan" and "inf", which the parser reads as numbers, and -1, which it converts to a large unsigned number.
 CLI::Option* within(CLI::Option* option, double least, double most, const std::string& unit) {
   return option
       ->check([least, most](const std::string& text) {
@@ -66,42 +66,45 @@ void add_seconds(CLI::App& app, const std::string& name, std::chrono::duration<d
   within(option, least, 1e6, "SECONDS");
 }
 
-void add_views(CLI::App& app, LoadOptions& load) {
+void add_view_options(CLI::App& app, LoadOptions& load) {
   const auto group = "Views";
   const std::map<std::string, Scenario> scenarios{
       {"full", Scenario::full}, {"orbit", Scenario::orbit}, {"zoom", Scenario::zoom}, {"jump", Scenario::jump}};
   app.add_option_function<std::string>(
          "--scenario", [&load, scenarios](const std::string& name) { load.scenario = scenarios.at(name); },
-         "full: the whole stream, once; orbit (default): around the box; zoom: to a point on it and back; jump: anywhere with each view")
+         "full: the whole stream, once; orbit (default): around the box; zoom: to a point on the box and back; jump: to a random place with "
+         "each view")
       ->check([scenarios](const std::string& name) { return std::string(scenarios.contains(name) ? "" : "must be full, orbit, zoom or jump"); })
       ->type_name("full|orbit|zoom|jump")
       ->group(group);
-  within(app.add_option("--views-per-second", load.views_per_second, "New views of each client; not for full")->capture_default_str(), 0.001, 1000,
-         "N")
+  within(app.add_option("--views-per-second", load.views_per_second, "Views that each client sends a second; not for full")->capture_default_str(),
+         0.001, 1000, "N")
       ->group(group);
-  within(app.add_option("--pixel-error", load.pixel_error, "How far surfaces may be off on a screen of 1920 x 1080, in pixels; less is more load")
+  within(app.add_option("--pixel-error", load.pixel_error,
+                        "Error of the surfaces that clients accept on a screen of 1920 x 1080, in pixels; less is more load")
              ->capture_default_str(),
          0.001, 10000, "PX")
       ->group(group);
-  within(app.add_option("--seed", load.seed, "Decides where clients look from")->capture_default_str(), 0, 9007199254740992.0, "N")->group(group);
+  within(app.add_option("--seed", load.seed, "Seed of the cameras: equal seeds give equal views")->capture_default_str(), 0, 9007199254740992.0, "N")
+      ->group(group);
 }
 
-void add_line(CLI::App& app, LoadOptions& load) {
+void add_connection_options(CLI::App& app, LoadOptions& load) {
   const auto group = "Connections";
-  add_seconds(app, "--ramp", load.ramp, 0, "Clients connect spread evenly over this time (default 1, or the duration if that is less)");
+  add_seconds(app, "--ramp", load.ramp, 0, "The clients connect spread evenly over this time (default 1, or the duration if that is less)");
   app.get_option("--ramp")->group(group);
-  add_seconds(app, "--patience", load.patience, 0.1, "A client that is not connected, or has no WebSocket, after so long has failed (default 10)");
+  add_seconds(app, "--patience", load.patience, 0.1, "Longest time to connect, and to open the WebSocket; then the client has failed (default 10)");
   app.get_option("--patience")->group(group);
   within(app.add_option_function<std::uint64_t>(
-             "--rate", [&load](std::uint64_t bytes) { load.rate = bytes; }, "Bytes a second that each client reads at most; default: no limit"),
+             "--rate", [&load](std::uint64_t bytes) { load.rate = bytes; }, "Most bytes a second that each client reads (default: no limit)"),
          1024, 1e12, "BYTES_PER_S")
       ->group(group);
   within(app.add_option_function<std::uint64_t>(
              "--window", [&load](std::uint64_t bytes) { load.window = bytes; },
-             "Credit in bytes that each client has outstanding at most: so much may come of an older view; default: by the line, as clients do"),
+             "Most outstanding credit of each client, in bytes: so much of an older view may still arrive (default: adapts to the connection)"),
          4 * double(protocol::kMinCredit), double(protocol::kMaxWindow), "BYTES")
       ->group(group);
-  within(app.add_option("--threads", load.threads, "Threads that the clients share; by default half of the cores"), 1, 256, "N")->group(group);
+  within(app.add_option("--threads", load.threads, "Threads that run the clients (default: half of the cores)"), 1, 256, "N")->group(group);
 }
 
 }  // namespace
@@ -112,27 +115,27 @@ void add_load_command(Program& program) {
   load.threads = std::max(1u, std::thread::hardware_concurrency() / 2);
   CLI::App& app = program.only_command([options] { return run(*options); });
   app.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
-  within(app.add_option("--clients", load.clients, "Clients at once")->required(), 1, 1e6, "N");
-  add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent; answers are waited for 2 s more at most");
+  within(app.add_option("--clients", load.clients, "Number of clients that run at once")->required(), 1, 1e6, "N");
+  add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent; answers may arrive up to 2 s later");
   app.get_option("--duration")->required();
-  add_views(app, load);
-  add_line(app, load);
+  add_view_options(app, load);
+  add_connection_options(app, load);
   const auto verify = app.add_flag(
-      "--verify", load.verify, "Apply all that comes, and compare every mesh with one of the whole stream; takes a mesh's memory for each client");
+      "--verify", load.verify, "Apply the batches, and compare every mesh with that of the whole stream; takes the memory of a mesh for each client");
   within(app.add_option_function<std::uint64_t>(
              "--max-tets", [&load](std::uint64_t tets) { load.budget.max_tets = tets; },
-             "With --verify: the most tetrahedra that each mesh may have; it keeps what is largest on the client's screen"),
+             "With --verify: most tetrahedra of each mesh; it keeps what is largest on the client's screen"),
          0, 1e15, "N")
       ->needs(verify);
   within(app.add_option_function<std::uint64_t>(
              "--max-kept", [&load](std::uint64_t updates) { load.budget.max_updates = updates; },
-             "With --verify: the most updates that each client keeps, in its mesh or beside it, at some 30 bytes; what is least is forgotten at both "
-             "ends"),
+             "With --verify: most updates that each client keeps, some 30 bytes each; it gives up the least important ones, and the server sends "
+             "them again when needed"),
          0, 1e15, "N")
       ->needs(verify);
   within(app.add_option_function<double>(
              "--reconnect", [&load](double seconds) { load.reconnect = std::chrono::duration<double>(seconds); },
-             "With --verify: a client that has lost its server looks for it again that long, and resumes with what it has; default: it has failed"),
+             "With --verify: how long a client tries to reach a lost server again, to resume (default: the client has failed)"),
          0.1, 1e6, "SECONDS")
       ->needs(verify);
   add_access_options(app, options->access);

@@ -1,4 +1,4 @@
-// The one command of intervale-load.
+// The command line of intervale-load.
 #pragma once
 
 #include "common/program/program.h"

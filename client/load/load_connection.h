@@ -1,4 +1,4 @@
-// How a client of a load comes to its server: connecting, and connecting again. Internal to client/load: brings in Asio.
+// The connection of a client of a load, which may be lost and opened again. Internal to client/load: brings in Asio.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -22,18 +22,19 @@ class LoadConnection {
   using Endpoints = boost::asio::ip::tcp::resolver::results_type;
   using WebSocket = boost::beast::websocket::stream<Stream>;
 
-  // All of them outlive this. seed: of the pauses between attempts.
+  // All references outlive this. seed: of the pauses between attempts.
   LoadConnection(boost::asio::io_context& io, const Endpoints& endpoints, const LoadPlan& plan, std::uint64_t seed);
 
-  // Opens the first WebSocket, within the plan's patience each for connecting and for the handshake. False: complaint() says why not.
+  // Opens the first WebSocket. Connecting and the handshake may each take the plan's patience. False: complaint() says
+  // why it failed.
   boost::asio::awaitable<bool> open();
-  // Another one in its place, once lose() was called: tries until the plan's time for it is over, then false, and complaint() is again what lose()
-  // was told. Wants a plan with such a time.
+  // After lose(): opens another one in its place. It tries for LoadPlan::reconnect, which must be given. False: the
+  // time is over, and complaint() is the reason given to lose().
   boost::asio::awaitable<bool> open_again();
 
   void lose(const std::string& why);  // and cut()
-  void cut();                         // what is under way on the WebSocket fails
-  void give_up();                     // cut(), and open_again() ends, if it is under way, with false
+  void cut();                         // closes the socket: pending operations fail
+  void give_up();                     // cut(); open_again() returns false
 
   [[nodiscard]] WebSocket& websocket() { return *websocket_; }               // another one after open_again()
   [[nodiscard]] const std::string& complaint() const { return complaint_; }  // why there is no connection; one line

@@ -1,4 +1,4 @@
-// What the clients of a load are to do, and how far they are.
+// What the clients of a load do, and their progress.
 #pragma once
 
 #include <atomic>
@@ -18,30 +18,31 @@ class TlsContext;
 
 using LoadClock = std::chrono::steady_clock;
 
-inline constexpr std::chrono::milliseconds kLate{5};  // a view sent later than this is a late one
-inline constexpr std::chrono::seconds kGrace{2};      // after the duration, for answers on their way
+inline constexpr std::chrono::milliseconds kLate{5};  // a view sent so much after it was due counts as late
+inline constexpr std::chrono::seconds kGrace{2};      // to wait for answers after the duration
 
 struct LoadPlan {
   ServerUrl url;
-  std::shared_ptr<const TlsContext> tls;  // if the URL says so
-  Description description;                // of the data set: every client is to be told the same
-  CameraPath path;                        // with the run's seed, from which the clients' are made
+  std::shared_ptr<const TlsContext> tls;  // with wss://
+  Description description;                // of the data set; each client must receive the same
+  CameraPath path;                        // with the seed of the run, which the seeds of the clients derive from
   unsigned clients = 1;
   LoadClock::time_point start;  // of the first client
   LoadClock::duration duration{};
-  LoadClock::duration ramp{};           // the clients' starts are spread over it evenly
-  std::optional<std::uint64_t> rate;    // bytes a second that a client reads, at least 1024; off: as fast as they come
-  std::optional<std::uint64_t> window;  // most credit that a client has outstanding; see CreditWindow
-  LoadClock::duration patience{};       // to be connected, for the WebSocket's handshake and for closing: each
-  bool verify = false;                  // apply what comes
-  Budget budget;                        // each client's, if it applies
-  // How long a client looks for a server again that it has lost; off: it has failed. Wants verify: one that applies nothing has nothing to resume
-  // with.
+  LoadClock::duration ramp{};           // the starts of the clients are spread evenly over it
+  std::optional<std::uint64_t> rate;    // bytes a second that a client reads, at least 1024; off: no limit
+  std::optional<std::uint64_t> window;  // the most outstanding credit of a client; see CreditWindow
+  // The longest time to connect, to do the WebSocket handshake, and to close: each.
+  LoadClock::duration patience{};
+  bool verify = false;  // apply the batches
+  Budget budget;        // of each client, with verify
+  // How long a client tries to reach a lost server again; off: the client has failed. Requires verify: without a mesh
+  // there is nothing to resume with.
   std::optional<LoadClock::duration> reconnect;
   [[nodiscard]] LoadClock::time_point end() const { return start + duration; }
 };
 
-// How far a run has come, for who watches it from another thread.
+// The progress of a run, to be read by another thread.
 struct LoadProgress {
   std::atomic<std::uint64_t> connected = 0;  // now
   std::atomic<std::uint64_t> updates = 0;

@@ -25,8 +25,8 @@
 namespace intervale {
 namespace {
 
-constexpr rlim_t kOtherFiles = 64;                      // besides the clients' sockets
-constexpr std::chrono::milliseconds kThreadsStart{20};  // time for threads and clients to be made before the first one is due
+constexpr rlim_t kOtherFiles = 64;                   // besides the clients' sockets
+constexpr std::chrono::milliseconds kStartTime{20};  // for threads and clients to start before the first client is due
 
 const char* name_of(Scenario scenario) {
   switch (scenario) {
@@ -42,10 +42,10 @@ const char* name_of(Scenario scenario) {
   return "";
 }
 
-// Each client has a socket.
+// Raises the limit of open files as far as allowed: each client has a socket.
 Result<void> allow_files(unsigned clients) {
   rlimit limit{};
-  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return {};  // the sockets will tell
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return {};  // then opening the sockets fails with a reason
   const rlim_t wanted = clients + kOtherFiles;
   if (limit.rlim_cur == RLIM_INFINITY || limit.rlim_cur >= wanted) return {};
   limit.rlim_cur = limit.rlim_max;
@@ -93,7 +93,7 @@ LoadPlan plan_of(const ServerUrl& url, const LoadOptions& options, const Descrip
   plan.verify = options.verify;
   plan.budget = options.budget;
   if (options.reconnect) plan.reconnect = ticks(*options.reconnect);
-  plan.start = LoadClock::now() + kThreadsStart;
+  plan.start = LoadClock::now() + kStartTime;
   return plan;
 }
 
@@ -104,16 +104,16 @@ double cpu_seconds(int whose) {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-// Threads that run clients, and what they bring back.
-class Crew {
+// Threads that run clients, and their results.
+class ThreadPool {
  public:
-  Crew(const LoadPlan& plan, unsigned threads) : meshes_(plan.clients), running_(threads) {
+  ThreadPool(const LoadPlan& plan, unsigned threads) : meshes_(plan.clients), running_(threads) {
     for (unsigned first = 0; first < threads; ++first) {
       threads_.emplace_back([this, &plan, first, threads] { work(plan, first, threads); });
     }
   }
 
-  // Once a second, says on a terminal how far it is; until all have ended.
+  // Shows the progress on a terminal once a second, until all threads have ended.
   void watch(const LoadPlan& plan) {
     Progress line("loading " + printable(plan.url.name));
     std::uint64_t updates = 0, bytes = 0;
@@ -188,15 +188,15 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   const double cpu_before = cpu_seconds(RUSAGE_SELF);
   LoadPlan plan = plan_of(url, options, *description);
   plan.tls = std::move(*tls);
-  Crew crew(plan, report.threads);
-  crew.watch(plan);
-  report.stats = crew.stats();
+  ThreadPool threads(plan, report.threads);
+  threads.watch(plan);
+  report.stats = threads.stats();
   const std::chrono::duration<double> wall = LoadClock::now() - plan.start;
   report.seconds = std::min(wall, options.duration).count();
   report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));
-  report.busiest_thread = crew.busiest_thread() / wall.count();
+  report.busiest_thread = threads.busiest_thread() / wall.count();
   if (reference) {
-    const auto [compared, differing] = verify_meshes(reference->front(), crew.meshes(), options.seed);
+    const auto [compared, differing] = verify_meshes(reference->front(), threads.meshes(), options.seed);
     report.verified = compared;
     report.differing = differing;
   }

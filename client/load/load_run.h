@@ -17,22 +17,24 @@ namespace intervale {
 struct LoadOptions {
   unsigned clients = 0;  // at least 1
   std::chrono::duration<double> duration{};
-  std::chrono::duration<double> ramp{1};  // within the duration; a longer one is cut to it
+  std::chrono::duration<double> ramp{1};  // at most the duration counts
   Scenario scenario = Scenario::orbit;
   double views_per_second = 5;
   double pixel_error = 2;
   std::uint64_t seed = 1;
   std::optional<std::uint64_t> rate;           // see LoadPlan
-  std::optional<std::uint64_t> window;         // off: goes by the line
-  std::chrono::duration<double> patience{10};  // to be connected, and then for the WebSocket's handshake
+  std::optional<std::uint64_t> window;         // off: adapts to the connection
+  std::chrono::duration<double> patience{10};  // see LoadPlan
   unsigned threads = 1;
-  bool verify = false;                                     // keeps a mesh for each client, and compares them all at the end: see verify_meshes
-  Budget budget;                                           // of each of those
+  // Keep a mesh for each client, and compare them at the end: see verify_meshes.
+  bool verify = false;
+  Budget budget;                                           // of each of these meshes
   std::optional<std::chrono::duration<double>> reconnect;  // see LoadPlan
 };
 
-// Asks the server about the data set, runs the clients, and compares. Blocks for the duration and a little. Fails where the run could not be made: no
-// server, no such data set, too few files allowed. Clients that fail later and meshes that differ are in the report.
+// Asks the server for the description, runs the clients, and compares meshes. Blocks for the duration and up to kGrace
+// and the patience. Fails if the run is not possible: no server, no such data set, too few open files allowed. Clients
+// that fail later and meshes that differ are in the report.
 [[nodiscard]] Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options);
 
 }  // namespace intervale

@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Keeps JSON readable: no digits beyond what a clock tells.
+// Keeps JSON readable: no digits below the resolution of the clock.
 double rounded(double value) { return std::round(value * 1000) / 1000; }
 
 Json to_json(const std::vector<double>& samples) {
@@ -122,7 +122,7 @@ std::string to_text(const LoadReport& report) {
       f.views, f.done_views, f.late_views, f.unanswered_views, 100 * report.own_cpu_share, 100 * report.busiest_thread);
   if (f.reconnects > 0) {
     text += line_of("resumed within", f.resume_ms, "ms");
-    text += fmt::format("{} sessions resumed; {} sent to say what clients had; {} updates, and {} in all, came twice\n", f.reconnects,
+    text += fmt::format("{} sessions resumed; {} sent to name the updates of clients; {} updates, and {} in all, received twice\n", f.reconnects,
                         human_bytes(f.resume_bytes), f.repeated_updates, human_bytes(f.repeated_bytes));
   }
   if (report.verified) text += fmt::format("{} meshes compared, {} differ\n", *report.verified, report.differing);

@@ -48,13 +48,14 @@ void LoadViews::serve(std::uint64_t epoch, Time now) {
   if (lost_at_) stats_.resume_ms.push_back(milliseconds(now - *std::exchange(lost_at_, {})));
   for (; !pending_.empty() && pending_.front().epoch <= epoch; pending_.pop_front()) {
     stats_.view_change_ms.push_back(milliseconds(now - pending_.front().due));
-    if (!is_only_one()) stats_.stale_bytes.push_back(double(pending_.front().stale_bytes));  // the first one replaces none
+    // The first one replaces none.
+    if (!is_only_one()) stats_.stale_bytes.push_back(double(pending_.front().stale_bytes));
   }
 }
 
 void LoadViews::finish(std::uint64_t epoch, bool is_all, Time now) {
   ++stats_.done_views;
-  has_mesh_ = true;  // if it has none, there is none
+  has_mesh_ = true;  // if it is empty now, it stays so
   is_complete_ = is_all && epoch == epoch_;
   serve(epoch, now);
 }

@@ -20,9 +20,9 @@ using asio::ip::tcp;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
-asio::awaitable<void> end_in_time(asio::steady_timer& timer, const LoadPlan& plan, std::vector<std::unique_ptr<LoadClient>>& clients) {
+asio::awaitable<void> end_on_time(asio::steady_timer& timer, const LoadPlan& plan, std::vector<std::unique_ptr<LoadClient>>& clients) {
   timer.expires_at(plan.end());
-  if (const auto [error] = co_await timer.async_wait(kAwait); error) co_return;  // all have ended already
+  if (const auto [error] = co_await timer.async_wait(kAwait); error) co_return;  // all clients have ended already
   for (const auto& client : clients) {
     if (client) client->end_views();
   }
@@ -50,11 +50,11 @@ LoadStats run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::
     asio::co_spawn(io, clients[i]->run(), [&, i](const std::exception_ptr& thrown) {
       if (thrown) failure = thrown;
       if (plan.verify) meshes[first + i * step] = clients[i]->take_mesh();
-      clients[i].reset();  // a WebSocket that was cut off keeps its timer running, and with it the io_context, for as long as it is there
+      clients[i].reset();  // the timer of a closed WebSocket would keep the io_context running
       if (--running == 0) end.cancel();
     });
   }
-  asio::co_spawn(io, end_in_time(end, plan, clients), [&](const std::exception_ptr& thrown) {
+  asio::co_spawn(io, end_on_time(end, plan, clients), [&](const std::exception_ptr& thrown) {
     if (thrown) failure = thrown;
   });
   io.run();

@@ -1,4 +1,4 @@
-// The clients of a load: see LoadViews for what of them is measured, and how.
+// The clients of a load on one thread. LoadViews explains what is measured, and how.
 #pragma once
 
 #include <optional>
@@ -10,9 +10,10 @@
 
 namespace intervale {
 
-// Runs clients number `first`, `first + step`, … of the plan on this thread, until the last has closed: at most kGrace and the plan's patience after
-// its end. meshes: a place for each of the plan's clients, filled if the plan says verify, left empty where a batch did not apply; other threads may
-// fill other places meanwhile. Throws where the machine fails, the host cannot be found for one.
+// Runs clients number `first`, `first + step`, … of the plan on this thread until the last one has closed, at most
+// kGrace and the plan's patience after the end of the plan. meshes: a place for each of the plan's clients, filled if
+// the plan says verify, left empty if a batch was invalid; other threads may fill other places meanwhile. Throws on
+// failures of the machine, and if the host is not found.
 [[nodiscard]] LoadStats run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<StreamClient>> meshes,
                                     LoadProgress& progress);
 

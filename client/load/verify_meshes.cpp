@@ -12,9 +12,9 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kWhole = 4;  // meshes compared themselves
+constexpr std::size_t kWhole = 4;  // meshes that are compared point by point
 
-// A mesh without its numbers.
+// A mesh, independent of how its points and tetrahedra are numbered.
 struct Canonical {
   std::vector<std::pair<std::array<double, 3>, Surface>> points;  // ascending
   std::vector<std::array<std::uint32_t, 4>> tets;                 // of these points, each ascending, ascending
@@ -35,7 +35,7 @@ Canonical::Canonical(const Mesh& mesh) {
   for (const auto& tet : mesh.tets) {
     std::array<std::uint32_t, 4> named{};
     std::ranges::transform(tet, named.begin(), [&rank](std::uint32_t i) { return rank[i]; });
-    std::ranges::sort(named);  // which way round it goes follows from its points: it is positive
+    std::ranges::sort(named);  // all tetrahedra are positive, so the points determine the orientation
     tets.push_back(named);
   }
   std::ranges::sort(tets);

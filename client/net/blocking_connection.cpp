@@ -23,14 +23,14 @@ Result<std::shared_ptr<const TlsContext>> tls_for(const ServerUrl& url) {
 std::string tls_failure(const Stream& stream, const ServerUrl& url, const error_code& error) {
   const std::string who = "cannot trust the server at " + url.authority() + ": ";
   if (const std::string why = stream.tls()->verify_error(); !why.empty()) return who + why + "; --ca FILE names certificates to trust";
-  return "cannot speak TLS with " + url.authority() + ": " + error.message() + "; is it a server without TLS (ws://)?";
+  return "TLS handshake failed with " + url.authority() + ": " + error.message() + "; is it a server without TLS (ws://)?";
 }
 
 std::string http_failure(const ServerUrl& url, const error_code& error) {
   using boost::beast::http::error::bad_version, boost::beast::http::error::end_of_stream, boost::beast::http::error::partial_message;
-  // A server with TLS ends the connection, or sends a few bytes that are no HTTP before.
+  // A server with TLS ends the connection, perhaps after a few bytes that are not HTTP.
   const bool no_http = error == end_of_stream || error == partial_message || error == bad_version || error == boost::asio::error::connection_reset;
-  return url.authority() + " is not an intervale server: " + error.message() + (no_http && !url.secure ? "; does it want wss://?" : "");
+  return url.authority() + " is not an intervale server: " + error.message() + (no_http && !url.secure ? "; does it require wss://?" : "");
 }
 
 Result<void> connect(BlockingRun& run, Stream& stream, const ServerUrl& url) {

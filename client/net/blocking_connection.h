@@ -1,4 +1,4 @@
-// A connection to a server, for those that block. Internal to client/net: brings in Asio.
+// Blocking connections to a server. Internal to client/net and client/load: brings in Asio.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -15,13 +15,14 @@
 
 namespace intervale {
 
-// An io_context that one operation at a time is run on, to its end.
+// An io_context that runs one asynchronous operation at a time, to its end.
 class BlockingRun {
  public:
   using Error = boost::system::error_code;
   [[nodiscard]] boost::asio::io_context& io() { return io_; }
 
-  // start(done) starts it, with a handler whose first argument is the error. The operation has a deadline of its own.
+  // start(done) starts an operation that has a deadline of its own. done is its handler; the first argument is the
+  // error.
   template <class Start>
   Error operator()(Start start) {
     Error result;
@@ -36,7 +37,7 @@ class BlockingRun {
     return result;
   }
 
-  // One that has none: the stream is cut if it takes longer, and the error is beast::error::timeout.
+  // For an operation without a deadline: if it takes longer, closes the stream and returns beast::error::timeout.
   template <class Start>
   Error within(std::chrono::milliseconds time, Stream& stream, Start start) {
     boost::asio::steady_timer timer(io_, time);
@@ -48,7 +49,7 @@ class BlockingRun {
     });
     const Error error = (*this)(start);
     timer.cancel();
-    io_.poll();  // what the timer still says refers to this call
+    io_.poll();  // the handler of the timer refers to this call
     return late ? Error(boost::beast::error::timeout) : error;
   }
 
@@ -56,16 +57,16 @@ class BlockingRun {
   boost::asio::io_context io_{1};
 };
 
-// Resolves, connects and, where the URL says so, shakes hands for TLS: within kConnectTime each.
+// Resolves the host, connects and, for wss://, does the TLS handshake: within kConnectTime each.
 [[nodiscard]] Result<void> connect(BlockingRun& run, Stream& stream, const ServerUrl& url);
 
-// What a client of that URL needs; nullptr without TLS.
+// The TLS context for a URL; nullptr for ws://.
 [[nodiscard]] Result<std::shared_ptr<const TlsContext>> tls_for(const ServerUrl& url);
 
-// "…: certificate has expired; …", if that is what went wrong, or else the error.
+// The text for a failed TLS handshake: why the certificate was refused, if that is the reason; else the error.
 [[nodiscard]] std::string tls_failure(const Stream& stream, const ServerUrl& url, const boost::system::error_code& error);
 
-// "…: is not an intervale server: end of stream; …": what went wrong with an HTTP request, and whether it looks as if TLS was wanted.
+// The text for a failed HTTP request. It asks for wss:// if the server seems to require TLS.
 [[nodiscard]] std::string http_failure(const ServerUrl& url, const boost::system::error_code& error);
 
 }  // namespace intervale

@@ -53,7 +53,7 @@ Result<void> StreamConnection::Socket::shake_hands() {
   }
   if (error) return fail(http_failure(url, error));
   if (response[http::field::sec_websocket_protocol] != protocol::kSubprotocol) {
-    return fail(url.authority() + " is not an intervale server: it does not speak " + protocol::kSubprotocol);
+    return fail(url.authority() + " is not an intervale server: it does not support " + protocol::kSubprotocol);
   }
   return {};
 }
@@ -66,7 +66,7 @@ tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) {
     return fail("the server at " + url.authority() + " closed the session with code " + std::to_string(reason.code));
   }
   if (error == websocket::error::message_too_big) return fail("the server at " + url.authority() + " sent a message larger than the protocol allows");
-  if (error == beast::error::timeout) return fail("lost the server at " + url.authority() + ": it fell silent");
+  if (error == beast::error::timeout) return fail("lost the server at " + url.authority() + ": it does not answer pings");
   return fail("lost the server at " + url.authority() + ": " + error.message());
 }
 
@@ -76,20 +76,20 @@ Error StreamConnection::Socket::faulted(const protocol::Fault& fault, const Erro
     return {"no data set '" + url.name + "' at " + url.server() + "; see intervale-client list " + url.server()};
   }
   if (fault.code == CloseCode::unauthorized) return unauthorized(url);
-  if (fault.code == CloseCode::forbidden) return {"the token given does not open '" + url.name + "' at " + url.server()};
+  if (fault.code == CloseCode::forbidden) return {"the token does not grant '" + url.name + "' at " + url.server()};
   return error;
 }
 
 Error unauthorized(const ServerUrl& url) {
-  if (url.access.token) return {"the server at " + url.authority() + " does not know the token given"};
-  return {"the server at " + url.authority() + " wants a token: --token or INTERVALE_TOKEN"};
+  if (url.access.token) return {"the server at " + url.authority() + " does not accept the token"};
+  return {"the server at " + url.authority() + " requires a token: --token or INTERVALE_TOKEN"};
 }
 
 Error turned_away(const ServerUrl& url, std::string_view body) {
   constexpr std::size_t kMost = 80;
   const std::string_view why = body.substr(0, std::min(body.find_first_of("\r\n"), kMost));
-  const bool told = !why.empty() && why.front() != '<';
-  return {"the server at " + url.authority() + " takes no new sessions now" + (told ? ": " + printable(why) : "")};
+  const bool is_reason = !why.empty() && why.front() != '<';
+  return {"the server at " + url.authority() + " accepts no new sessions now" + (is_reason ? ": " + printable(why) : "")};
 }
 
 StreamConnection::StreamConnection(std::unique_ptr<Socket> socket) : socket_(std::move(socket)) {}
@@ -117,7 +117,7 @@ Result<ClientSession::Event> StreamConnection::receive(ClientSession& session) {
   Socket& socket = *socket_;
   socket.buffer.clear();
   if (const auto error = socket.run([&](auto done) { socket.ws.async_read(socket.buffer, done); })) return socket.lost(error);
-  if (socket.ws.got_text()) return fail("the server at " + socket.url.authority() + " sent text, where only binary messages are spoken");
+  if (socket.ws.got_text()) return fail("the server at " + socket.url.authority() + " sent a text message; all messages are binary");
   const auto event =
       session.receive({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()}, ClientSession::Clock::now());
   if (!event && session.fault()) {

@@ -35,13 +35,15 @@ struct Fetched {
 };
 
 struct FetchEvents {
-  std::function<void(const StreamClient&, const FetchStats&)> on_batch;  // after each batch; the stream's seconds are not known yet
-  std::function<void(const std::string&)> on_notice;                     // one line that the user should read; the stream goes on
+  // After each batch; the stream's seconds are not known yet.
+  std::function<void(const StreamClient&, const FetchStats&)> on_batch;
+  // One line that the user should read; the stream goes on.
+  std::function<void(const std::string&)> on_notice;
 };
 
 // Connects, and receives until everything has arrived or a budget is reached. When the server is lost, connects again
-// after the pauses of Backoff, and resumes; if the data changed, starts again. Every other failure is an error that names
-// the server.
+// after the pauses of Backoff, and resumes; if the data changed, starts again. Every other failure is an error that
+// names the server.
 Result<Fetched> fetch(const ServerUrl& url, const FetchOptions& options, const FetchEvents& events);
 
 }  // namespace intervale

@@ -8,8 +8,9 @@
 
 namespace intervale {
 
-// The body that GET of target gives, at most 16 MiB. Failures: no connection within 5 s, a certificate that is not trusted, no answer within 10 s
-// more, a server that is not one of ours, a token that is wanted or does not do, a status other than 200.
+// The body of the answer to GET target, at most 16 MiB. Fails without a connection within 5 s, without an answer within
+// another 10 s, and on a certificate that is not trusted, a server that is not intervale, a missing or refused token,
+// or a status other than 200.
 [[nodiscard]] Result<std::string> http_get(const ServerUrl& url, const std::string& target);
 
 }  // namespace intervale

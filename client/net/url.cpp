@@ -16,7 +16,7 @@ struct Scheme {
 constexpr std::array<Scheme, 2> kSchemes{{{"ws://", false}, {"wss://", true}}};
 
 bool is_host(std::string_view host, bool bracketed) {
-  if (bracketed && host.find(':') == std::string_view::npos) return false;  // only an IPv6 address wants brackets
+  if (bracketed && host.find(':') == std::string_view::npos) return false;  // only an IPv6 address has brackets
   return !host.empty() && std::all_of(host.begin(), host.end(), [bracketed](unsigned char c) {
     return std::isalnum(c) != 0 || c == '.' || (bracketed ? c == ':' || c == '%' : c == '-' || c == '_');
   });
@@ -28,8 +28,8 @@ bool is_port(std::string_view port) {
   return failure == std::errc() && stop == port.data() + port.size() && number != 0;
 }
 
-// "a%20b" is "a b"; what is no escape stays as it is.
-std::string unescaped(std::string_view text) {
+// "a%20b" becomes "a b"; a % that starts no escape stays.
+std::string percent_decoded(std::string_view text) {
   std::string plain;
   for (std::size_t i = 0; i < text.size(); ++i) {
     unsigned char byte = 0;
@@ -47,7 +47,7 @@ std::string ServerUrl::authority() const { return (host.find(':') == std::string
 
 Result<ServerUrl> parse_url(std::string_view text) {
   const auto wrong = [text](const char* what) {
-    return misuse("cannot read the URL '" + std::string(text) + "': " + what + "; ws://host:port or ws://host:port/name is wanted");
+    return misuse("invalid URL '" + std::string(text) + "': " + what + "; expected ws://host:port or ws://host:port/name");
   };
   const auto* const scheme = std::find_if(kSchemes.begin(), kSchemes.end(), [text](const Scheme& one) { return text.starts_with(one.text); });
   if (scheme == kSchemes.end()) return wrong("it does not begin with ws:// or wss://");
@@ -59,16 +59,16 @@ Result<ServerUrl> parse_url(std::string_view text) {
     rest = rest.substr(0, slash);
   }
   if (!url.name.empty() && url.name.back() == '/') url.name.pop_back();
-  url.name = unescaped(url.name);
-  if (url.name.find('/') != std::string::npos) return wrong("a data set's name holds no slash");
+  url.name = percent_decoded(url.name);
+  if (url.name.find('/') != std::string::npos) return wrong("the name of a data set has no slash");
 
   const bool bracketed = rest.starts_with('[');
   const auto end = bracketed ? rest.find(']') : rest.find(':');
-  if (bracketed && end == std::string_view::npos) return wrong("a bracket is missing");
+  if (bracketed && end == std::string_view::npos) return wrong("a closing bracket is missing");
   url.host = bracketed ? rest.substr(1, end - 1) : rest.substr(0, end);
   rest = end == std::string_view::npos ? std::string_view() : rest.substr(bracketed ? end + 1 : end);
   url.port = rest.empty() ? (url.secure ? "443" : "80") : std::string(rest.substr(1));
-  if (!is_host(url.host, bracketed)) return wrong("the host is no name and no address");
+  if (!is_host(url.host, bracketed)) return wrong("the host is neither a name nor an address");
   if ((!rest.empty() && rest.front() != ':') || !is_port(url.port)) return wrong("the port is not 1 to 65535");
   return url;
 }

@@ -1,4 +1,4 @@
-// Where a server is, and which of its data sets is meant.
+// The URL of a server or of one of its data sets.
 #pragma once
 
 #include <filesystem>
@@ -10,16 +10,16 @@
 
 namespace intervale {
 
-// How to be let in; no part of a URL.
+// Access to a server; not part of the URL.
 struct Access {
   std::optional<std::string> token;
-  std::optional<std::filesystem::path> authorities;  // PEM: certificates to trust instead of the system's
+  std::optional<std::filesystem::path> authorities;  // PEM file of certificates to trust instead of the system's
 };
 
 struct ServerUrl {
   std::string host;     // a name or an address, without brackets
   std::string port;     // 1 to 65535, in digits
-  std::string name;     // the data set's; empty: none
+  std::string name;     // of the data set; empty: none is given
   bool secure = false;  // TLS
   Access access = {};
 
@@ -27,8 +27,9 @@ struct ServerUrl {
   [[nodiscard]] std::string server() const { return (secure ? "wss://" : "ws://") + authority(); }
 };
 
-// "ws://host:port" or "ws://host:port/name"; wss:// for TLS. An IPv6 address in brackets; port 80, or 443, if there is none. In the name "%20" is a
-// space and so on, as browsers write it; a % without two hexadecimal digits behind it is itself. Misuse: anything else.
+// Parses "ws://host:port" or "ws://host:port/name"; wss:// for TLS. An IPv6 address is in brackets. The default port is
+// 80, or 443 with TLS. The name is percent-decoded; a % without two hexadecimal digits after it stays. Anything else is
+// Error::usage.
 [[nodiscard]] Result<ServerUrl> parse_url(std::string_view text);
 
 }  // namespace intervale

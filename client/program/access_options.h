@@ -1,4 +1,4 @@
-// The options that say how to be let in, the same for every program that talks to a server.
+// The options for access to a server, the same for all client programs.
 #pragma once
 
 #include "client/net/url.h"
@@ -6,7 +6,7 @@
 
 namespace intervale {
 
-// --token (INTERVALE_TOKEN) and --ca (INTERVALE_CA). `access` must live until the options are read.
+// --token (INTERVALE_TOKEN) and --ca (INTERVALE_CA). `access` must outlive the parsing.
 void add_access_options(CLI::App& app, Access& access);
 
 }  // namespace intervale

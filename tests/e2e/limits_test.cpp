@@ -70,7 +70,7 @@ TEST(Server, TurnsSessionsAwayAtItsLimits) {
     EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
     const auto opened = StreamConnection::open(parse_url("ws://127.0.0.1:" + std::to_string(server->port())).value());
     ASSERT_FALSE(opened);
-    EXPECT_THAT(opened.error().message, EndsWith("takes no new sessions now: the server has no capacity for another session"));
+    EXPECT_THAT(opened.error().message, EndsWith("accepts no new sessions now: the server has no capacity for another session"));
     EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
   }
   options = {};

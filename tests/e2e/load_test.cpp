@@ -168,7 +168,7 @@ TEST(Load, AServerThatIsFullSaysSo) {
   const ServerProgram narrow(buckyball().string(), {"--max-sessions", "1"});
   const auto finished = run(command(narrow.url("buckyball"), {"--clients", "4", "--duration", "1"}));
   EXPECT_EQ(finished.status, 1);
-  EXPECT_THAT(finished.err, testing::EndsWith("takes no new sessions now: the server has no capacity for another session\n"));
+  EXPECT_THAT(finished.err, testing::EndsWith("accepts no new sessions now: the server has no capacity for another session\n"));
 }
 
 TEST(Load, ServersThatCannotBeLoadedAreOneLine) {

@@ -197,11 +197,11 @@ TEST(Programs, AServerThatTakesNobodySaysWhy) {
     EXPECT_EQ(finished.status, 1);
     return finished.err;
   };
-  EXPECT_THAT(complaint_about("loading\nmore"), testing::EndsWith("takes no new sessions now: loading\n"));
-  EXPECT_THAT(complaint_about("\x1b[2J"), testing::EndsWith("takes no new sessions now: ?[2J\n"));
-  EXPECT_THAT(complaint_about(std::string(500, 'x')), testing::EndsWith("takes no new sessions now: " + std::string(80, 'x') + "\n"));
-  EXPECT_THAT(complaint_about("<html>busy</html>"), testing::EndsWith("takes no new sessions now\n"));
-  EXPECT_THAT(complaint_about(""), testing::EndsWith("takes no new sessions now\n"));
+  EXPECT_THAT(complaint_about("loading\nmore"), testing::EndsWith("accepts no new sessions now: loading\n"));
+  EXPECT_THAT(complaint_about("\x1b[2J"), testing::EndsWith("accepts no new sessions now: ?[2J\n"));
+  EXPECT_THAT(complaint_about(std::string(500, 'x')), testing::EndsWith("accepts no new sessions now: " + std::string(80, 'x') + "\n"));
+  EXPECT_THAT(complaint_about("<html>busy</html>"), testing::EndsWith("accepts no new sessions now\n"));
+  EXPECT_THAT(complaint_about(""), testing::EndsWith("accepts no new sessions now\n"));
 }
 
 TEST(Programs, APortInUseIsOneLine) {

@@ -75,11 +75,11 @@ TEST(Programs, TokensLetInAndAreNeverTold) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   };
-  expect_complaint(fetch({}), 1, "wants a token: --token or INTERVALE_TOKEN");
-  expect_complaint(fetch({"--token", wrong}), 1, "does not know the token given");
-  expect_complaint(fetch({"--token", secret + "2"}), 1, "does not open 'buckyball'");
+  expect_complaint(fetch({}), 1, "requires a token: --token or INTERVALE_TOKEN");
+  expect_complaint(fetch({"--token", wrong}), 1, "does not accept the token");
+  expect_complaint(fetch({"--token", secret + "2"}), 1, "does not grant 'buckyball'");
   EXPECT_EQ(fetch({"--token", secret}).status, 0);
-  expect_complaint(run({client(), "list", server.url()}), 1, "wants a token");
+  expect_complaint(run({client(), "list", server.url()}), 1, "requires a token");
   folder.file("tokens", secret + "\n" + secret + "3 buckyball\n");
   EXPECT_TRUE(server.process().wait_for("reloaded the tokens"));
   EXPECT_EQ(fetch({"--token", secret + "3"}).status, 0);
