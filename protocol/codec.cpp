@@ -54,8 +54,7 @@ Body encode_body(FlatBufferBuilder& out, const View& message) {
   fbs::Camera camera;
   if (const auto& c = lod.camera)
     camera = fbs::Camera(to_vector(c->eye), to_vector(c->look_at), to_vector(c->up), c->fov, c->viewport[0], c->viewport[1], c->pixel_error);
-  const auto table = fbs::CreateLod(out, lod.error, percent, lod.roi ? &box : nullptr, to_wire(lod.max_tets), to_wire(lod.max_updates),
-                                    lod.camera ? &camera : nullptr);
+  const auto table = fbs::CreateLod(out, lod.error, percent, lod.roi ? &box : nullptr, to_wire(lod.max_updates), lod.camera ? &camera : nullptr);
   const auto forget = message.forget.empty() ? 0 : out.CreateVector(encode_splits(message.forget));
   return body(fbs::ClientBody::View, fbs::CreateView(out, message.epoch, table, to_wire(message.room), forget));
 }
@@ -117,12 +116,8 @@ Result<ClientMessage> decode_body(const fbs::Open& table) {
 
 Result<ClientMessage> decode_body(const fbs::View& table) {
   const fbs::Lod& wire = *table.lod();
-  Lod lod{.error = wire.error(),
-          .error_percent = from_wire(wire.error_percent()),
-          .roi = {},
-          .camera = {},
-          .max_tets = from_wire(wire.max_tets()),
-          .max_updates = from_wire(wire.max_updates())};
+  Lod lod{
+      .error = wire.error(), .error_percent = from_wire(wire.error_percent()), .roi = {}, .camera = {}, .max_updates = from_wire(wire.max_updates())};
   if (const auto* roi = wire.roi()) lod.roi = Box{to_array(roi->min()), to_array(roi->max())};
   if (const auto* c = wire.camera()) {
     lod.camera = Camera{.eye = to_array(c->eye()),
