@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(Tokens, OpenWhatTheirLineSays) {
+TEST(Tokens, GrantWhatTheirLineSays) {
   const auto tokens = Tokens::parse("# who may come in\n\nall-0123456789\n some.one~/+=\tengine  scans-* h?ad # mine\r\n").value();
   const auto everything = tokens.find("all-0123456789");
   ASSERT_NE(everything, nullptr);
@@ -28,14 +28,14 @@ TEST(Tokens, OpenWhatTheirLineSays) {
   for (const char* name : {"", "engines", "my engine", "scans", "had", "heead", "Engine"}) EXPECT_FALSE(some->allows(name)) << name;
 }
 
-TEST(Tokens, AreWholeOrNothing) {
+TEST(Tokens, MatchAsAWholeOnly) {
   const auto tokens = Tokens::parse("secret-token\n").value();
   for (const char* wrong : {"", "secret-toke", "secret-token1", "secret-tokem", "Secret-token", "#", "secret-tokensecret-token"}) {
     EXPECT_EQ(tokens.find(wrong), nullptr) << wrong;
   }
 }
 
-TEST(Tokens, PatternsAreTriedToTheirEnd) {
+TEST(Tokens, PatternsMatchTheWholeName) {
   const Scope scope({"a*b*c", "*-public", "**"});
   EXPECT_TRUE(scope.allows("anything"));
   const Scope some({"a*b*c", "*-public"});
@@ -45,7 +45,7 @@ TEST(Tokens, PatternsAreTriedToTheirEnd) {
   EXPECT_FALSE(Scope({std::string(100, '*') + "b"}).allows(std::string(255, 'a')));
 }
 
-TEST(Tokens, ThatCannotBeReadAreAnErrorThatKeepsThem) {
+TEST(Tokens, MalformedFilesAreErrorsThatRevealNoToken) {
   for (const auto& [text, about] : std::vector<std::pair<std::string, std::string>>{{"", "no tokens"},
                                                                                     {"# none\n", "no tokens"},
                                                                                     {"good\nhush-hush!\n", "line 2"},
@@ -63,7 +63,7 @@ TEST(Tokens, ThatCannotBeReadAreAnErrorThatKeepsThem) {
   EXPECT_TRUE(Tokens::load(folder.file("good", "token\n")));
 }
 
-TEST(Tokens, OfAsManyAsAFileHoldsEachOpensItsOwn) {
+TEST(Tokens, AFullFileIsParsedInLinearTime) {
   std::string text;
   for (int i = 0; text.size() < (1 << 20) - 20; ++i) text += std::to_string(i) + " data-" + std::to_string(i) + "\n";
   const auto tokens = Tokens::parse(text);  // in a moment: not each against each
@@ -73,7 +73,7 @@ TEST(Tokens, OfAsManyAsAFileHoldsEachOpensItsOwn) {
   EXPECT_FALSE(Tokens::parse(text + "40000\n"));
 }
 
-TEST(Tokens, ComeInAHeaderOrAsASubprotocol) {
+TEST(Tokens, AreReadFromAHeaderOrASubprotocol) {
   EXPECT_EQ(token_of("Bearer abc.def", ""), "abc.def");
   EXPECT_EQ(token_of("bearer  abc ", "intervale.v1"), "abc");
   EXPECT_EQ(token_of("", "intervale.v1, intervale.token.YWI"), "ab");

@@ -41,7 +41,7 @@ TEST(Catalogue, NamesAreUtf8) {
   EXPECT_EQ(listed.status, 200u) << "JSON can hold every name there is";
 }
 
-TEST(Catalogue, NamesFitIntoAUrlOnce) {
+TEST(Catalogue, NamesAreUniquePathSegmentsOfAUrl) {
   Catalogue catalogue;
   for (const std::string& name : {std::string("a b"), std::string(255, 'x')}) EXPECT_TRUE(add(catalogue, name)) << name;
   for (const std::string& name : {std::string(), std::string(256, 'x'), std::string("a/b"), std::string("a?b"), std::string("a#b"),

@@ -43,7 +43,7 @@ struct Watched : ::testing::Test {
 
 using CatalogueWatcherTest = Watched;
 
-TEST_F(CatalogueWatcherTest, TakesUpWhatAppearsOnceItStands) {
+TEST_F(CatalogueWatcherTest, LoadsANewFileOnceItIsStable) {
   save(folder / "a.ivm", -0.3);
   EXPECT_THAT(names(watcher.load().value()), ElementsAre("a"));
   EXPECT_FALSE(watcher.poll());
@@ -56,7 +56,7 @@ TEST_F(CatalogueWatcherTest, TakesUpWhatAppearsOnceItStands) {
   EXPECT_FALSE(watcher.poll());
 }
 
-TEST_F(CatalogueWatcherTest, LeavesAFileAloneThatIsBeingWritten) {
+TEST_F(CatalogueWatcherTest, DoesNotReadAFileThatIsBeingWritten) {
   save(folder / "whole.tmp", -0.3);
   const std::string bytes = contents_of(folder / "whole.tmp");
   EXPECT_THAT(names(watcher.load().value()), IsEmpty());
@@ -69,7 +69,7 @@ TEST_F(CatalogueWatcherTest, LeavesAFileAloneThatIsBeingWritten) {
   EXPECT_TRUE(watcher.poll());
 }
 
-TEST_F(CatalogueWatcherTest, WhatChangesIsReplacedAndWhoHasTheOldOneKeepsIt) {
+TEST_F(CatalogueWatcherTest, AChangedFileIsReloadedAndUsersOfTheOldContentsKeepThem) {
   save(folder / "a.ivm", -0.3);
   const auto before = watcher.load().value().find("a");
   save(folder / "a.ivm", -0.2);
@@ -85,7 +85,7 @@ TEST_F(CatalogueWatcherTest, WhatChangesIsReplacedAndWhoHasTheOldOneKeepsIt) {
   EXPECT_FALSE(watcher.poll());
 }
 
-TEST_F(CatalogueWatcherTest, WhatGoesGoes) {
+TEST_F(CatalogueWatcherTest, ARemovedFileLeavesTheCatalogue) {
   save(folder / "a.ivm", -0.3);
   save(folder / "b.ivm", -0.3);
   const Catalogue before = watcher.load().value();
@@ -96,7 +96,7 @@ TEST_F(CatalogueWatcherTest, WhatGoesGoes) {
   EXPECT_NE(before.find("a"), nullptr);
 }
 
-TEST_F(CatalogueWatcherTest, DamageTouchesNoOneWhoIsServed) {
+TEST_F(CatalogueWatcherTest, DamageToAFileDoesNotAffectSessions) {
   save(folder / "a.ivm", -0.3);
   const std::string bytes = contents_of(folder / "a.ivm");
   const auto volume = watcher.load().value().find("a");
@@ -120,7 +120,7 @@ TEST_F(CatalogueWatcherTest, DamageTouchesNoOneWhoIsServed) {
 }
 
 // As one is that may be read only later, or that a copy puts in its place which keeps its time.
-TEST_F(CatalogueWatcherTest, AFileThatHasChangedIsReadWhateverItsTimeOfWriting) {
+TEST_F(CatalogueWatcherTest, AChangedFileIsReadWhateverItsModificationTime) {
   save(folder / "a.ivm", -0.3);
   const std::string good = contents_of(folder / "a.ivm");
   const auto time = std::filesystem::last_write_time(folder / "a.ivm");
@@ -140,7 +140,7 @@ TEST_F(CatalogueWatcherTest, AFileThatHasChangedIsReadWhateverItsTimeOfWriting) 
   EXPECT_THAT(names(*mended), ElementsAre("a"));
 }
 
-TEST_F(CatalogueWatcherTest, AFolderThatIsAwayKeepsWhatItHad) {
+TEST_F(CatalogueWatcherTest, AMissingFolderKeepsItsDataSets) {
   std::filesystem::create_directory(folder / "in");
   save(folder / "in/a.ivm", -0.3);
   for (const char* name : {"in", "in/", "./in//"}) {
@@ -156,7 +156,7 @@ TEST_F(CatalogueWatcherTest, AFolderThatIsAwayKeepsWhatItHad) {
   }
 }
 
-TEST_F(CatalogueWatcherTest, AFileWhoseNameDoesNotDoIsLeftOut) {
+TEST_F(CatalogueWatcherTest, AFileWithAnInvalidNameIsSkipped) {
   save(folder / "a.ivm", -0.3);
   for (const char* name : {"a?.ivm", "b\n.ivm", "c\xff.ivm", "d\xc2\x9b.ivm"}) std::filesystem::copy_file(folder / "a.ivm", folder / name);
   EXPECT_THAT(names(watcher.load().value()), ElementsAre("a"));
@@ -164,7 +164,7 @@ TEST_F(CatalogueWatcherTest, AFileWhoseNameDoesNotDoIsLeftOut) {
   EXPECT_FALSE(CatalogueWatcher({folder / "a?.ivm"}).load()) << "one that is named is an error";
 }
 
-TEST_F(CatalogueWatcherTest, OfTwoOfOneNameTheFirstStands) {
+TEST_F(CatalogueWatcherTest, OfTwoDataSetsOfOneNameTheFirstCounts) {
   std::filesystem::create_directory(folder / "x");
   std::filesystem::create_directory(folder / "y");
   save(folder / "y/a.ivm", -0.3);
@@ -181,14 +181,14 @@ TEST_F(CatalogueWatcherTest, OfTwoOfOneNameTheFirstStands) {
   EXPECT_THAT(again.error().message, HasSubstr("two data sets are named 'a'"));
 }
 
-TEST_F(CatalogueWatcherTest, WhereMemoryIsShortNothingMoreIsRead) {
+TEST_F(CatalogueWatcherTest, ReadsNothingAboveTheMemoryLimit) {
   CatalogueWatcher poor({folder.path()}, 1);
   save(folder / "a.ivm", -0.3);
   EXPECT_THAT(names(poor.load().value()), IsEmpty());
   for (int i = 0; i < 3; ++i) EXPECT_FALSE(poor.poll());
 }
 
-TEST_F(CatalogueWatcherTest, LoadingStopsWhenToldTo) {
+TEST_F(CatalogueWatcherTest, LoadingStopsWhenKeepGoingReturnsFalse) {
   save(folder / "a.ivm", -0.3);
   save(folder / "b.ivm", -0.3);
   int asked = 0;

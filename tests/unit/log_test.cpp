@@ -34,14 +34,14 @@ class Said {
   spdlog::level::level_enum level_;
 };
 
-TEST(Log, IsTextWithASessionsNumber) {
+TEST(Log, TextLinesHaveTheSessionsNumber) {
   const Said said(LogFormat::text);
   log_session(7, spdlog::level::info, "closed: {}", "a\nb\x1b[31m");
   spdlog::info("stopped");
   EXPECT_THAT(said.lines(), MatchesRegex("[-0-9]*T[0-9:.]*[+-][0-9:]* info session 7 closed: a.b.\\[31m\n[^\n]* info stopped\n"));
 }
 
-TEST(Log, IsOneJsonObjectALine) {
+TEST(Log, JsonLinesAreOneObjectEach) {
   const Said said(LogFormat::json);
   log_session(7, spdlog::level::warn, "closed: {}", "\"a\"\nb\xff");
   spdlog::info("stopped");
@@ -60,7 +60,7 @@ TEST(Log, IsOneJsonObjectALine) {
   EXPECT_FALSE(std::getline(lines, line));
 }
 
-TEST(Log, SaysNothingBelowItsLevel) {
+TEST(Log, OmitsLinesBelowItsLevel) {
   const Said said(LogFormat::text, "warn");
   log_session(7, spdlog::level::info, "opened");
   EXPECT_EQ(said.lines(), "");

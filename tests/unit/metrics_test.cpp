@@ -13,7 +13,7 @@ using testing::HasSubstr;
 using testing::Not;
 using namespace std::chrono_literals;
 
-TEST(Metrics, SayWhatWasCounted) {
+TEST(Metrics, ReportWhatWasCounted) {
   Metrics metrics;
   metrics.sessions.Increment();
   metrics.sessions.Increment();
@@ -37,7 +37,7 @@ TEST(Metrics, SayWhatWasCounted) {
 }
 
 // A client chooses the code it closes with, and may not make the list of series grow.
-TEST(Metrics, CountClosesByCodesThatAreKnown) {
+TEST(Metrics, HaveNoSeriesForUnknownCloseCodes) {
   Metrics metrics;
   EXPECT_THAT(metrics.text({.catalogue = {}}), HasSubstr("intervale_session_closes_total{code=\"4404\"} 0\n"));
   const auto lines = [&metrics] {

@@ -108,7 +108,7 @@ class Receiver {
 
 class Plan : public ::testing::TestWithParam<unsigned> {};
 
-TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
+TEST_P(Plan, SendsEveryWantedUpdateOnceWhateverViewsFollow) {
   const auto volume = volume_of_seed(GetParam());
   std::mt19937 random(GetParam());
   StreamPlan plan(volume);
@@ -149,7 +149,7 @@ TEST_P(Plan, SendsWhatIsWantedAndNothingTwiceWhateverIsAskedInTheMiddle) {
 }
 
 // Bands of falling error: half of the updates already leave no more than the error that the plain order leaves after a quarter.
-TEST_P(Plan, GreatErrorsComeEarly) {
+TEST_P(Plan, GreatErrorsAreSentEarly) {
   const auto volume = volume_of_seed(GetParam());
   const auto order = in_order(*volume, select(*volume, {}), {});
   StreamPlan plan(volume);
@@ -173,7 +173,7 @@ TEST_P(Plan, RemainingErrorNeverGrowsWithinAView) {
   EXPECT_EQ(last, 0);
 }
 
-TEST_P(Plan, TheSameViewAgainSendsNothing) {
+TEST_P(Plan, TheSameViewSendsNothingTheSecondTime) {
   const auto volume = volume_of_seed(GetParam());
   StreamPlan plan(volume);
   Lod lod;
