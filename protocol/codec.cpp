@@ -116,8 +116,12 @@ Result<ClientMessage> decode_body(const fbs::Open& table) {
 
 Result<ClientMessage> decode_body(const fbs::View& table) {
   const fbs::Lod& wire = *table.lod();
-  Lod lod{
-      .error = wire.error(), .error_percent = from_wire(wire.error_percent()), .roi = {}, .camera = {}, .max_updates = from_wire(wire.max_updates())};
+  Lod lod{.error = wire.error(),
+          .error_percent = from_wire(wire.error_percent()),
+          .roi = {},
+          .camera = {},
+          .max_tets = {},
+          .max_updates = from_wire(wire.max_updates())};
   if (const auto* roi = wire.roi()) lod.roi = Box{to_array(roi->min()), to_array(roi->max())};
   if (const auto* c = wire.camera()) {
     lod.camera = Camera{.eye = to_array(c->eye()),
