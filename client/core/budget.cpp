@@ -136,7 +136,7 @@ class Balance {
 }  // namespace
 
 Importance size_on_screen(const Camera& camera, const Grid& grid) {
-  return [view = View(camera, grid), domain = Domain(grid.dims)](SupercubeKey key) {
+  return [view = ScreenError(camera, grid), domain = Domain(grid.dims)](SupercubeKey key) {
     return std::ldexp(view.pixels_per_unit(region_of(domain, key, 1)), scale_of_key(key));
   };
 }

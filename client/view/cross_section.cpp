@@ -11,8 +11,8 @@ using Tet = FrontMesher::Tet;
 
 class Cutter {
  public:
-  Cutter(const Skin& skin, const CutPlane& plane) : skin_(skin) {
-    const Grid& grid = skin.mesher().state().grid;
+  Cutter(const BoundarySurface& surface, const CutPlane& plane) : surface_(surface) {
+    const Grid& grid = surface.mesher().state().grid;
     offset_ = plane.offset;
     for (int i = 0; i < 3; ++i) {
       normal_[i] = plane.normal[i] * grid.spacing[i];
@@ -22,12 +22,12 @@ class Cutter {
 
   std::vector<SectionVertex> run() {
     std::vector<Tet> tets;
-    for (std::size_t number = 0; number < skin_.mesher().state().blocks.size(); ++number) {
-      const FrontState::Block& block = skin_.mesher().block(number);
+    for (std::size_t number = 0; number < surface_.mesher().state().blocks.size(); ++number) {
+      const FrontState::Block& block = surface_.mesher().block(number);
       if (!may_meet(block)) continue;
       tets.clear();
-      skin_.mesher().append_tets(number, tets);
-      level_ = std::uint8_t(block.scale);
+      surface_.mesher().append_tets(number, tets);
+      lod_ = std::uint8_t(block.scale);
       for (const Tet& tet : tets) cut(tet);
     }
     return std::move(out_);
@@ -36,7 +36,7 @@ class Cutter {
  private:
   // Its diamonds reach from h before its corner to 4 h behind. What the corners of the domain leave is everywhere.
   [[nodiscard]] bool may_meet(const FrontState::Block& block) const {
-    if (skin_.mesher().state().is_root_block(block)) return true;
+    if (surface_.mesher().state().is_root_block(block)) return true;
     const double h = double(std::int32_t(1) << block.scale);
     const Vertex p = block.position;
     const Vec3 low{(4.0 * p.x - 1) * h, (4.0 * p.y - 1) * h, (4.0 * p.z - 1) * h};
@@ -53,7 +53,7 @@ class Cutter {
     std::array<Vec3, 4> corners;
     std::array<double, 4> distances;
     for (std::size_t k = 0; k < 4; ++k) {
-      const auto& at = skin_.position(tet[k]);
+      const auto& at = surface_.position(tet[k]);
       corners[k] = scaled(1.0 / FrontMesher::kSteps, {double(at[0]), double(at[1]), double(at[2])});
       distances[k] = dot(normal_, corners[k]) - offset_;
     }
@@ -64,22 +64,22 @@ class Cutter {
       const std::array<std::size_t, 3> corner{0, i, i + 1};
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec3& p = polygon.corners[corner[k]];
-        SectionVertex v{float(p[0]), float(p[1]), float(p[2]), {}, level_};
+        SectionVertex v{float(p[0]), float(p[1]), float(p[2]), {}, lod_};
         for (std::size_t side = 0; side < 3; ++side) v.side[side] = side == k || !is_side[side] ? 255 : 0;
         out_.push_back(v);
       }
     }
   }
 
-  const Skin& skin_;
+  const BoundarySurface& surface_;
   Vec3 normal_;  // so that its product with a place in samples is the distance in world units
   double offset_ = 0;
-  std::uint8_t level_ = 0;
+  std::uint8_t lod_ = 0;
   std::vector<SectionVertex> out_;
 };
 
 }  // namespace
 
-std::vector<SectionVertex> cross_section(const Skin& skin, const CutPlane& plane) { return Cutter(skin, plane).run(); }
+std::vector<SectionVertex> cross_section(const BoundarySurface& surface, const CutPlane& plane) { return Cutter(surface, plane).run(); }
 
 }  // namespace intervale

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "client/view/skin.h"
+#include "client/view/boundary_surface.h"
 #include "common/util/vec3.h"
 
 namespace intervale {
@@ -22,11 +22,11 @@ struct CutPlane {
 struct SectionVertex {
   float x = 0, y = 0, z = 0;  // samples
   std::array<std::uint8_t, 3> side{};
-  std::uint8_t level = 0;  // as of SkinVertex
+  std::uint8_t lod = 0;  // as of SurfaceVertex
 };
 static_assert(sizeof(SectionVertex) == 16);
 
-// Triangles, three vertices each, that face the normal's side. By the skin's last update.
-[[nodiscard]] std::vector<SectionVertex> cross_section(const Skin& skin, const CutPlane& plane);
+// Triangles, three vertices each, that face the normal's side. By the surface's last update.
+[[nodiscard]] std::vector<SectionVertex> cross_section(const BoundarySurface& surface, const CutPlane& plane);
 
 }  // namespace intervale

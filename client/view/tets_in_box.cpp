@@ -3,8 +3,8 @@
 #include "common/util/tetrahedron.h"
 
 namespace intervale {
-TetsInBox tets_in_box(const Skin& skin, const Box& box, std::uint64_t most) {
-  const FrontState& front = skin.mesher().state();
+TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint64_t most) {
+  const FrontState& front = surface.mesher().state();
   const Grid& grid = front.grid;
   std::array<double, 3> low, high;  // in samples
   for (int i = 0; i < 3; ++i) {
@@ -24,20 +24,20 @@ TetsInBox tets_in_box(const Skin& skin, const Box& box, std::uint64_t most) {
       if (apart) continue;
     }
     tets.clear();
-    skin.mesher().append_tets(number, tets);
+    surface.mesher().append_tets(number, tets);
     for (const auto& tet : tets) {
       std::array<double, 3> middle{};
       for (const PointId id : tet) {
-        for (int i = 0; i < 3; ++i) middle[i] += skin.position(id)[i] * (0.25 / FrontMesher::kSteps);
+        for (int i = 0; i < 3; ++i) middle[i] += surface.position(id)[i] * (0.25 / FrontMesher::kSteps);
       }
       bool inside = true;
       for (int i = 0; i < 3; ++i) inside = inside && middle[i] >= low[i] && middle[i] <= high[i];
       if (!inside || ++found.out_of > most) continue;
       const auto first = std::uint32_t(found.vertices.size());
       for (const PointId id : tet) {
-        const auto& at = skin.position(id);
+        const auto& at = surface.position(id);
         found.vertices.push_back({float(at[0]) / FrontMesher::kSteps, float(at[1]) / FrontMesher::kSteps, float(at[2]) / FrontMesher::kSteps,
-                                  float(middle[0]), float(middle[1]), float(middle[2]), skin.surface(id), std::uint8_t(scale)});
+                                  float(middle[0]), float(middle[1]), float(middle[2]), surface.surface(id), std::uint8_t(scale)});
       }
       for (const auto& face : kTetFaces) found.indices.insert(found.indices.end(), {first + face[0], first + face[1], first + face[2]});
       ++found.count;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "client/view/skin.h"
+#include "client/view/boundary_surface.h"
 #include "common/view/lod.h"
 
 namespace intervale {
@@ -15,7 +15,7 @@ struct TetVertex {
   float x = 0, y = 0, z = 0;
   float middle_x = 0, middle_y = 0, middle_z = 0;
   Surface surface = Surface::inside;
-  std::uint8_t level = 0;  // as of SkinVertex
+  std::uint8_t lod = 0;  // as of SurfaceVertex
   std::array<std::uint8_t, 2> padding{};
 };
 static_assert(sizeof(TetVertex) == 28);
@@ -27,7 +27,7 @@ struct TetsInBox {
   std::uint64_t out_of = 0;  // that lie there
 };
 
-// Those whose middles lie in the box (world coordinates), `most` of them at most. By the skin's last update.
-[[nodiscard]] TetsInBox tets_in_box(const Skin& skin, const Box& box, std::uint64_t most);
+// Those whose middles lie in the box (world coordinates), `most` of them at most. By the surface's last update.
+[[nodiscard]] TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint64_t most);
 
 }  // namespace intervale

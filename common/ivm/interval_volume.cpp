@@ -34,37 +34,33 @@ std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& pa
   h = hash(parts.set.occupancy(), h);
   h = hash(std::span<const UpdateCode>(parts.codes), h);
   h = hash(std::span<const std::uint8_t>(parts.residuals), h);
-  h = hash(std::span<const float>(parts.error_levels), h);
-  return hash(std::span<const Yield>(parts.yields), h);
+  h = hash(std::span<const float>(parts.error_steps), h);
+  return hash(std::span<const ErrorToDistance>(parts.error_to_distance), h);
 }
 
-}  // namespace
-
-namespace {
-
-// Steps an octave, and the step of a ratio of 1: near ones go from 2^-12 to 2^20, far ones as well.
+// Codes an octave, the code of a ratio of 1, and the code without a bound. Both near and far ratios go from 2^-12 to 2^20.
 constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
 constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
 
 }  // namespace
 
-Yield Yield::at_least(double ratio, double unit, bool is_far) {
-  if (!(ratio > 0)) return Yield(0);
-  const auto step = [&](int steps, int one) { return std::ceil(steps * std::log2(ratio / unit) - 1e-9) + one; };
-  if (is_far) return Yield(std::uint8_t(std::clamp(step(kFarSteps, kFarOne), double(kFirstFar), double(kNoBoundFar))));
-  return Yield(std::uint8_t(std::clamp(step(kNearSteps, kNearOne), 1.0, double(kNoBound))));
+ErrorToDistance ErrorToDistance::at_least(double ratio, double unit, bool is_far) {
+  if (!(ratio > 0)) return ErrorToDistance(0);
+  const auto code = [&](int steps, int one) { return std::ceil(steps * std::log2(ratio / unit) - 1e-9) + one; };
+  if (is_far) return ErrorToDistance(std::uint8_t(std::clamp(code(kFarSteps, kFarOne), double(kFirstFar), double(kNoBoundFar))));
+  return ErrorToDistance(std::uint8_t(std::clamp(code(kNearSteps, kNearOne), 1.0, double(kNoBound))));
 }
 
-bool Yield::is_far() const { return step_ >= kFirstFar; }
+bool ErrorToDistance::is_far() const { return code_ >= kFirstFar; }
 
-float Yield::ratio(float unit) const {
-  if (step_ == 0) return 0;
-  if (step_ == kNoBound || step_ == kNoBoundFar) return std::numeric_limits<float>::max();
-  if (is_far()) return unit * std::exp2(float(int(step_) - kFarOne) / kFarSteps);
-  return unit * std::exp2(float(int(step_) - kNearOne) / kNearSteps);
+float ErrorToDistance::ratio(float unit) const {
+  if (code_ == 0) return 0;
+  if (code_ == kNoBound || code_ == kNoBoundFar) return std::numeric_limits<float>::max();
+  if (is_far()) return unit * std::exp2(float(int(code_) - kFarOne) / kFarSteps);
+  return unit * std::exp2(float(int(code_) - kNearOne) / kNearSteps);
 }
 
-double yield_unit(const Grid& grid, double max_error) {
+double error_to_distance_unit(const Grid& grid, double max_error) {
   return max_error > 0 ? std::min({grid.spacing[0], grid.spacing[1], grid.spacing[2]}) / max_error : 1.0;
 }
 
@@ -76,30 +72,30 @@ IntervalVolume::IntervalVolume(Parts parts)
       set_(std::move(parts.set)),
       codes_(std::move(parts.codes)),
       residuals_(std::move(parts.residuals)),
-      error_levels_(std::move(parts.error_levels)),
-      yields_(std::move(parts.yields)),
+      error_steps_(std::move(parts.error_steps)),
+      error_to_distance_(std::move(parts.error_to_distance)),
       reach_(float(diamond_width(description_.grid) / 2)) {
-  const auto unit = float(yield_unit(description_.grid, error_levels_.empty() ? 0.0 : double(error_levels_.back())));
-  for (unsigned step = 0; step < factor_.size(); ++step) factor_[step] = Yield(std::uint8_t(step)).ratio(unit);
+  const auto unit = float(error_to_distance_unit(description_.grid, error_steps_.empty() ? 0.0 : double(error_steps_.back())));
+  for (unsigned code = 0; code < factor_.size(); ++code) factor_[code] = ErrorToDistance(std::uint8_t(code)).ratio(unit);
   brick_object_error_.resize(set_.bricks().size());
-  supercube_level_.reserve(set_.supercubes());
+  supercube_half_step_.reserve(set_.supercubes());
   brick_first_.reserve(set_.bricks().size());
   first_in_brick_.reserve(set_.supercubes());
-  brick_level_.reserve(set_.bricks().size());
+  brick_step_.reserve(set_.bricks().size());
   std::uint32_t n = 0;
   for (std::uint32_t b = 0; b < set_.bricks().size(); ++b) {
     brick_first_.push_back(n);
-    brick_level_.push_back(0);
+    brick_step_.push_back(0);
     set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
       first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
       const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
       unsigned most = 0;
       for (UpdateIndex i = first; i < end; ++i) {
         n += codes_[i].coefficients();
-        most = std::max(most, codes_[i].error_level());
+        most = std::max(most, codes_[i].error_step());
       }
-      supercube_level_.push_back(half_of_level(most));
-      brick_level_[b] = std::max(brick_level_[b], std::uint16_t(most));
+      supercube_half_step_.push_back(half_of_step(most));
+      brick_step_[b] = std::max(brick_step_[b], std::uint16_t(most));
       brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
     });
   }
@@ -108,11 +104,13 @@ IntervalVolume::IntervalVolume(Parts parts)
 Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
-  if (parts.codes.size() != parts.set.size() || parts.yields.size() != parts.set.supercubes()) return fail("updates and supercubes do not fit");
-  if (parts.error_levels.size() > kErrorLevels || (parts.error_levels.empty() && !parts.codes.empty())) return fail("error levels out of range");
-  for (std::size_t i = 0; i < parts.error_levels.size(); ++i) {
-    if (!std::isfinite(parts.error_levels[i]) || parts.error_levels[i] < (i == 0 ? 0.0f : parts.error_levels[i - 1]))
-      return fail("error levels do not ascend");
+  if (parts.codes.size() != parts.set.size() || parts.error_to_distance.size() != parts.set.supercubes())
+    return fail("the numbers of codes or supercubes do not match the set");
+  if (parts.error_steps.size() > kMaxErrorSteps || (parts.error_steps.empty() && !parts.codes.empty()))
+    return fail("the number of errors is out of range");
+  for (std::size_t i = 0; i < parts.error_steps.size(); ++i) {
+    if (!std::isfinite(parts.error_steps[i]) || parts.error_steps[i] < (i == 0 ? 0.0f : parts.error_steps[i - 1]))
+      return fail("errors do not ascend");
   }
   const int levels = Domain(d.grid.dims).levels();
   for (const SupercubeSet::Brick& brick : parts.set.bricks()) {
@@ -120,10 +118,11 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   }
   std::uint64_t coefficients = 0;
   for (UpdateCode c : parts.codes) {
-    if (c.side_residual() > 2 || c.coefficients() > kMaxCuts || c.error_level() >= parts.error_levels.size()) return fail("an update's code is none");
+    if (c.side_residual() > 2 || c.coefficients() > kMaxCuts || c.error_step() >= parts.error_steps.size())
+      return fail("an update's code is invalid");
     coefficients += c.coefficients();
   }
-  if (coefficients != parts.residuals.size()) return fail("updates and coefficients do not fit");
+  if (coefficients != parts.residuals.size()) return fail("the codes require another number of coefficients");
   if (coefficients > std::numeric_limits<std::uint32_t>::max()) return fail("more than 2^32 coefficients");
   const Domain domain(d.grid.dims);
   if (auto root_patch = decode_root_patch(d.root_patch, domain); !root_patch) return tl::unexpected(root_patch.error());
@@ -141,8 +140,8 @@ UpdateView IntervalVolume::update(const Place& p) const {
 
 std::size_t IntervalVolume::memory_bytes() const {
   return sizeof *this + description_.root_patch.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
-         brick_level_.size() * 2 + brick_object_error_.size() * 4 + yields_.size() + supercube_level_.size() + first_in_brick_.size() * 2 +
-         residuals_.size() + error_levels_.size() * sizeof(float);
+         brick_step_.size() * 2 + brick_object_error_.size() * 4 + error_to_distance_.size() + supercube_half_step_.size() +
+         first_in_brick_.size() * 2 + residuals_.size() + error_steps_.size() * sizeof(float);
 }
 
 }  // namespace intervale

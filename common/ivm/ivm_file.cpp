@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "common/codec/byte_planes.h"
-#include "common/codec/residual_coder.h"
+#include "common/ivm/ivm_coding.h"
 #include "common/util/atomic_file.h"
 #include "common/util/bits.h"
 
@@ -26,9 +26,9 @@ constexpr int kCompression = 9;               // zstd; 19 gains a few percent an
 constexpr unsigned kSlotBytes = 7;            // of an occupancy word: 56 slots
 constexpr std::uint64_t kMaxRatio = 1 << 15;  // zstd's own: a block of 128 KiB in 4 bytes; a range coder's is less
 
-enum Section : std::uint32_t { kMeta, kRootPatch, kErrors, kBricks, kMasks, kOccupancy, kYields, kLevels, kShapes, kResiduals, kSections };
-constexpr const char* kSectionNames[kSections] = {"meta",      "root_patch", "errors", "bricks", "masks",
-                                                  "occupancy", "yields",     "levels", "shapes", "residuals"};
+enum Section : std::uint32_t { kMeta, kRootPatch, kErrors, kBricks, kMasks, kOccupancy, kErrorToDistance, kLevels, kShapes, kResiduals, kSections };
+constexpr const char* kSectionNames[kSections] = {"meta",      "root_patch",        "errors", "bricks", "masks",
+                                                  "occupancy", "error_to_distance", "levels", "shapes", "residuals"};
 
 struct Header {
   char magic[8];
@@ -51,7 +51,7 @@ static_assert(sizeof(Header) == 32 && sizeof(Entry) == 40 && sizeof(Meta) == 144
 
 constexpr std::size_t kTableBytes = sizeof(Header) + kSections * sizeof(Entry);
 
-// What a section holds, in the file and decompressed.
+// A section as stored in the file, and its size when decompressed.
 struct Stored {
   std::vector<std::uint8_t> bytes;
   std::uint64_t raw_bytes = 0;
@@ -61,53 +61,6 @@ Stored compressed(const std::vector<std::uint8_t>& raw) {
   Stored s{std::vector<std::uint8_t>(ZSTD_compressBound(raw.size())), raw.size()};
   s.bytes.resize(ZSTD_compress(s.bytes.data(), s.bytes.size(), raw.data(), raw.size(), kCompression));
   return s;
-}
-
-// The three below write what is in their last argument, or read into it: by number of the update.
-
-// An error is no smaller than its children's, and often their largest. Fine to coarse.
-template <class Coder>
-void code_levels(Coder& coder, const SupercubeSet& set, std::span<std::uint16_t> levels) {
-  std::array<std::array<NumberModel<9>, 2>, 3> without_children;
-  std::array<std::array<SmallNumberModel, 2>, 3> above_children;
-  std::vector<std::uint16_t> least(set.size());  // the largest level of a child and 1, 0 without children
-  static_assert(kErrorLevels == 512);
-  set.for_each_up([&](const Place& p) {
-    const int cls = class_of_slot(int(p.slot)), finest = scale_of_key(p.key) == 0;
-    std::uint16_t& level = levels[p.index];
-    const unsigned from = least[p.index];
-    if (from == 0) {
-      level = std::uint16_t(without_children[cls][finest].code(coder, level));
-    } else {
-      level = std::uint16_t((from - 1 + above_children[cls][finest].code(coder, (level - from + 1) & 511u)) & 511u);
-    }
-    for_each_parent(set, p, [&](UpdateIndex parent) { least[parent] = std::max(least[parent], std::uint16_t(level + 1)); });
-  });
-}
-
-// Where the parents have many cuts, so has an update. Coarse to fine.
-template <class Coder>
-void code_shapes(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> shapes) {
-  std::array<std::array<std::array<NumberModel<7>, 16>, 2>, 3> model;
-  set.for_each_down([&](const Place& p) {
-    unsigned cuts = 0;
-    for_each_parent(set, p, [&](UpdateIndex parent) { cuts += UpdateCode(shapes[parent]).coefficients(); });
-    std::uint8_t& shape = shapes[p.index];
-    shape = std::uint8_t(model[class_of_slot(int(p.slot))][scale_of_key(p.key) == 0][std::min(cuts, 15u)].code(coder, shape));
-  });
-}
-
-template <class Coder>
-void code_residuals(Coder& coder, const SupercubeSet& set, std::span<const std::uint8_t> shapes, std::span<std::uint8_t> residuals) {
-  ResidualCoder model;
-  std::uint8_t* next = residuals.data();
-  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
-    set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
-      const UpdateCode code(shapes[p.index]);
-      model.code_cuts(coder, class_of_slot(int(p.slot)), code.side_residual(), code.coefficients(), code.first_cuts(), next);
-      next += code.coefficients();
-    });
-  }
 }
 
 template <class T>
@@ -150,7 +103,7 @@ Stored stored(const IntervalVolume& volume, Section section) {
     case kRootPatch:
       return compressed(volume.description().root_patch);
     case kErrors:
-      return compressed(bytes_of(volume.error_levels()));
+      return compressed(bytes_of(volume.error_steps()));
     case kBricks: {
       std::uint64_t previous = 0;
       for (const SupercubeSet::Brick& b : set.bricks()) append_varint(raw, (b.key >> 6) - std::exchange(previous, b.key >> 6));
@@ -163,8 +116,8 @@ Stored stored(const IntervalVolume& volume, Section section) {
     }
     case kOccupancy:
       return compressed(split_bytes(set.occupancy(), kSlotBytes));
-    case kYields:
-      return compressed(bytes_of(volume.yields()));
+    case kErrorToDistance:
+      return compressed(bytes_of(volume.error_to_distance()));
     case kLevels:
     case kShapes:
     case kResiduals:
@@ -175,8 +128,8 @@ Stored stored(const IntervalVolume& volume, Section section) {
   if (section == kLevels) {
     std::vector<std::uint16_t> levels;
     levels.reserve(codes.size());
-    for (const UpdateCode c : codes) levels.push_back(std::uint16_t(c.error_level()));
-    code_levels(coder, set, levels);
+    for (const UpdateCode c : codes) levels.push_back(std::uint16_t(c.error_step()));
+    code_error_steps(coder, set, levels);
     return {coder.finish(), 2 * levels.size()};
   }
   for (const UpdateCode c : codes) raw.push_back(c.shape());
@@ -218,19 +171,19 @@ Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> s
     if (!step || (b > 0 && *step == 0) || *step >= (std::uint64_t(1) << 56) - brick || masks[b] == 0) return fail("bricks do not ascend");
     brick += *step;
     const SupercubeKey first = brick << 6;
-    if (scale_of_key(first) < 0 || scale_of_key(first) >= kMaxLevels) return fail("a brick is of no scale");
+    if (scale_of_key(first) < 0 || scale_of_key(first) >= kMaxLevels) return fail("a brick's scale is out of range");
     for (const int bit : set_bits(masks[b])) {
-      if (keys.size() == count) return fail("more supercubes than there should be");
+      if (keys.size() == count) return fail("more supercubes than the header says");
       keys.push_back(first + unsigned(bit));
       const Vertex p = position_of_key(keys.back());
-      if (std::max({p.x, p.y, p.z}) > (1 << kMaxLevels) >> (scale_of_key(first) + 2)) return fail("a supercube beyond any grid");
+      if (std::max({p.x, p.y, p.z}) > (1 << kMaxLevels) >> (scale_of_key(first) + 2)) return fail("a supercube outside the largest grid");
     }
   }
-  if (keys.size() != count || !steps.empty()) return fail("bricks and supercubes do not fit");
+  if (keys.size() != count || !steps.empty()) return fail("the numbers of supercubes in bricks and in the header differ");
   return keys;
 }
 
-// That a file of so many bytes may begin like this: with its header and section table, or with all there is of them.
+// Checks the start of a file of so many bytes: its header and section table, or the whole file if it is shorter.
 Result<void> check_start(std::span<const std::byte> start, std::uint64_t bytes) {
   Header header;
   if (start.size() < sizeof kMagic || std::memcmp(start.data(), kMagic, sizeof kMagic) != 0) return fail("not an interval volume file (.ivm)");
@@ -238,7 +191,7 @@ Result<void> check_start(std::span<const std::byte> start, std::uint64_t bytes) 
   std::memcpy(&header, start.data(), sizeof header);
   if (header.version != kIvmVersion) {
     return fail("version " + std::to_string(header.version) + " of the format, this program reads version " + std::to_string(kIvmVersion) +
-                (header.version > kIvmVersion ? "; a newer program is wanted" : "; build the file again"));
+                (header.version > kIvmVersion ? "; use a newer program" : "; build the file again"));
   }
   if (header.checksum != table_checksum(start.first(kTableBytes))) return fail("the header is damaged (checksum)");
   if (header.sections != kSections)
@@ -257,7 +210,7 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   header.version = kIvmVersion;
   header.sections = kSections;
-  // Only what is to be stored is kept: all sections as they are would be as large as the volume that they come from.
+  // Only compressed sections are kept: together, the raw ones would be as large as the volume.
   std::array<Stored, kSections> sections;
   parallel(kSections, [&](std::size_t s) { sections[s] = stored(volume, Section(s)); });
   for (std::size_t s = 0; s < kSections; ++s) {
@@ -311,21 +264,24 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
     d.grid.spacing[i] = meta.spacing[i];
     d.grid.origin[i] = meta.origin[i];
   }
-  if (meta.refine > 1) return fail("the way of refining is none");
+  if (meta.refine > 1) return fail("the refinement mode is unknown");
   d.refine = Refine(meta.refine);
   d.range = {meta.range[0], meta.range[1]};
   d.max_error = meta.max_error;
   d.full = {meta.full_vertices, meta.full_tets};
-  // Counts before contents: each must be what its section holds.
-  if (entries[kErrors].raw_bytes > kErrorLevels * sizeof(float) || entries[kErrors].raw_bytes % sizeof(float) != 0)
-    return fail("error levels out of range");
+  // Counts before contents: each must match the size of its section.
+  if (entries[kErrors].raw_bytes > kMaxErrorSteps * sizeof(float) || entries[kErrors].raw_bytes % sizeof(float) != 0)
+    return fail("the number of errors is out of range");
   if (meta.bricks > meta.supercubes || meta.supercubes > meta.updates || meta.updates > meta.supercubes * kSlots ||
       meta.coefficients > meta.updates * kMaxCuts || meta.updates > std::numeric_limits<UpdateIndex>::max()) {
-    return fail("the counts do not fit");
+    return fail("the counts contradict each other");
   }
-  const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},  {kOccupancy, meta.supercubes * kSlotBytes},
-                                                        {kYields, meta.supercubes}, {kLevels, 2 * meta.updates},
-                                                        {kShapes, meta.updates},    {kResiduals, meta.coefficients}};
+  const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},
+                                                        {kOccupancy, meta.supercubes * kSlotBytes},
+                                                        {kErrorToDistance, meta.supercubes},
+                                                        {kLevels, 2 * meta.updates},
+                                                        {kShapes, meta.updates},
+                                                        {kResiduals, meta.coefficients}};
   for (const auto& [section, bytes] : expected) {
     if (auto ok = is_size(section, bytes); !ok) return tl::unexpected(ok.error());
   }
@@ -342,16 +298,16 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
     if (word == 0) return fail("a supercube without a diamond");
     slots += std::popcount(word);
   }
-  if (slots != meta.updates) return fail("updates and supercubes do not fit");
+  if (slots != meta.updates) return fail("the numbers of updates and occupied slots differ");
   d.root_patch = std::move(*raw[kRootPatch]);
-  parts.error_levels.resize(raw[kErrors]->size() / sizeof(float));
-  if (!parts.error_levels.empty()) std::memcpy(parts.error_levels.data(), raw[kErrors]->data(), raw[kErrors]->size());
-  for (const std::uint8_t step : *raw[kYields]) parts.yields.emplace_back(step);
+  parts.error_steps.resize(raw[kErrors]->size() / sizeof(float));
+  if (!parts.error_steps.empty()) std::memcpy(parts.error_steps.data(), raw[kErrors]->data(), raw[kErrors]->size());
+  for (const std::uint8_t code : *raw[kErrorToDistance]) parts.error_to_distance.emplace_back(code);
   parts.set = SupercubeSet(*keys, std::move(occupancy));
   const auto coded = [&](Section section) { return all.subspan(entries[section].offset, entries[section].stored_bytes); };
   std::vector<std::uint16_t> levels(meta.updates);
   RangeDecoder level_coder(coded(kLevels));
-  code_levels(level_coder, parts.set, levels);
+  code_error_steps(level_coder, parts.set, levels);
   if (!level_coder.is_spent()) return does_not_decompress(entries[kLevels]);
   std::vector<std::uint8_t> shapes(meta.updates);
   RangeDecoder shape_coder(coded(kShapes));
@@ -361,17 +317,17 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   std::uint64_t coefficients = 0;
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const UpdateCode code(std::uint16_t(shapes[i] | levels[i] << 7));
-    if (code.side_residual() > 2 || code.coefficients() > kMaxCuts) return fail("an update's code is none");
+    if (code.side_residual() > 2 || code.coefficients() > kMaxCuts) return fail("an update's code is invalid");
     parts.codes.push_back(code);
     coefficients += code.coefficients();
   }
-  if (coefficients != meta.coefficients) return fail("updates and coefficients do not fit");
+  if (coefficients != meta.coefficients) return fail("the codes require another number of coefficients");
   parts.residuals.resize(meta.coefficients);
   RangeDecoder residual_coder(coded(kResiduals));
   code_residuals(residual_coder, parts.set, shapes, parts.residuals);
   if (!residual_coder.is_spent()) return does_not_decompress(entries[kResiduals]);
   auto volume = IntervalVolume::assemble(std::move(parts));
-  if (volume && volume->description().content_hash != meta.content_hash) return fail("the contents are not those that were written (content hash)");
+  if (volume && volume->description().content_hash != meta.content_hash) return fail("the contents differ from what was written (content hash)");
   return volume;
 }
 

@@ -10,8 +10,8 @@ namespace intervale {
 
 Ranking::Ranking(const IntervalVolume& volume, const Lod& lod) : volume_(volume) {
   const double threshold = error_of(lod, volume.description().max_error);
-  const auto levels = volume.error_levels();
-  while (threshold > 0 && level_ < levels.size() && levels[level_] <= threshold) ++level_;
+  const auto steps = volume.error_steps();
+  while (threshold > 0 && least_step_ < steps.size() && steps[least_step_] <= threshold) ++least_step_;
   const Grid& g = volume.description().grid;
   if (lod.roi) {
     roi_.emplace();
@@ -24,7 +24,7 @@ Ranking::Ranking(const IntervalVolume& volume, const Lod& lod) : volume_(volume)
     }
   }
   if (lod.camera) {
-    view_.emplace(*lod.camera, g);
+    screen_.emplace(*lod.camera, g);
     pixel_error_ = float(lod.camera->pixel_error);
   }
 }
@@ -37,30 +37,30 @@ bool Ranking::meets_roi(const Diamond& d) const {
   return true;
 }
 
-Ranking::Brick Ranking::of_brick(std::uint32_t brick, unsigned level, float object_error) const {
+Ranking::Brick Ranking::of_brick(std::uint32_t brick, unsigned step, float object_error) const {
   Brick b;
   b.ranking_ = this;
   const SupercubeKey key = volume_.set().bricks()[brick].key;
   b.scale_ = scale_of_key(key);
-  if (level < level_) return b;
-  if (!roi_ && !view_) {
-    b.bound_ = Rank(level + 1);
+  if (step < least_step_) return b;
+  if (!roi_ && !screen_) {
+    b.bound_ = Rank(step + 1);
     return b;
   }
-  const View::Region region = region_of(volume_.domain(), key, 4);
+  const ScreenError::Region region = region_of(volume_.domain(), key, 4);
   for (int i = 0; i < 3 && roi_; ++i) {
     if (region.middle[i] + region.reach[i] < roi_->min[i] || region.middle[i] - region.reach[i] > roi_->max[i]) return b;
   }
-  if (!view_) {
-    b.bound_ = Rank(level + 1);
+  if (!screen_) {
+    b.bound_ = Rank(step + 1);
     return b;
   }
-  b.pixels_ = float(view_->pixels_per_unit(region));
-  b.near_ = view_->is_near(region);
+  b.pixels_ = float(screen_->pixels_per_unit(region));
+  b.near_ = screen_->is_near(region);
   const float pixels = object_error * b.pixels_;
   if (pixels > pixel_error_) b.bound_ = rank_of(pixels);
-  b.aside_ = view_->is_central(region) ? 0 : kAside;  // the middle of the picture a little sooner
-  if (!b.near_ && b.bound_ != 0) b.bound_ = Rank(b.bound_ - b.aside_);
+  b.off_centre_ = screen_->is_central(region) ? 0 : kOffCentre;  // the middle of the picture comes a little sooner
+  if (!b.near_ && b.bound_ != 0) b.bound_ = Rank(b.bound_ - b.off_centre_);
   return b;
 }
 
@@ -71,26 +71,26 @@ Ranking::Supercube Ranking::Brick::supercube(std::uint32_t supercube, SupercubeK
   s.key_ = key;
   s.scale_ = scale_;
   s.pixels_ = pixels_;
-  s.aside_ = aside_;
+  s.off_centre_ = off_centre_;
   if (near_) {
-    const View::Region region = region_of(ranking_->volume_.domain(), key, 1);
-    s.pixels_ = float(ranking_->view_->pixels_per_unit(region));
-    s.aside_ = ranking_->view_->is_central(region) ? 0 : kAside;
+    const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
+    s.pixels_ = float(ranking_->screen_->pixels_per_unit(region));
+    s.off_centre_ = ranking_->screen_->is_central(region) ? 0 : kOffCentre;
   }
   return s;
 }
 
 double Ranking::bound(Rank rank) const {
   if (rank == 0) return 0;
-  if (!view_) return double(volume_.error_levels()[rank - 1u]);
-  return double(pixels_of(rank + 1 + kAside));
+  if (!screen_) return double(volume_.error_steps()[rank - 1u]);
+  return double(pixels_of(rank + 1 + kOffCentre));
 }
 
 Ranking::Rank Ranking::band_below(Rank top) const {
-  if (view_) return Rank(std::max(1, top - kBand + 1));
-  const auto levels = volume_.error_levels();
-  const float low = levels[top - 1u] * 0.25F;
-  return Rank(std::lower_bound(levels.begin(), levels.end(), low) - levels.begin() + 1);
+  if (screen_) return Rank(std::max(1, top - kBand + 1));
+  const auto steps = volume_.error_steps();
+  const float low = steps[top - 1u] * 0.25F;
+  return Rank(std::lower_bound(steps.begin(), steps.end(), low) - steps.begin() + 1);
 }
 
 }  // namespace intervale

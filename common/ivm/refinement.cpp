@@ -21,7 +21,7 @@ SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>
 }
 
 SplitSet select(const IntervalVolume& volume, const Lod& lod) {
-  // Bricks that want nothing are passed over.
+  // Skips bricks in which nothing is wanted.
   const Ranking ranking(volume, lod);
   SplitSet wanted(volume.size());
   const SupercubeSet& set = volume.set();
@@ -37,7 +37,7 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
       }
     });
   }
-  if (!lod.roi && !lod.camera) return wanted;  // saturated errors are closed as they are
+  if (!lod.roi && !lod.camera) return wanted;  // saturated errors are closed under parents
   return select(set, [&wanted](const Place& p) { return wanted.contains(p.index); });
 }
 

@@ -1,7 +1,7 @@
-// Which updates a level of detail needs, and in which order. Pure functions of the updates' errors and places.
+// Which updates a level of detail needs, and in which order. Pure functions of the updates' errors and positions.
 //
-// Weiss and De Floriani 2008, section 7. Errors are saturated, so the updates with an error above a threshold are closed under parents as they are.
-// What looks at places too is closed by one pass from fine to coarse.
+// Weiss and De Floriani 2008, section 7. Errors are saturated, so the updates with an error above a threshold are closed under parents. A selection
+// that depends on positions too is closed by one pass from fine to coarse.
 #pragma once
 
 #include <array>
@@ -18,14 +18,14 @@
 
 namespace intervale {
 
-// The updates of `set` that `wants` names, and all their ancestors.
+// The updates of `set` for which `wants` returns true, and all their ancestors.
 [[nodiscard]] SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>& wants);
 
-// The updates that a level of detail needs, closed under parents; budgets are the caller's.
+// The updates that a level of detail needs, closed under parents. Budgets are not applied.
 [[nodiscard]] SplitSet select(const IntervalVolume& volume, const Lod& lod);
 
-// `updates`, closed under parents, as a level of detail ranks them: what matters most first, an ancestor as much as what needs it, then coarse before
-// fine, then by number. So parents always come before children.
+// `updates`, closed under parents, in descending order of rank (ranking.h), where an ancestor has at least the rank of its descendants; equal ranks
+// from coarse to fine, then by number. So parents always come before children.
 [[nodiscard]] std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& updates, const Lod& lod);
 
 }  // namespace intervale

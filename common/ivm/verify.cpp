@@ -18,8 +18,8 @@ Result<void> validate(const IntervalVolume& volume) {
   const Description& description = volume.description();
   const Domain& domain = volume.domain();
   const SupercubeSet& set = volume.set();
-  const auto error_levels = volume.error_levels();
-  if (description.max_error != (error_levels.empty() ? 0.0 : double(error_levels.back()))) return fail("the largest error is not that of any update");
+  const auto error_steps = volume.error_steps();
+  if (description.max_error != (error_steps.empty() ? 0.0 : double(error_steps.back()))) return fail("the largest error is not that of any update");
   const auto root_patch = decode_root_patch(description.root_patch, domain);
   if (!root_patch) return tl::unexpected(root_patch.error());
   Front front(description.grid, *root_patch);
@@ -37,8 +37,7 @@ Result<void> validate(const IntervalVolume& volume) {
       const Vertex q = d.parent(k);
       if (domain.clamp(q) != q && domain.tets(Diamond(q)) == 0) continue;
       const auto parent = set.find(q);
-      if (parent && volume.error_level(parent->index) < volume.error_level(p.index))
-        wrong = Error{"an error is greater than its parent's" + where(c)};
+      if (parent && volume.error_step(parent->index) < volume.error_step(p.index)) wrong = Error{"an error is greater than its parent's" + where(c)};
     }
     if (!apply_update(front, *handle, volume.update(p))) wrong = Error{"an update's coefficients do not fit the sides around it" + where(c)};
   });

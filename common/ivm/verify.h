@@ -1,4 +1,4 @@
-// Checks an interval volume against the laws that every one obeys.
+// Checks the invariants of an interval volume.
 #pragma once
 
 #include "common/ivm/interval_volume.h"
@@ -6,8 +6,8 @@
 
 namespace intervale {
 
-// Checks every invariant: every parent of an update is present, updates lie in the box, errors are saturated, sides fit coefficients, and refined to
-// the end it gives the mesh that the description promises. Fails with the first that does not hold. Takes as long as an extraction.
+// Checks that every parent of an update is present, updates lie in the box, errors are saturated, sides match coefficients, and full refinement gives
+// the mesh that the description states. Fails with the first violation. Takes as long as an extraction.
 [[nodiscard]] Result<void> validate(const IntervalVolume& volume);
 
 }  // namespace intervale

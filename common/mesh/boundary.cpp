@@ -1,6 +1,6 @@
-// Faces of one tetrahedron only, by a counting sort of all faces on their smallest point: 4 bytes a face and 4 a point above the mesh
-// itself. A hash table of open faces was rejected: it is smaller on well-ordered meshes, but half of all faces on shuffled ones, and
-// each of its steps misses the cache.
+// Finds the faces of one tetrahedron only by a counting sort of all faces by their smallest point: 4 bytes a face and 4 a point beside the mesh. A
+// hash table of open faces was rejected: it is smaller on well-ordered meshes, but holds half of all faces of a shuffled one, and each of its steps
+// misses the cache.
 #include "common/mesh/boundary.h"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ std::uint64_t others(const Triangle& t) {
 template <class Id>
 std::vector<bool> single_faces(const Mesh& mesh) {
   const std::uint64_t faces = 4 * std::uint64_t{mesh.tets.size()};
-  std::vector<Id> ends(mesh.points.size() + 1, 0);  // ends[p + 1]: at first the number of p's faces, then where they end in by_point
+  std::vector<Id> ends(mesh.points.size() + 1, 0);  // ends[p + 1]: at first the number of p's faces, then their end in by_point
   for (std::uint64_t id = 0; id < faces; ++id) ++ends[smallest(face(mesh, id)) + std::size_t{1}];
   // Shifted by one place, so that filling the buckets turns starts into ends and no second array is needed.
   Id start = 0;

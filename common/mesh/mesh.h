@@ -10,10 +10,10 @@
 
 namespace intervale {
 
-// What a mesh point lies on: a grid vertex inside the range, the alpha surface or the beta surface.
+// What a mesh point lies on: a grid vertex inside the range (inside), the alpha surface or the beta surface.
 enum class Surface : std::uint8_t { inside = 0, alpha = 1, beta = 2 };
 
-// A vector whose new elements are not set to anything until they are written: a large mesh is written once, by many threads.
+// An allocator whose vectors leave new elements uninitialised: a large mesh is written once, by many threads.
 template <class T>
 struct DefaultInit : std::allocator<T> {
   template <class U>
@@ -40,7 +40,7 @@ struct Mesh {
   MeshArray<std::array<std::uint32_t, 4>> tets;
 };
 
-// The sum of the volumes of the tetrahedra, world units cubed; compensated, so that it does not depend on their order to 1e-12 relative.
+// The sum of the volumes of the tetrahedra, in world units cubed; compensated, so that their order changes it by less than 1e-12 relative.
 [[nodiscard]] double volume_of(const Mesh& mesh);
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// The sum of the tetrahedra's hashes: it does not depend on their order. Twice, with different seeds.
+// A sum of hashes of tetrahedra does not depend on their order. Two sums, with different seeds.
 #include "common/mesh/mesh_digest.h"
 
 #include <xxhash.h>

@@ -1,4 +1,4 @@
-// A mesh in one short text, by which two that were made in different places are compared.
+// A digest of a mesh, to compare meshes that were made in different places.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace intervale {
 
-// 32 hexadecimal digits. Equal for meshes of the same tetrahedra at the same places with the same surfaces, in any order of points and tetrahedra;
-// for others it differs, but by an accident that none need fear who does not look for it. O(tetrahedra).
+// 32 hexadecimal digits. Equal for meshes of the same tetrahedra, by position and Surface, in any order of points and tetrahedra. Other meshes have
+// another digest, except by collision; not cryptographic. O(tetrahedra).
 [[nodiscard]] std::string mesh_digest(const Mesh& mesh);
 
 }  // namespace intervale

@@ -11,8 +11,8 @@ Result<void> check_description(const Description& d) {
     const double far = d.grid.origin[i] + d.grid.spacing[i] * (d.grid.dims[i] - 1);
     if (!(d.grid.spacing[i] > 0) || !std::isfinite(d.grid.origin[i]) || !std::isfinite(far)) return fail("spacing or origin is out of bounds");
   }
-  if (!(d.range.alpha <= d.range.beta)) return fail("the range is none");
-  if (!(d.max_error >= 0) || !std::isfinite(d.max_error)) return fail("the largest error is none");
+  if (!(d.range.alpha <= d.range.beta)) return fail("invalid range: alpha is greater than beta");
+  if (!(d.max_error >= 0) || !std::isfinite(d.max_error)) return fail("the largest error is negative or not finite");
   return {};
 }
 

@@ -1,4 +1,4 @@
-// What there is to know about an interval volume before its first update.
+// Everything about an interval volume except its updates.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ struct FullMesh {
   friend bool operator==(const FullMesh&, const FullMesh&) = default;
 };
 
-// Everything about an interval volume but its updates. A client starts from this.
+// A client starts from this.
 struct Description {
   std::string name;
   Grid grid;
@@ -38,13 +38,13 @@ struct Description {
   std::uint64_t updates = 0;       // relevant diamonds
   std::uint64_t coefficients = 0;  // cuts on their subdivision edges
   FullMesh full;
-  std::uint64_t content_hash = 0;        // equal for equal contents, whatever the name
-  std::vector<std::uint8_t> root_patch;  // the sides of the 8 corners and the cuts on the root's edges; see root_patch.h
+  std::uint64_t content_hash = 0;        // of the contents; the name does not count
+  std::vector<std::uint8_t> root_patch;  // the root patch, encoded: sides of the 8 corners, cuts on the root's edges (root_patch.h)
   friend bool operator==(const Description&, const Description&) = default;
 };
 
-// Checks a description from outside: sides within bounds, the box finite and not flat, a range, numbers that can be. The root patch is checked by
-// decode_root_patch.
+// Checks a description from outside: sides within bounds, a box that is finite and not flat, a valid range, a finite error.
+// decode_root_patch checks the root patch.
 [[nodiscard]] Result<void> check_description(const Description& description);
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// Sides of a range, and where its two surfaces cut an edge.
+// The side of a value with respect to a range, and the cuts of the range's two surfaces on an edge.
 #pragma once
 
 #include <algorithm>
@@ -34,8 +34,8 @@ struct Cuts {
   return c;
 }
 
-// Cuts of the edge whose ends hold the finite values `from` and `to`; seen from the other end they are the same. Where alpha < beta and both surfaces
-// cut, the cut nearer to `from` stays strictly nearer.
+// The cuts of an edge whose ends have the finite values `from` and `to`; exchanging the ends gives the reversed cuts. Where alpha < beta and both
+// surfaces cut, the cut nearer to `from` stays strictly nearer: if quantisation makes them equal, one moves by a step.
 [[nodiscard]] inline Cuts cuts_between(double from, double to, const Range& range) {
   const double low = std::min(from, to), high = std::max(from, to);
   const Side a = side_of(low, range), b = side_of(high, range);

@@ -12,7 +12,7 @@ constexpr int kEdge[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4,
 
 using Polygon = std::vector<PatchCorner>;
 
-// Places 0..9: the vertices, then the edges' midpoints. Whether place a comes before place b in the given order.
+// Places 0..9 are the vertices, then the midpoints of the edges. Whether place a comes before place b in the given order.
 bool place_less(int order, int a, int b) {
   constexpr int ends[10][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
   if (a == b) return false;
@@ -20,7 +20,7 @@ bool place_less(int order, int a, int b) {
   const auto [b0, b1] = ends[b];
   if (a0 <= b0 && a1 <= b1) return true;  // vertices ascend, so this decides
   if (b0 <= a0 && b1 <= a1) return false;
-  // Left are an edge that spans further on both sides, and what lies between its ends.
+  // What remains: an edge whose ends enclose the other place.
   const bool a_spans = a0 < b0;
   const int s0 = a_spans ? a0 : b0, s1 = a_spans ? a1 : b1, m0 = a_spans ? b0 : a0, m1 = a_spans ? b1 : a1;
   int bit = 0;
@@ -60,7 +60,7 @@ Polygon clip(const std::array<std::uint8_t, 3>& face, const std::array<Side, 4>&
   return polygon;
 }
 
-// The section of one surface: what the clipped faces leave open, the other way round. which: 0 alpha, 1 beta.
+// The polygon of one surface, 0 alpha or 1 beta: its sides are the open sides of the clipped faces, reversed.
 Polygon section(const std::vector<Polygon>& faces, int which) {
   std::map<PatchCorner, PatchCorner> next;
   const auto on = [which](PatchCorner c) { return c >= 4 && (c - 4) % 2 == which; };

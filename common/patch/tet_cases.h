@@ -1,10 +1,10 @@
-// The interval volume inside one tetrahedron: 15 cases by how many of its vertices lie below, inside and above the range, made into tetrahedra.
+// The interval volume inside one tetrahedron, as tetrahedra: 15 cases by how many of its vertices lie below, inside and above the range.
 //
 // Gregory M. Nielson and Junwon Sung, "Interval Volume Tetrahedrization", 1997 (the cases); Weiss and De Floriani 2008, section 7 (their use).
 // The table is generated: the part of the tetrahedron inside the range is a convex polyhedron whose corners are inside vertices and cuts; every
-// face is split from its lowest corner, and the polyhedron is coned from its lowest corner. "Lowest" is one order for all tetrahedra (by the midpoint
-// of the edge that a corner lies on, a vertex being its own midpoint; then alpha before beta), so that two tetrahedra split the face between them
-// alike.
+// face is split from its lowest corner, and the polyhedron is coned from its lowest corner. One order holds for all tetrahedra (by the midpoint of
+// the edge that a corner lies on, a vertex being its own midpoint; then alpha before beta), so that two tetrahedra split the face that they share
+// in the same way.
 #pragma once
 
 #include <array>
@@ -37,8 +37,8 @@ inline constexpr int kTetOrders = 32;
          (sides >> (2 * s.vertex[3]) & 3) << 6;
 }
 
-// Sides of the tetrahedra around a diamond and of their halves, as of tet_sides: both ends of the spine (of a half: the end that stays, then the
-// centre), belt i and belt i + 1. sides: two bits each, by local vertex.
+// Sides of the tetrahedra around a diamond and of their halves, encoded as by tet_sides: both ends of the spine (of a half: the end that stays, then
+// the centre), belt i and belt i + 1. sides: two bits each, by local vertex.
 class Ring {
  public:
   Ring(std::uint32_t sides, int belt) : ends_{sides & 3, sides >> 2 & 3}, centre_(sides >> (2 * kCentre) & 3) {
@@ -57,15 +57,16 @@ class TetCases {
  public:
   TetCases();
 
-  // The patch's tetrahedra as corners, positively oriented when vertices 0..3 are (else exchange two corners of each). sides as of tet_sides.
+  // The patch's tetrahedra as corners, positively oriented when vertices 0..3 are (else exchange two corners of each). sides: as encoded by
+  // tet_sides.
   [[nodiscard]] std::span<const std::array<PatchCorner, 4>> tets(int order, unsigned sides) const {
     const Entry e = entries_[order * 256 + sides];
     return {tets_.data() + e.first, e.count};
   }
   [[nodiscard]] unsigned count(int order, unsigned sides) const { return entries_[order * 256 + sides].count; }
 
-  // How many there are whatever the order, vertices taken in any order too; kDepends for a tetrahedron with vertices below, inside and above in which
-  // that depends on it.
+  // The number of tetrahedra if it is the same for every order, with the vertices in any sequence; otherwise kDepends, which is so for some
+  // tetrahedra with vertices below, inside and above.
   static constexpr unsigned kDepends = 255;
   [[nodiscard]] unsigned count(unsigned sides) const { return counts_[sides]; }
 
@@ -78,7 +79,7 @@ class TetCases {
   std::array<std::uint8_t, 256> counts_{};
 };
 
-// The table, made at first use.
+// The table, computed at first use.
 [[nodiscard]] const TetCases& tet_cases();
 
 }  // namespace intervale

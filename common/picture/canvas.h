@@ -1,4 +1,4 @@
-// A picture being drawn: triangles with depth, lit from where they are seen, on a light background.
+// Draws triangles with a depth buffer, lit from the viewpoint, on a light background.
 #pragma once
 
 #include <array>
@@ -13,25 +13,26 @@
 
 namespace intervale {
 
-// Rows from the top, red, green and blue a byte each, sRGB; no gaps.
+// Rows from the top; red, green and blue, a byte each, sRGB; rows without padding.
 struct Pixels {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;
 };
 
-// One thread, from its making to its end.
+// Belongs to one thread from creation to destruction.
 class Canvas {
  public:
-  // The background. size: width and height, at least 1. Fails where nothing can be drawn, or not as large.
+  // Draws the background. size: width and height, at least 1. Fails where OpenGL ES is missing, or the size is too large for it.
   static Result<Canvas> create(const std::array<int, 2>& size, const Viewpoint& viewpoint);
   Canvas(Canvas&&) noexcept;
   Canvas& operator=(Canvas&&) = delete;
   ~Canvas();
 
-  // Three corners a triangle, counterclockwise seen from outside; both sides are seen. Where two triangles coincide, that which faces the eye is.
+  // Three corners a triangle, counterclockwise seen from outside; both sides are visible. Where two triangles coincide, the one that faces the eye
+  // wins.
   void draw(std::span<const Corner> corners);
 
-  // Fails if the graphics library ran out of memory on the way.
+  // Fails if the graphics library ran out of memory.
   [[nodiscard]] Result<Pixels> finish();
 
  private:

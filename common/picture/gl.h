@@ -1,4 +1,4 @@
-// OpenGL ES 3 without a display: Mesa's EGL, found when the first picture is drawn, so that machines that draw none need none of it.
+// OpenGL ES 3 without a display, by Mesa's EGL. Loaded when the first picture is drawn, so that machines that draw none do not need it.
 #pragma once
 
 #include <EGL/egl.h>
@@ -28,7 +28,7 @@ struct Gl {
 #undef INTERVALE_GL_MEMBER
 };
 
-// A context that is current in the thread that made it, as long as it lives; what is made in it goes with it. One thread.
+// A context, current in the thread that created it while it exists; it owns all objects created in it. One thread.
 class GlContext {
  public:
   // Fails, with what to install, where there is no EGL or it has no OpenGL ES 3 without a display.

@@ -13,7 +13,7 @@
 namespace intervale {
 namespace {
 
-// Four samples a pixel with depths are 32 bytes: about a gigabyte. The screens called 8K have a few less.
+// Four samples a pixel, with depth, take 32 bytes: about a gigabyte. 8K screens have slightly fewer pixels.
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 25;
 
 }  // namespace

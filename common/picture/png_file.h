@@ -7,7 +7,7 @@
 
 namespace intervale {
 
-// Writes aside and renames. At least one pixel.
+// Writes a temporary file and renames it. At least one pixel.
 Result<void> write_png(const std::filesystem::path& path, const Pixels& pixels);
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// What a Canvas runs on each corner and on each pixel.
+// The vertex and fragment shaders of a Canvas.
 #pragma once
 
 namespace intervale {
@@ -12,7 +12,7 @@ void main() {
   gl_Position = vec4(corner, 0.0, 1.0);
 })";
 
-// What both fragment shaders begin with. Colours are mixed as light, and made sRGB at the end.
+// The beginning of both fragment shaders. Colours are mixed as linear light, and converted to sRGB at the end.
 inline constexpr char kFragmentPreamble[] = R"(#version 300 es
 precision highp float;
 uniform float height;
@@ -43,8 +43,8 @@ void main() {
   v_part = look & 3u;
 })";
 
-// A light beside the eye, a soft one from above, little else. What is far pales, so that depth is seen.
-// Sides are drawn about a pixel wide; where triangles are but a few pixels wide, they fade, or nothing else would be seen.
+// A light beside the eye and a soft one from above. Distant parts are paler, as a cue for depth.
+// Sides are drawn about a pixel wide; where triangles are only a few pixels wide, they fade, or they would hide everything else.
 inline constexpr char kMeshFragmentShader[] = R"(in vec3 v_normal;
 in vec3 v_to_eye;
 in vec3 v_sides;

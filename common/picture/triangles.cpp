@@ -18,15 +18,15 @@ constexpr std::size_t kAtOnce = 3 * 16384;
 
 Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) { return normalized(cross(subtract(b, a), subtract(c, a))); }
 
-// The surfaces' triangles have all their points on one of them; every other one is part of a side of the box, where a surface leaves lines only.
+// A triangle of a surface has all its points on it; every other triangle is part of a side of the box, which surfaces meet in lines only.
 Part part_of(const Mesh& mesh, const Triangle& t) {
   const Surface surface = mesh.surface[t[0]];
   if (surface == Surface::inside || mesh.surface[t[1]] != surface || mesh.surface[t[2]] != surface) return Part::box;
   return surface == Surface::alpha ? Part::alpha : Part::beta;
 }
 
-// Beginning with the corner that is least by its coordinates. The order of a mesh's points and tetrahedra is not told by what the mesh is, and what
-// is drawn should be: rounding follows the order of corners.
+// Each begins with the corner of least coordinates. Rounding follows the order of corners, and a picture must not depend on the order of the mesh's
+// points and tetrahedra, which is arbitrary.
 std::vector<Triangle> ordered_boundary(const Mesh& mesh) {
   std::vector<Triangle> triangles = boundary_triangles(mesh);
   for (Triangle& t : triangles)
@@ -59,7 +59,7 @@ struct Polygon {
   }
 };
 
-// What is left of a triangle behind the plane. The side along the plane is not drawn: it is the cut's.
+// The part of a triangle behind the plane. The side along the plane is not drawn: it belongs to the cut.
 Polygon clipped(const Polygon& triangle, const std::array<double, 3>& distances) {
   Polygon kept;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -1,4 +1,4 @@
-// What a picture of a mesh is drawn from: the triangles of its boundary and of a cut through it, with normals.
+// The triangles of a picture: the boundary of a mesh and a cut through it, with normals.
 #pragma once
 
 #include <array>
@@ -12,25 +12,24 @@
 
 namespace intervale {
 
-// What a triangle is part of: the alpha surface, the beta surface, the sides of the box, the cut.
+// What a triangle belongs to: the alpha surface, the beta surface, a side of the box, or the cut.
 enum class Part : std::uint8_t { alpha = 0, beta = 1, box = 2, cut = 3 };
 
-// A corner of a triangle, as the graphics library takes it.
+// A corner of a triangle, in the layout of the vertex shader.
 struct Corner {
   std::array<float, 3> position;  // in the scene
   std::array<float, 3> normal;    // outward, of length 1
-  std::uint32_t look;             // the same for all three: the Part, and 4 << i: the side opposite corner i is an edge of the mesh, to be drawn
+  std::uint32_t look;             // equal for all three: the Part, and bit 4 << i if the side opposite corner i is drawn as an edge of the mesh
 };
 
 struct TriangleOptions {
-  std::optional<Plane> clip;  // what lies on its normal's side is cut away
+  std::optional<Plane> clip;  // cuts away what lies on its normal's side (plane_cut.h)
   bool edges = false;         // whether the edges of the boundary are drawn; those of a cut always are
 };
 
-// Hands the corners over, three by three, counterclockwise seen from outside; some ten thousand at a time, valid during the call. Normals of the
-// alpha and of the beta surface are smooth: of its triangles around the point, weighted by their angles there (Thuermer and Wuethrich, Computing
-// Vertex Normals from Polygonal Facets, 1998). Triangles without an area are left out. Which triangles come, and
-// how their corners follow each other, depends on where points lie and not on their numbers. O(points + tetrahedra).
+// Calls take() with corners, three a triangle, counterclockwise seen from outside; some ten thousand at a time, valid during the call. Normals of the
+// alpha and of the beta surface are smooth (normals.h). Triangles without an area are left out. The triangles and the order of their corners depend
+// on the positions of points, not on their numbers. O(points + tetrahedra).
 void for_each_triangle(const Mesh& mesh, const TriangleOptions& options, const Viewpoint& viewpoint,
                        const std::function<void(std::span<const Corner>)>& take);
 

@@ -61,7 +61,7 @@ Viewpoint::Viewpoint(const Camera& camera, const Box& box) : centre(middle_of(bo
   const double scale_y = 1 / std::tan(camera.fov * std::numbers::pi / 360), scale_x = scale_y * camera.viewport[1] / camera.viewport[0];
   const double a = (far + nearest) / (nearest - far), b = 2 * far * nearest / (nearest - far);
 
-  // Put together in doubles: from afar, what is left of far numbers that nearly cancel is what depths are told apart by.
+  // Computed in doubles: seen from afar, depths differ by the small remainder of large numbers that nearly cancel.
   const std::array<Vec3, 3> rows{axes.right, axes.up, axes.back};
   std::array<double, 3> shift;
   for (std::size_t i = 0; i < 3; ++i) shift[i] = -dot(rows[i], from);

@@ -1,4 +1,4 @@
-// Where a picture is seen from, and how that puts points of the world onto it.
+// The viewpoint of a picture, and the projection of points of the world.
 #pragma once
 
 #include <array>
@@ -10,12 +10,12 @@
 
 namespace intervale {
 
-// A camera with the whole box in its picture of 1280 x 960 pixels, from above and aside. A cut is seen from its open side. The box is not a point.
+// A camera that shows the whole box in 1280 x 960 pixels, in a three-quarter view from above; a cut from its open side. The box is not a point.
 [[nodiscard]] Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip);
 
-// The scene: the world moved and scaled so that the box's corners lie on the sphere of radius 1 around the origin. Floats suffice there.
+// The scene is the world moved and scaled so that the box's corners lie on the unit sphere; floats are precise enough there.
 struct Viewpoint {
-  Viewpoint(const Camera& camera, const Box& box);  // a camera that check_lod lets pass
+  Viewpoint(const Camera& camera, const Box& box);  // camera: valid by check_lod
 
   [[nodiscard]] std::array<float, 3> in_scene(const Vec3& world) const;
 

@@ -50,11 +50,11 @@ StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(s
   for (std::uint32_t b = 0; b < bricks.size(); ++b) {
     const UpdateIndex end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
     pending_[b].unsent = std::uint16_t(end - bricks[b].first);
-    pending_[b].level = std::uint16_t(volume_->brick_error_level(b));
+    pending_[b].level = std::uint16_t(volume_->brick_error_step(b));
     pending_[b].object_error = Up16(volume_->brick_object_error(b));
   }
-  const auto half_levels = volume_->supercube_half_levels();
-  half_levels_.assign(half_levels.begin(), half_levels.end());
+  const auto half_steps = volume_->supercube_half_steps();
+  half_steps_.assign(half_steps.begin(), half_steps.end());
 }
 
 bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
@@ -86,10 +86,10 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     --sent_count_;
     Pending& pending = pending_[here.brick];
     ++pending.unsent;
-    const unsigned level = volume_->error_level(i);
+    const unsigned level = volume_->error_step(i);
     pending.level = std::max(pending.level, std::uint16_t(level));
     pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(here.supercube, scale_of_key(g.key), level)));
-    half_levels_[here.supercube] = std::max(half_levels_[here.supercube], volume_->half_of_level(level));
+    half_steps_[here.supercube] = std::max(half_steps_[here.supercube], volume_->half_of_step(level));
   });
   return true;
 }
@@ -144,7 +144,7 @@ StreamPlan::Remaining StreamPlan::remaining() const {
   for (std::uint32_t b = 0; b < pending_.size(); ++b) {
     if (pending_[b].rank != 0) level = std::max(level, unsigned(pending_[b].level));
   }
-  remaining.error = volume_->error_levels()[level];
+  remaining.error = volume_->error_steps()[level];
   return remaining;
 }
 
@@ -222,7 +222,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const std::uint32_t s = first.supercube;
   const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
-  Unsent rest{.level = volume_->level_of_half(half_levels_[s])};
+  Unsent rest{.level = volume_->step_of_half(half_steps_[s])};
   if (candidates == 0) return rest;
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
@@ -237,9 +237,9 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   rest = {};
   if (!add_band(ranking, first, candidates, builder, rest)) return {};
   for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
-    rest.level = std::max(rest.level, volume_->error_level(first.index + UpdateIndex(std::countr_zero(others))));
+    rest.level = std::max(rest.level, volume_->error_step(first.index + UpdateIndex(std::countr_zero(others))));
   }
-  half_levels_[s] = volume_->half_of_level(rest.level);
+  half_steps_[s] = volume_->half_of_step(rest.level);
   return rest;
 }
 
@@ -253,7 +253,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
   for (; candidates != 0; candidates &= candidates - 1) {
     const auto k = unsigned(std::countr_zero(candidates));
     for (; at <= k; ++at, slots &= slots - 1) place.slot = std::uint32_t(std::countr_zero(slots));
-    const unsigned level = volume_->error_level(first + k);
+    const unsigned level = volume_->error_step(first + k);
     float importance = ranking.importance(level);
     if (importance > 0 && !ranking.meets_roi(int(place.slot))) importance = 0;
     importance = std::max(importance, least);

@@ -3,15 +3,13 @@
 #include <cmath>
 #include <cstddef>
 
-#include "common/util/vec3.h"
-
 namespace intervale {
 namespace {
 
 Result<void> check_camera(const Camera& c) {
   if (!is_finite(c.eye) || !is_finite(c.look_at) || !is_finite(c.up)) return misuse("the camera's vectors must be finite");
   const Vec3 ahead = subtract(c.look_at, c.eye);
-  if (!(length(ahead) > 0) || !std::isfinite(length(ahead))) return misuse("the camera must look at another point than the one it is at");
+  if (!(length(ahead) > 0) || !std::isfinite(length(ahead))) return misuse("the camera must look at another point than its own position");
   if (!(length(cross(ahead, c.up)) > 1e-9 * length(ahead) * length(c.up))) return misuse("the camera's up must not be along its line of sight");
   if (!(c.fov > 0 && c.fov < 180)) return misuse("the field of view must be above 0 and below 180 degrees");
   for (const int pixels : c.viewport) {

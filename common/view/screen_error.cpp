@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "common/util/vec3.h"
-
 namespace intervale {
 namespace {
 
@@ -16,7 +14,7 @@ double reach_along(const Vec3& reach, const Vec3& n) { return reach[0] * std::ab
 
 }  // namespace
 
-View::View(const Camera& camera, const Grid& grid) : origin_(grid.origin), spacing_(grid.spacing), eye_(camera.eye) {
+ScreenError::ScreenError(const Camera& camera, const Grid& grid) : origin_(grid.origin), spacing_(grid.spacing), eye_(camera.eye) {
   ahead_ = normalized(subtract(camera.look_at, eye_));
   right_ = normalized(cross(ahead_, normalized(camera.up)));
   up_ = cross(right_, ahead_);
@@ -36,7 +34,7 @@ View::View(const Camera& camera, const Grid& grid) : origin_(grid.origin), spaci
   sides_ = {side(right_, 1, tan_x_), side(right_, -1, tan_x_), side(up_, 1, tan_y_), side(up_, -1, tan_y_)};
 }
 
-double View::pixels_per_unit(const Region& region) const {
+double ScreenError::pixels_per_unit(const Region& region) const {
   Vec3 at, reach;
   double gap2 = 0, far2 = 0;  // to the nearest point of the region, and to its furthest corner
   for (int i = 0; i < 3; ++i) {
@@ -46,9 +44,9 @@ double View::pixels_per_unit(const Region& region) const {
     gap2 += gap * gap;
     far2 += (std::abs(at[i]) + reach[i]) * (std::abs(at[i]) + reach[i]);
   }
-  // What the picture shows of the region is no nearer than that.
+  // The visible part of the region is no nearer than that.
   const double depth = std::max({dot(at, ahead_) - reach_along(reach, ahead_), std::sqrt(gap2) * cos_corner_, least_depth_});
-  // How far the whole region is beyond a side of what is seen; from a right angle on, how far from the side's edge line.
+  // The distance of the whole region beyond a side of the view frustum; behind a right angle, from the side's middle line.
   double outside = 0;
   for (const Side& s : sides_) {
     const double beyond = -dot(at, s.inward) - reach_along(reach, s.inward), behind = -dot(at, s.edge) - reach_along(reach, s.edge);
@@ -58,7 +56,7 @@ double View::pixels_per_unit(const Region& region) const {
   return scale_ / (depth * (1 + kFade * outside / std::sqrt(far2)));
 }
 
-bool View::is_near(const Region& region) const {
+bool ScreenError::is_near(const Region& region) const {
   double across2 = 0, gap2 = 0;
   for (int i = 0; i < 3; ++i) {
     const double at = origin_[i] + spacing_[i] * region.middle[i] - eye_[i], reach = spacing_[i] * region.reach[i];
@@ -69,19 +67,19 @@ bool View::is_near(const Region& region) const {
   return gap2 < 9 * across2;
 }
 
-bool View::is_central(const Region& region) const {
+bool ScreenError::is_central(const Region& region) const {
   Vec3 at;
   for (int i = 0; i < 3; ++i) at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
   const double depth = dot(at, ahead_);
   return std::abs(dot(at, right_)) <= tan_x_ / 2 * depth && std::abs(dot(at, up_)) <= tan_y_ / 2 * depth;
 }
 
-// Diamonds reach h further down than their supercubes, and no further up.
-View::Region region_of(const Domain& domain, SupercubeKey key, std::int32_t cells) {
+// Diamonds extend below their supercube by h, and not above it.
+ScreenError::Region region_of(const Domain& domain, SupercubeKey key, std::int32_t cells) {
   const int scale = scale_of_key(key);
   const Vertex p = position_of_key(key), last = domain.last();
   const std::int32_t h = 1 << scale;
-  View::Region region;
+  ScreenError::Region region;
   const auto along = [&](int axis, std::int32_t at, std::int32_t end) {
     const double low = std::max(0.0, 4.0 * at * h - h), high = std::min(double(end), 4.0 * (at + cells) * h);
     region.middle[axis] = (low + high) / 2;

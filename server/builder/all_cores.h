@@ -1,4 +1,4 @@
-// Independent pieces of work on all cores that oneTBB may use.
+// Runs independent pieces of work on all cores that oneTBB may use.
 #pragma once
 
 #include <cstddef>

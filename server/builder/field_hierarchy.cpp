@@ -13,24 +13,24 @@
 #include "common/diamond/supercube_neighbours.h"
 #include "common/patch/tet_cases.h"
 #include "common/util/bits.h"
-#include "server/builder/error_levels.h"
+#include "server/builder/error_steps.h"
 #include "server/builder/interpolation_error.h"
 #include "server/builder/relevance.h"
 #include "server/builder/supercube_family.h"
-#include "server/builder/surface_moves.h"
+#include "server/builder/surface_deviation.h"
 
 namespace intervale {
 namespace {
 
-constexpr int kShared = 5;  // diamonds of this scale and up are few and large: threads share their tetrahedra out
+constexpr int kShared = 5;  // diamonds of this scale and coarser are few and large: their tetrahedra are shared out among threads
 
 // The samples around a diamond, by local vertex.
 using Around = std::array<double, kMaxVertices + 1>;
 
 template <class T>
-Around around(const Field<T>& field, const Domain& domain, const Diamond& d, const Outline& outline) {
+Around around(const Field<T>& field, const Domain& domain, const Diamond& d, const BorderShape& shape) {
   Around f{};
-  if (outline.interior) {
+  if (shape.interior) {
     const T* const centre = &field.samples[field.index(d.centre)];
     const std::ptrdiff_t x = d.h, y = x * (field.last.x + 1), z = y * (field.last.y + 1);
     for (int v = 0; v < d.row->vertices; ++v) {
@@ -41,7 +41,7 @@ Around around(const Field<T>& field, const Domain& domain, const Diamond& d, con
     return f;
   }
   for (int v = 0; v < d.row->vertices; ++v) {
-    if (outline.vertices >> v & 1) f[v] = field.at(domain.clamp(d.vertex(v)));
+    if (shape.vertices >> v & 1) f[v] = field.at(domain.clamp(d.vertex(v)));
   }
   f[kCentre] = field.at(domain.clamp(d.centre));
   return f;
@@ -66,12 +66,12 @@ constexpr std::array<EdgeTable, 3> kEdgeTables = [] {
   return tables;
 }();
 
-DiamondContext context_of(const Around& f, const Outline& outline, const Range& range) {
+DiamondContext context_of(const Around& f, const BorderShape& shape, const Range& range) {
   DiamondContext c;
-  c.row = outline.row;
-  c.vertices = outline.vertices;
+  c.row = shape.row;
+  c.vertices = shape.vertices;
   const EdgeTable& edges = kEdgeTables[c.row->cls];
-  std::uint32_t alpha = 0, beta = 0;  // the edges that they cut: one end is below, or above, and the other is not
+  std::uint32_t alpha = 0, beta = 0;  // the edges that each surface cuts: exactly one end is below, or above
   for (int v = 0; v < c.row->vertices; ++v) {
     if (!c.has(v)) continue;
     const Side side = side_of(f[v], range);
@@ -79,7 +79,7 @@ DiamondContext context_of(const Around& f, const Outline& outline, const Range& 
     alpha ^= side == Side::below ? edges.at[v] : 0;
     beta ^= side == Side::above ? edges.at[v] : 0;
   }
-  for (const int e : set_bits((alpha | beta) & outline.edges)) {
+  for (const int e : set_bits((alpha | beta) & shape.edges)) {
     const Cuts cuts = cuts_between(f[edges.ends[e][0]], f[edges.ends[e][1]], range);
     int n = 0;
     if (alpha >> e & 1) c.cut[e][0] = std::uint16_t(2 * cuts.q[n++] + 1);
@@ -88,7 +88,7 @@ DiamondContext context_of(const Around& f, const Outline& outline, const Range& 
   return c;
 }
 
-// The cuts on the subdivision edges; comes back with how many.
+// Writes the cuts on the subdivision edges; returns their number.
 std::size_t cuts_of(const Around& f, const DiamondContext& c, const Range& range, std::uint8_t* cuts) {
   const Side centre = side_of(f[kCentre], range);
   std::size_t n = 0;
@@ -101,32 +101,33 @@ std::size_t cuts_of(const Around& f, const DiamondContext& c, const Range& range
 }
 
 // Tetrahedra of the patch in one tetrahedron of a diamond, or one of its halves. local: its vertices.
-unsigned patch_tets(const TetCases& cases, const Domain& domain, const Diamond& d, const Outline& outline, std::uint32_t sides,
+unsigned patch_tets(const TetCases& cases, const Domain& domain, const Diamond& d, const BorderShape& border, std::uint32_t sides,
                     const std::array<std::uint8_t, 4>& local, const TetShape& known) {
-  if (outline.interior) return cases.count(known.order, shape_sides(known, sides));
+  if (border.interior) return cases.count(known.order, shape_sides(known, sides));
   const auto positions = domain.positions(d, local);
   if (!Domain::exists(positions)) return 0;
   const TetShape shape = shape_of(positions, local, d.row->belt);
   return cases.count(shape.order, shape_sides(shape, sides));
 }
 
-// Leaves of the full mesh that a split diamond leaves: the halves that go to children that are never split. split: a bit for each child that is.
-std::uint64_t leaves(const TetCases& cases, const Domain& domain, const Diamond& d, const Outline& outline, std::uint32_t sides, unsigned split) {
+// The tetrahedra of the full mesh in a split diamond: the patches of the halves of children that are never split. split: a bit for each child that
+// is.
+std::uint64_t leaves(const TetCases& cases, const Domain& domain, const Diamond& d, const BorderShape& shape, std::uint32_t sides, unsigned split) {
   const std::uint32_t belt = sides >> 4 & ((1u << 2 * d.row->belt) - 1), ring = belt | belt << 2 * d.row->belt, centre = sides >> (2 * kCentre);
   std::uint64_t n = 0;
   for (int k = 0; k < d.row->children; ++k) {
     if (split >> k & 1) continue;
     for (const Duet::Half& half : d.row->child[k].half) {
-      if (!(outline.tets >> half.tet & 1)) continue;
-      // The end that stays, both belt vertices, the centre: that is mostly enough.
+      if (!(shape.tets >> half.tet & 1)) continue;
+      // The end that stays, both belt vertices and the centre mostly determine the number.
       const unsigned count = cases.count((sides >> (2 * half.end) & 3) | (ring >> (2 * half.tet) & 15) << 2 | centre << 6);
-      if (count == 0 || (outline.interior && count != TetCases::kDepends)) {
+      if (count == 0 || (shape.interior && count != TetCases::kDepends)) {
         n += count;
         continue;
       }
       auto local = d.row->tet(half.tet);
       local[1 - half.end] = kCentre;
-      n += patch_tets(cases, domain, d, outline, sides, local, d.row->half_shape[half.tet][half.end]);
+      n += patch_tets(cases, domain, d, shape, sides, local, d.row->half_shape[half.tet][half.end]);
     }
   }
   return n;
@@ -142,6 +143,18 @@ unsigned children_in_set(SetNeighbours& neighbours, int slot) {
   return some;
 }
 
+// The error of one diamond, its tetrahedra shared out among threads.
+template <class T>
+double error_in_parallel(const DiamondErrors<T>& error_of, const Diamond& d, const BorderShape& shape) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<int>(0, d.row->tets, 1), 0.0,
+      [&](const auto& tets, double worst) {
+        for (int i = tets.begin(); i != tets.end(); ++i) worst = std::max(worst, error_of(d, shape, 1u << i));
+        return worst;
+      },
+      [](double a, double b) { return std::max(a, b); });
+}
+
 float round_up(double error) {
   if (error >= std::numeric_limits<float>::max()) return std::numeric_limits<float>::max();
   const float f = float(error);
@@ -152,8 +165,8 @@ float round_up(double error) {
 
 FieldHierarchy::FieldHierarchy(const Volume& volume, const BuildOptions& options)
     : volume_(volume), range_(options.range), refine_(options.refine), domain_(volume.grid.dims) {
-  for (int scale = 0; scale < domain_.levels(); ++scale) outlines_.emplace_back(domain_, scale);
-  Relevance found = find_relevant(volume_, range_, refine_, outlines_);
+  for (int scale = 0; scale < domain_.levels(); ++scale) shapes_.emplace_back(domain_, scale);
+  Relevance found = find_relevant(volume_, range_, refine_, shapes_);
   set_ = std::move(found.set);
   unit_cuts_ = found.unit_cuts;
   measure_errors(options.progress);
@@ -168,38 +181,24 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
     for (int scale = 0; scale < domain_.levels(); ++scale) {
       const DiamondErrors<T> error_of(field, extremes, domain_, scale);
       const auto [begin, end] = set_.of_scale(scale);
-      tbb::parallel_for(tbb::blocked_range<std::uint32_t>(begin, end, 1), [&](const auto& some) {
-        for (std::uint32_t brick = some.begin(); brick != some.end(); ++brick) {
-          set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
-            const SupercubeDiamonds diamonds(outlines_, key);
-            UpdateIndex next = set_.first(brick, s);
-            for (const int slot : set_bits(set_.occupancy()[s])) {
-              const Diamond d = diamonds.diamond(slot);
-              const Outline& outline = diamonds.outline(slot);
-              double error = 0;
-              if (scale < kShared) {
-                error = error_of(d, outline);
-              } else {
-                error = tbb::parallel_reduce(
-                    tbb::blocked_range<int>(0, d.row->tets, 1), 0.0,
-                    [&](const auto& tets, double worst) {
-                      for (int i = tets.begin(); i != tets.end(); ++i) worst = std::max(worst, error_of(d, outline, 1u << i));
-                      return worst;
-                    },
-                    [](double a, double b) { return std::max(a, b); });
-              }
-              errors_[next++] = round_up(error);
-            }
-          });
-        }
+      tbb::parallel_for(begin, end, [&](std::uint32_t brick) {
+        set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+          const SupercubeDiamonds diamonds(shapes_, key);
+          UpdateIndex next = set_.first(brick, s);
+          for (const int slot : set_bits(set_.occupancy()[s])) {
+            const Diamond d = diamonds.diamond(slot);
+            const BorderShape& shape = diamonds.shape(slot);
+            errors_[next++] = round_up(scale < kShared ? error_of(d, shape) : error_in_parallel(error_of, d, shape));
+          }
+        });
       });
-      // Every scale goes over the whole box, at most: that share of the work is done.
+      // Every scale visits the whole box at most once: an equal share of the work.
       if (progress) progress(double(scale + 1) / domain_.levels());
     }
   });
 }
 
-// Makes each no smaller than those of the relevant children.
+// Raises each error to the largest of its relevant children.
 void FieldHierarchy::saturate(std::vector<float>& errors) const {
   for (int scale = 0; scale < domain_.levels(); ++scale) {
     const auto [begin, end] = set_.of_scale(scale);
@@ -224,29 +223,30 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
   }
 }
 
-// What makes object errors of errors, supercube by supercube: of moves it is half, but no less than twice what points move in the mean, so that 99 %
-// of them are within it also where all of a surface moves alike, as with labels.
-std::vector<Yield> FieldHierarchy::yields(double max_error, const std::vector<UpdateCode>& codes, const std::vector<float>& levels) const {
-  SurfaceMoves moves = surface_moves(volume_, range_, domain_, set_);
-  saturate(moves.most);
-  const double unit = yield_unit(volume_.grid, max_error);
-  std::vector<Yield> yields(set_.supercubes());
+// Converts errors to object errors, supercube by supercube. An object error is half of the deviation, but no less than twice the mean deviation of
+// surface points, so that 99 % of them are within it also where all of a surface moves alike, as with labels.
+std::vector<ErrorToDistance> FieldHierarchy::error_to_distance(const IntervalVolume::Parts& parts) const {
+  SurfaceDeviation deviation = surface_deviation(volume_, range_, domain_, set_);
+  saturate(deviation.largest);
+  const double unit = error_to_distance_unit(volume_.grid, parts.description.max_error);
+  std::vector<ErrorToDistance> result(set_.supercubes());
   tbb::parallel_for(std::uint32_t(0), std::uint32_t(set_.bricks().size()), [&](std::uint32_t b) {
     set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
       const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
       const double width = diamond_width(volume_.grid) * double(1 << scale_of_key(key));
       double furthest = 0, ratio = 0;
       for (UpdateIndex i = first; i < end; ++i) {
-        const double error = double(levels[codes[i].error_level()]);
+        const double error = double(parts.error_steps[parts.codes[i].error_step()]);
         if (error == 0) continue;
-        furthest = std::max(furthest, double(moves.most[i]));
-        ratio = std::max(ratio, double(moves.most[i]) / error);
+        furthest = std::max(furthest, double(deviation.largest[i]));
+        ratio = std::max(ratio, double(deviation.largest[i]) / error);
       }
-      const double share = furthest > 0 ? std::clamp(2 * double(moves.mean[s]) / furthest, 0.5, 1.0) : 1;
-      yields[s] = Yield::at_least(share * ratio, unit, furthest > width * (1 + 1e-6));
+      const double share = furthest > 0 ? std::clamp(2 * double(deviation.mean[s]) / furthest, 0.5, 1.0) : 1;
+      constexpr double kRounding = 1e-6;
+      result[s] = ErrorToDistance::at_least(share * ratio, unit, furthest > width * (1 + kRounding));
     });
   });
-  return yields;
+  return result;
 }
 
 double FieldHierarchy::value(Vertex v) const {
@@ -268,20 +268,91 @@ RootPatch FieldHierarchy::root_patch() const {
 }
 
 DiamondContext FieldHierarchy::context(const Diamond& d) const {
-  const Outline outline = Outlines::outline_of(domain_, d);
+  const BorderShape shape = BorderShapes::shape_of(domain_, d);
   return visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    return context_of(around(Field<T>{samples, domain_.last()}, domain_, d, outline), outline, range_);
+    return context_of(around(Field<T>{samples, domain_.last()}, domain_, d, shape), shape, range_);
   });
 }
 
 std::vector<std::uint8_t> FieldHierarchy::cuts(const Diamond& d) const {
-  const Outline outline = Outlines::outline_of(domain_, d);
+  const BorderShape shape = BorderShapes::shape_of(domain_, d);
   std::vector<std::uint8_t> cuts(kMaxCuts);
   cuts.resize(visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    const Around f = around(Field<T>{samples, domain_.last()}, domain_, d, outline);
-    return cuts_of(f, context_of(f, outline, range_), range_, cuts.data());
+    const Around f = around(Field<T>{samples, domain_.last()}, domain_, d, shape);
+    return cuts_of(f, context_of(f, shape, range_), range_, cuts.data());
   }));
   return cuts;
+}
+
+// What one brick's updates add to the interval volume, besides their codes.
+struct FieldHierarchy::BrickPart {
+  std::vector<std::uint8_t> residuals;
+  FullMesh full;              // vertices: only samples that are centres
+  std::vector<Vertex> moved;  // samples inside the range to which clamping moves centres outside the box
+};
+
+// Encodes one brick's updates into `codes`.
+template <class T>
+FieldHierarchy::BrickPart FieldHierarchy::encode_brick(const Field<T>& field, std::uint32_t brick, const ErrorStepFinder& step_of,
+                                                       std::vector<UpdateCode>& codes) const {
+  const TetCases& cases = tet_cases();
+  BrickPart part;
+  SetNeighbours neighbours(set_);
+  set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+    const SupercubeDiamonds diamonds(shapes_, key);
+    neighbours.move_to(key);
+    UpdateIndex next = set_.first(brick, s);
+    for (const int slot : set_bits(set_.occupancy()[s])) {
+      const Diamond diamond = diamonds.diamond(slot);
+      const BorderShape& shape = diamonds.shape(slot);
+      const Around f = around(field, domain_, diamond, shape);
+      const Side centre = side_of(f[kCentre], range_);
+      const DiamondContext c = context_of(f, shape, range_);
+      std::array<std::uint8_t, kMaxCuts> cuts, coded;
+      const std::size_t n = cuts_of(f, c, range_, cuts.data());
+      Prediction prediction(c);
+      prediction.encode(centre, std::span(cuts).first(n), coded.data());
+      part.residuals.insert(part.residuals.end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
+      codes[next] = UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first),
+                               unsigned(step_of(errors_[next])));
+      ++next;
+      part.full.tets += leaves(cases, domain_, diamond, shape, c.sides | std::uint32_t(centre) << (2 * kCentre), children_in_set(neighbours, slot));
+      if (centre != Side::inside) continue;
+      if (domain_.contains(diamond.centre))
+        ++part.full.vertices;
+      else
+        part.moved.push_back(domain_.clamp(diamond.centre));
+    }
+  });
+  return part;
+}
+
+// Vertices of the full mesh are cuts of unit edges, for every longer edge with different sides is the spine of a relevant diamond, and samples
+// inside the range that are centres of relevant diamonds or the root's corners.
+FullMesh FieldHierarchy::full_mesh(const std::vector<BrickPart>& parts) const {
+  FullMesh full;
+  full.vertices = unit_cuts_;
+  const Diamond root(domain_.root());
+  std::uint32_t sides = 0;
+  std::vector<Vertex> moved;
+  for (int v = 0; v < kRootVertices; ++v) {
+    const Side at = side(root.vertex(v));
+    sides |= std::uint32_t(at) << (2 * v);
+    if (at == Side::inside) moved.push_back(domain_.clamp(root.vertex(v)));
+  }
+  for (const BrickPart& part : parts) {
+    full.vertices += part.full.vertices;
+    full.tets += part.full.tets;
+    moved.insert(moved.end(), part.moved.begin(), part.moved.end());
+  }
+  std::sort(moved.begin(), moved.end(), [](Vertex a, Vertex b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); });
+  moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
+  for (const Vertex v : moved) full.vertices += v == Vertex{} || !set_.find(v);
+  if (set_.size() != 0) return full;
+  // Nothing is relevant: the root's tetrahedra are the full mesh.
+  const BorderShape shape = BorderShapes::shape_of(domain_, root);
+  for (const int i : set_bits(shape.tets)) full.tets += patch_tets(tet_cases(), domain_, root, shape, sides, root.row->tet(i), root.row->shape[i]);
+  return full;
 }
 
 Result<IntervalVolume> FieldHierarchy::compact() const {
@@ -293,83 +364,24 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
   d.refine = refine_;
   d.root_patch = encode_root_patch(root_patch());
   parts.set = set_;
-  parts.error_levels = choose_error_levels(errors_, kErrorLevels);
-  d.max_error = parts.error_levels.empty() ? 0.0 : double(parts.error_levels.back());
+  parts.error_steps = choose_error_steps(errors_, kMaxErrorSteps);
+  d.max_error = parts.error_steps.empty() ? 0.0 : double(parts.error_steps.back());
   parts.codes.resize(set_.size());
-  const TetCases& cases = tet_cases();
-  const LevelFinder level_of(parts.error_levels);
-  // Each brick's by themselves; then all in one.
-  struct Part {
-    std::vector<std::uint8_t> residuals;
-    FullMesh full;
-    std::vector<Vertex> moved;  // inside, where clamping takes centres that lie outside the box
-  };
-  std::vector<Part> by_brick(set_.bricks().size());
+  const ErrorStepFinder step_of(parts.error_steps);
+  std::vector<BrickPart> by_brick(set_.bricks().size());
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain_.last()};
-    tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()), [&](std::uint32_t b) {
-      Part& part = by_brick[b];
-      SetNeighbours neighbours(set_);
-      set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
-        const SupercubeDiamonds diamonds(outlines_, key);
-        neighbours.move_to(key);
-        UpdateIndex next = set_.first(b, s);
-        for (const int slot : set_bits(set_.occupancy()[s])) {
-          const Diamond diamond = diamonds.diamond(slot);
-          const Outline& outline = diamonds.outline(slot);
-          const Around f = around(field, domain_, diamond, outline);
-          const Side centre = side_of(f[kCentre], range_);
-          const DiamondContext c = context_of(f, outline, range_);
-          std::array<std::uint8_t, kMaxCuts> cuts, coded;
-          const std::size_t n = cuts_of(f, c, range_, cuts.data());
-          Prediction prediction(c);
-          prediction.encode(centre, std::span(cuts).first(n), coded.data());
-          part.residuals.insert(part.residuals.end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
-          parts.codes[next] = UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first),
-                                         unsigned(level_of(errors_[next])));
-          part.full.tets +=
-              leaves(cases, domain_, diamond, outline, c.sides | std::uint32_t(centre) << (2 * kCentre), children_in_set(neighbours, slot));
-          ++next;
-          if (centre != Side::inside) continue;
-          if (domain_.contains(diamond.centre))
-            ++part.full.vertices;
-          else
-            part.moved.push_back(domain_.clamp(diamond.centre));
-        }
-      });
-    });
+    tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()),
+                      [&](std::uint32_t b) { by_brick[b] = encode_brick(field, b, step_of, parts.codes); });
   });
-  parts.yields = yields(d.max_error, parts.codes, parts.error_levels);
-  // Vertices of the full mesh are cuts of unit edges, for every longer edge with different sides is the spine of a relevant diamond, and samples
-  // inside the range that are centres of relevant diamonds or the root's corners.
-  d.full.vertices = unit_cuts_;
-  std::vector<Vertex> moved;
-  const Diamond root(domain_.root());
-  for (int v = 0; v < kRootVertices; ++v) {
-    if (side(root.vertex(v)) == Side::inside) moved.push_back(domain_.clamp(root.vertex(v)));
-  }
+  parts.error_to_distance = error_to_distance(parts);
+  d.full = full_mesh(by_brick);
   std::size_t total = 0;
-  for (const Part& part : by_brick) {
-    total += part.residuals.size();
-    d.full.vertices += part.full.vertices;
-    d.full.tets += part.full.tets;
-    moved.insert(moved.end(), part.moved.begin(), part.moved.end());
-  }
-  std::sort(moved.begin(), moved.end(), [](Vertex a, Vertex b) { return std::tie(a.z, a.y, a.x) < std::tie(b.z, b.y, b.x); });
-  moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
-  for (Vertex v : moved) d.full.vertices += v == Vertex{} || !set_.find(v);
-  if (set_.size() == 0) {
-    std::uint32_t sides = 0;
-    for (int v = 0; v < kRootVertices; ++v) sides |= std::uint32_t(side(root.vertex(v))) << (2 * v);
-    const Outline outline = Outlines::outline_of(domain_, root);
-    for (int i = 0; i < root.row->tets; ++i) {
-      if (outline.tets >> i & 1) d.full.tets += patch_tets(cases, domain_, root, outline, sides, root.row->tet(i), root.row->shape[i]);
-    }
-  }
+  for (const BrickPart& part : by_brick) total += part.residuals.size();
   parts.residuals.reserve(total);
-  for (Part& part : by_brick) {
+  for (BrickPart& part : by_brick) {
     parts.residuals.insert(parts.residuals.end(), part.residuals.begin(), part.residuals.end());
-    part = {};
+    part = {};  // frees it: two copies of everything would be the peak of memory
   }
   return IntervalVolume::assemble(std::move(parts));
 }

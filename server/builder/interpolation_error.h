@@ -1,4 +1,4 @@
-// How well a diamond's tetrahedra stand for the samples inside them.
+// The error of a diamond: how far linear interpolation in its tetrahedra is from the samples inside them.
 #pragma once
 
 #include <oneapi/tbb/parallel_for.h>
@@ -16,11 +16,11 @@
 #include "common/util/bits.h"
 #include "common/util/tetrahedron.h"
 #include "common/util/vec3.h"
-#include "server/builder/outline.h"
+#include "server/builder/border_shape.h"
 
 namespace intervale {
 
-// Samples of type T, found by vertices inside the box.
+// Samples of type T, indexed by vertices inside the box.
 template <class T>
 struct Field {
   std::span<const T> samples;
@@ -31,7 +31,7 @@ struct Field {
   [[nodiscard]] double at(Vertex v) const { return double(samples[index(v)]); }
 };
 
-// The largest |F - interpolation| over rows of samples, along which interpolation grows by the same step.
+// The largest |F - interpolation| over rows of samples, along which the interpolant grows linearly.
 template <class T, class Real>
 class RowErrors {
  public:
@@ -51,7 +51,7 @@ class RowErrors {
   }
 
  private:
-  static constexpr int kLanes = sizeof(T) < 4 ? 8 : 4;  // so many at once, where a row is as long as that
+  static constexpr int kLanes = sizeof(T) < 4 ? 8 : 4;  // samples at once, in rows that are long enough
   static constexpr std::array<Real, kLanes> kNumbers = [] {
     std::array<Real, kLanes> numbers{};
     for (int i = 0; i < kLanes; ++i) numbers[i] = Real(i);
@@ -66,7 +66,7 @@ class RowErrors {
   Real worst_ = 0;
 };
 
-// The least and the largest sample of every block of kSide^3, the last ones smaller.
+// The least and the largest sample of every block of kSide^3 samples; the last blocks are smaller.
 template <class T>
 struct Extremes {
   static constexpr std::int32_t kSide = 8;
@@ -135,8 +135,8 @@ class Tetrahedron {
     }
   }
 
-  // The largest |F - linear interpolation| over all samples inside; or, where that is no more than `known`, any number up to that. O(blocks that its
-  // bounding box meets + rows and samples of the blocks where there may be more).
+  // The larger of `known` and the largest |F - linear interpolation| over all samples inside. O(blocks that its bounding box meets + rows and samples
+  // of the blocks whose extremes allow more than that).
   [[nodiscard]] double error(const Extremes<T>& extremes, double known) const {
     constexpr std::int64_t side = Extremes<T>::kSide;
     if (high_[0] - low_[0] < 2 * side && high_[1] - low_[1] < 2 * side && high_[2] - low_[2] < 2 * side)
@@ -172,7 +172,7 @@ class Tetrahedron {
   using I3 = std::array<std::int64_t, 3>;
   static I3 minus(Vertex a, Vertex b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 
-  // Whether no face has the whole cube [low, low + size] outside.
+  // Whether no face separates the cube [low, low + size] from the tetrahedron.
   [[nodiscard]] bool meets(const I3& low, std::int64_t size) const {
     for (int i = 0; i < 4; ++i) {
       std::int64_t r = d_[i];
@@ -182,7 +182,7 @@ class Tetrahedron {
     return true;
   }
 
-  // Over the samples of the box [low, high] that are inside.
+  // The error over the samples of the box [low, high] that lie inside the tetrahedron.
   [[nodiscard]] double error_in(I3 low, I3 high) const {
     for (int k = 0; k < 3; ++k) {
       low[k] = std::max(low[k], low_[k]);
@@ -215,19 +215,19 @@ class Tetrahedron {
 
   const Field<T>& field_;
   Vertex p0_;              // the origin of all that follows
-  std::array<I3, 4> n_{};  // half spaces n . q + d >= 0, n without a common factor
+  std::array<I3, 4> n_{};  // half spaces n . q + d >= 0; the components of n have no common factor
   std::array<std::int64_t, 4> d_{};
   I3 low_{}, high_{};                     // bounding box
-  double f0_ = 0, least_ = 0, most_ = 0;  // the value at p0, and how far those at the corners are below and above
+  double f0_ = 0, least_ = 0, most_ = 0;  // the value at p0, and the least and largest at the corners less that
   std::array<double, 3> gradient_{};
 };
 
-// One tetrahedron of a type of diamond, for h = 1 and with the centre as the origin.
+// One tetrahedron of a diamond type, for h = 1, with the centre as the origin.
 struct TetPlan {
   // The gradient of the interpolant times h, [axis][i], from the values at spine end 0 and at both belt vertices, less that at the spine's middle.
   std::array<std::array<double, 3>, 3> gradient{};
   // Half spaces n . q + d h >= open, those with n_x > 0 first, then those with n_x < 0. All of n and d are -1, 0 or 1. Samples on a face between two
-  // tetrahedra are left to one of the two.
+  // tetrahedra are assigned to one of them.
   struct Face {
     std::array<std::int8_t, 3> n{};
     std::int8_t d = 0, open = 0;
@@ -236,10 +236,10 @@ struct TetPlan {
   int lower = 0, upper = 0;  // faces that bound x from below, and from above
   std::array<std::int8_t, 3> low{}, high{};
 
-  // Calls visit(y, z, first x, last x) for the rows of samples inside. shares: whether samples on faces are shared out among the tetrahedra.
+  // Calls visit(y, z, first x, last x) for the rows of samples inside. shares: whether samples on a face belong to one of its two tetrahedra only.
   template <class Visit>
   void for_each_row(int h, bool shares, Visit&& visit) const {
-    // Faces that do not bound x bound y, or z alone.
+    // Faces that do not bound x bound y, or only z.
     std::array<int, 4> ny{}, nz{}, d{};
     for (int i = 0; i < 4; ++i) {
       ny[i] = face[i].n[1];
@@ -265,7 +265,7 @@ struct TetPlan {
   }
 };
 
-// Of each type and tetrahedron.
+// By type and tetrahedron.
 [[nodiscard]] const std::array<std::array<TetPlan, kMaxTets>, 64>& tet_plans();
 
 // Errors of the diamonds of one scale: error(delta) of the paper, section 4, the largest difference over the samples of all their tetrahedra.
@@ -298,13 +298,13 @@ class DiamondErrors {
     }
   }
 
-  // Over those of a diamond's tetrahedra that are in the mask and exist.
-  [[nodiscard]] double operator()(const Diamond& d, const Outline& outline, unsigned tets = ~0u) const {
-    if (scale_ == 0) return outline.interior ? finest(d) : finest_moved(d, outline);
+  // The error over a diamond's tetrahedra that exist and are in the mask.
+  [[nodiscard]] double operator()(const Diamond& d, const BorderShape& shape, unsigned tets = ~0u) const {
+    if (scale_ == 0) return shape.interior ? finest(d) : finest_moved(d, shape);
     double worst = 0;
-    for (const int i : set_bits(tets & outline.tets)) {
-      if (scale_ <= kSmall && (outline.unmoved >> i & 1)) {
-        worst = std::max(worst, double(unmoved(d, i, outline.interior)));
+    for (const int i : set_bits(tets & shape.tets)) {
+      if (scale_ <= kSmall && (shape.unmoved >> i & 1)) {
+        worst = std::max(worst, double(unmoved(d, i, shape.interior)));
       } else {
         worst = Tetrahedron<T>(field_, domain_.positions(d, d.row->tet(i))).error(extremes_, worst);
       }
@@ -313,9 +313,9 @@ class DiamondErrors {
   }
 
  private:
-  static constexpr int kSmall = 3;   // the last scale of tetrahedra that are gone over whole
-  static constexpr int kListed = 2;  // the last scale whose rows are listed beforehand: short ones are found more slowly than gone over
-  // Up to kSmall, 24 bits hold all that interpolation between samples of two bytes gives: halves of differences, shared out among h.
+  static constexpr int kSmall = 3;   // the coarsest scale whose tetrahedra are visited row by row, without blocks
+  static constexpr int kListed = 2;  // the coarsest scale whose rows are listed in advance: finding short rows takes longer than visiting them
+  // Up to scale kSmall, the 24 bits of a float hold every interpolant between samples of two bytes: halves of differences, divided by h.
   using Real = std::conditional_t<sizeof(T) <= 2, float, double>;
 
   struct Middle {
@@ -324,7 +324,7 @@ class DiamondErrors {
   struct Run {
     std::ptrdiff_t at;  // its first sample
     int count;
-    float x, y, z;  // where that lies
+    float x, y, z;  // its position
   };
 
   [[nodiscard]] std::ptrdiff_t step(std::ptrdiff_t x, std::ptrdiff_t y, std::ptrdiff_t z) const {
@@ -342,10 +342,10 @@ class DiamondErrors {
     return worst;
   }
 
-  // A diamond at the border, h = 1: there, too.
-  [[nodiscard]] double finest_moved(const Diamond& d, const Outline& outline) const {
+  // A diamond at the border, h = 1: every sample inside is a vertex or the middle of an edge there, too.
+  [[nodiscard]] double finest_moved(const Diamond& d, const BorderShape& shape) const {
     double worst = 0;
-    for (const int e : set_bits(outline.edges)) {
+    for (const int e : set_bits(shape.edges)) {
       const auto [i, k] = edge_ends(e, d.row->belt);
       const Vertex a = domain_.clamp(d.vertex(i)), b = domain_.clamp(d.vertex(k)), both{a.x + b.x, a.y + b.y, a.z + b.z};
       if ((both.x | both.y | both.z) & 1) continue;
@@ -355,7 +355,7 @@ class DiamondErrors {
     return worst;
   }
 
-  // One tetrahedron with all its vertices in the box. interior: so are all others of the diamond, and share out their faces.
+  // One tetrahedron with all its vertices in the box. interior: all others of the diamond are too, so each face belongs to one of them.
   [[nodiscard]] Real unmoved(const Diamond& d, int tet, bool interior) const {
     const T* const origin = field_.samples.data() + field_.index(d.centre);
     const TetPlan& plan = plans_[d.type][tet];

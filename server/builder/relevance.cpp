@@ -15,9 +15,9 @@
 namespace intervale {
 namespace {
 
-constexpr std::uint64_t kEven = 0x5555555555555555u, kOdd = ~kEven;
+constexpr std::uint64_t kEven = 0x5555555555555555u, kOdd = ~kEven, kEveryFourth = 0x1111111111111111u;
 
-// A bit for each point of a grid, in rows along x that begin with a word of their own.
+// A bit for each point of a grid, in rows along x. Each row begins with a new word.
 class BitGrid {
  public:
   BitGrid() = default;
@@ -29,7 +29,7 @@ class BitGrid {
   [[nodiscard]] std::uint64_t* row(std::int32_t y, std::int32_t z) { return &bits_[words_ * (std::size_t(z) * size_[1] + y)]; }
   [[nodiscard]] const std::uint64_t* row(std::int32_t y, std::int32_t z) const { return &bits_[words_ * (std::size_t(z) * size_[1] + y)]; }
 
-  // Bits of the neighbours at x + step in {-1, 0, 1}; 0 past a row's ends.
+  // Word w of a row shifted so that each bit is that of the neighbour at x + step, step in {-1, 0, 1}; 0 past the ends of the row.
   [[nodiscard]] std::uint64_t shifted(const std::uint64_t* row, std::size_t w, int step) const {
     if (step == 0) return row[w];
     if (step < 0) return row[w] << 1 | (w > 0 ? row[w - 1] >> 63 : 0);
@@ -50,7 +50,7 @@ void for_each_row(std::int32_t ny, std::int32_t nz, Visit&& visit) {
   });
 }
 
-// Bits 0, 2, 4, ... of a word side by side.
+// Bits 0, 2, 4, ... of a word, packed into its lower half.
 std::uint64_t every_other(std::uint64_t v) {
   v &= kEven;
   v = (v | v >> 1) & 0x3333333333333333u;
@@ -60,7 +60,7 @@ std::uint64_t every_other(std::uint64_t v) {
   return (v | v >> 16) & 0xffffffffu;
 }
 
-// Bits begin to end - 1 of a row, as far as they lie in its word w.
+// A mask of bits [begin, end) of a row, in its word w.
 std::uint64_t between(std::int32_t begin, std::int32_t end, std::size_t w) {
   const auto first = std::clamp<std::int64_t>(begin - std::int64_t(w) * 64, 0, 64),
              last = std::clamp<std::int64_t>(end - std::int64_t(w) * 64, 0, 64);
@@ -68,18 +68,18 @@ std::uint64_t between(std::int32_t begin, std::int32_t end, std::size_t w) {
   return (last == 64 ? ~std::uint64_t(0) : (std::uint64_t(1) << last) - 1) & ~((std::uint64_t(1) << first) - 1);
 }
 
-// Rows have one place more, so that each place's next neighbour is there.
+// Rows have one bit more, so that the next neighbour of each exists.
 std::array<std::int32_t, 3> with_next(const std::array<std::int32_t, 3>& places) { return {places[0] + 1, places[1], places[2]}; }
 
-// Sides at the places of one scale. A place past the last sample has that sample's side.
+// Sides at the vertices of one scale. A vertex past the last sample has that sample's side.
 struct Sides {
   BitGrid below, above;
   explicit Sides(const std::array<std::int32_t, 3>& places) : below(with_next(places)), above(with_next(places)) {}
 };
 
-std::array<std::int32_t, 3> places(const Outlines& outlines) { return {outlines.count(0), outlines.count(1), outlines.count(2)}; }
+std::array<std::int32_t, 3> places(const BorderShapes& shapes) { return {shapes.count(0), shapes.count(1), shapes.count(2)}; }
 
-// Sets the bit `to` of a row as `from` is.
+// Copies bit `from` of a row to bit `to`, which is 0.
 void copy_bit(std::uint64_t* row, std::int32_t from, std::int32_t to) { row[to / 64] |= (row[from / 64] >> (from % 64) & 1) << (to % 64); }
 
 template <class T>
@@ -90,7 +90,7 @@ Sides sides_of(std::span<const T> samples, const Grid& grid, const Range& range)
     const T* const from = &samples[(std::size_t(z) * ny + y) * nx];
     std::uint64_t *const below = sides.below.row(y, z), *const above = sides.above.row(y, z);
     for (std::int32_t x = 0; x < nx; x += 64) {
-      // Bytes first, which the compiler does many at a time; then the lowest bits of eight of them are multiplied to stand side by side.
+      // Bytes first, which the compiler vectorises; then a multiplication packs the lowest bits of eight of them.
       std::array<std::uint8_t, 64> is_below{}, is_above{};
       const std::int32_t n = std::min(64, nx - x);
       for (std::int32_t i = 0; i < n; ++i) {
@@ -112,7 +112,7 @@ Sides sides_of(std::span<const T> samples, const Grid& grid, const Range& range)
   return sides;
 }
 
-// The sides one scale further up, of every other place.
+// The sides of the next coarser scale: of every other vertex.
 Sides coarser(const Sides& fine, const std::array<std::int32_t, 3>& size) {
   Sides coarse(size);
   for_each_row(size[1], size[2], [&](std::int32_t y, std::int32_t z) {
@@ -133,7 +133,7 @@ Sides coarser(const Sides& fine, const std::array<std::int32_t, 3>& size) {
   return coarse;
 }
 
-// Cuts on the edges of the mesh that is refined everywhere: along the axes, and from the even to the odd end of faces' and cells' diagonals.
+// Cuts on the edges of the finest mesh: those along the axes, and the diagonals of faces and cells from the even to the odd end.
 std::uint64_t count_unit_cuts(const Sides& sides, Vertex last) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::int32_t>(0, last.z + 1), std::uint64_t(0),
@@ -165,11 +165,11 @@ std::uint64_t count_unit_cuts(const Sides& sides, Vertex last) {
 // The relevant diamonds of one scale, by centre in units of h.
 class Judge {
  public:
-  Judge(const Outlines& outlines, const Sides& sides, Refine refine, const BitGrid* finer)
-      : outlines_(outlines), sides_(sides), refine_(refine), finer_(finer), relevant_(with_next(places(outlines))) {}
+  Judge(const BorderShapes& shapes, const Sides& sides, Refine refine, const BitGrid* finer)
+      : shapes_(shapes), sides_(sides), refine_(refine), finer_(finer), relevant_(with_next(places(shapes))) {}
 
-  // Children first. Where b of y and z are odd, those of even x are of class 3 - b, those of odd x of class 2 - b; their children have either fewer
-  // odd coordinates in y and z, or an even x beside them, or are of the finer scale. So rows of one b can be done side by side.
+  // Children first. Where b of y and z are odd, diamonds at even x are of class 3 - b, those at odd x of class 2 - b. Their children have fewer odd
+  // coordinates in y and z, or are their neighbours at even x, or are of the finer scale. So rows with equal b can be judged in parallel.
   BitGrid judge() && {
     for (int b = 0; b < 3; ++b) {
       for_each_row(relevant_.size(1), relevant_.size(2), [&](std::int32_t y, std::int32_t z) {
@@ -182,29 +182,29 @@ class Judge {
   }
 
  private:
+  // Diamonds between the ends of a row are of two kinds of position, which alternate. Inside the box both have the same vertices and are judged
+  // together. Each end is judged by itself.
   void judge_row(std::int32_t y, std::int32_t z, int odd_x) {
-    const std::int32_t n = relevant_.size(0) - 1;
-    const int place_y = outlines_.place(1, y), place_z = outlines_.place(2, z);
-    // First x between the ends: of two kinds, which are done together inside the box, where both have the same vertices. Then each end by itself.
-    std::int32_t end = n;
-    while (end > 1 && outlines_.place(0, end - 1) > 4) --end;
-    const Outline &first = outlines_.of(1 + odd_x, place_y, place_z), &second = outlines_.of(3 + odd_x, place_y, place_z);
-    const std::uint64_t every_fourth = 0x1111111111111111u << odd_x;
+    const int position_y = shapes_.position(1, y), position_z = shapes_.position(2, z);
+    const auto shape_at = [&](int position_x) -> const BorderShape& { return shapes_.of(position_x, position_y, position_z); };
+    const std::int32_t end = shapes_.between_end(0), count = shapes_.count(0);
+    const BorderShape &first = shape_at(shapes_.between(odd_x)), &second = shape_at(shapes_.between(odd_x + 2));
+    const std::uint64_t every_fourth = kEveryFourth << odd_x;
     if (first.interior && second.interior) {
       judge_some(first, y, z, 1, end, every_fourth | every_fourth << 2);
     } else {
       judge_some(first, y, z, 1, end, every_fourth);
       judge_some(second, y, z, 1, end, every_fourth << 2);
     }
-    for (std::int32_t x : {0, end, end + 1}) {
-      if (x < n && (x & 1) == odd_x) judge_some(outlines_.of(outlines_.place(0, x), place_y, place_z), y, z, x, x + 1, ~std::uint64_t(0));
+    for (const std::int32_t x : {0, end, end + 1}) {
+      if (x < count && (x & 1) == odd_x) judge_some(shape_at(shapes_.position(0, x)), y, z, x, x + 1, ~std::uint64_t(0));
     }
   }
 
-  // Those of a row at x in [begin, end) and in the mask, which all have this outline.
-  void judge_some(const Outline& outline, std::int32_t y, std::int32_t z, std::int32_t begin, std::int32_t end, std::uint64_t mask) {
-    if (!outline.splits) return;
-    const DiamondType& row = *outline.row;
+  // Judges the diamonds of a row at x in [begin, end) and in the mask, which all have this shape.
+  void judge_some(const BorderShape& shape, std::int32_t y, std::int32_t z, std::int32_t begin, std::int32_t end, std::uint64_t mask) {
+    if (!shape.splits) return;
+    const DiamondType& row = *shape.row;
     struct Neighbour {
       const std::uint64_t *below, *above;
       int step;
@@ -217,7 +217,7 @@ class Judge {
     };
     add({});
     for (int v = 0; v < row.vertices; ++v) {
-      if (outline.vertices >> v & 1) add(row.vertex[v]);
+      if (shape.vertices >> v & 1) add(row.vertex[v]);
     }
     std::uint64_t* const out = relevant_.row(y, z);
     for (std::size_t w = std::size_t(begin) / 64; w * 64 < std::size_t(end); ++w) {
@@ -237,7 +237,7 @@ class Judge {
     }
   }
 
-  // Those of 64 places that would have a relevant child there.
+  // Which of 64 centres, of a diamond of this type, have a relevant child.
   [[nodiscard]] std::uint64_t relevant_children(const DiamondType& row, std::int32_t y, std::int32_t z, std::size_t w) const {
     std::uint64_t some = 0;
     if (row.cls == 2 && finer_ == nullptr) return some;
@@ -259,7 +259,7 @@ class Judge {
     return some;
   }
 
-  const Outlines& outlines_;
+  const BorderShapes& shapes_;
   const Sides& sides_;
   Refine refine_;
   const BitGrid* finer_;
@@ -294,25 +294,25 @@ Supercubes supercubes_of(const BitGrid& relevant, int scale) {
 
 }  // namespace
 
-Relevance find_relevant(const Volume& volume, const Range& range, Refine refine, const std::vector<Outlines>& outlines) {
+Relevance find_relevant(const Volume& volume, const Range& range, Refine refine, const std::vector<BorderShapes>& shapes) {
   Relevance result;
-  std::vector<Supercubes> levels;
+  std::vector<Supercubes> by_scale;
   Sides sides = visit_samples(volume, [&]<class T>(std::span<const T> samples) { return sides_of(samples, volume.grid, range); });
   result.unit_cuts = count_unit_cuts(sides, {volume.grid.dims[0] - 1, volume.grid.dims[1] - 1, volume.grid.dims[2] - 1});
   BitGrid finer;
-  for (std::size_t scale = 0; scale < outlines.size(); ++scale) {
-    if (scale > 0) sides = coarser(sides, places(outlines[scale]));
-    finer = Judge(outlines[scale], sides, refine, scale > 0 ? &finer : nullptr).judge();
-    levels.push_back(supercubes_of(finer, int(scale)));
+  for (std::size_t scale = 0; scale < shapes.size(); ++scale) {
+    if (scale > 0) sides = coarser(sides, places(shapes[scale]));
+    finer = Judge(shapes[scale], sides, refine, scale > 0 ? &finer : nullptr).judge();
+    by_scale.push_back(supercubes_of(finer, int(scale)));
   }
   std::vector<SupercubeKey> keys;
   std::vector<std::uint64_t> occupancy;
-  for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
-    for (const auto& [key, slots] : *level) {
+  for (auto supercubes = by_scale.rbegin(); supercubes != by_scale.rend(); ++supercubes) {
+    for (const auto& [key, slots] : *supercubes) {
       keys.push_back(key);
       occupancy.push_back(slots);
     }
-    *level = Supercubes();
+    *supercubes = Supercubes();
   }
   result.set = SupercubeSet(keys, std::move(occupancy));
   return result;

@@ -10,12 +10,12 @@
 
 namespace intervale {
 
-// Decodes what begins at `offset`, drops `skip` decoded bytes and fills `out`. Comes back with how many bytes of it were filled: fewer than
-// out.size() if the data ends before. Damaged data fails. If the data ends within the next few kilobytes, its checksum has been compared;
-// concatenated members count as one.
+// Decodes the data at `offset`, skips `skip` decoded bytes and fills `out`. Returns how many bytes were filled: fewer than out.size() if the data
+// ends before. Fails on damaged data. If the data ends within the next few kilobytes, its checksum has been compared; concatenated members count as
+// one.
 Result<std::uint64_t> gzip_decode(const InputFile& file, std::uint64_t offset, std::uint64_t skip, std::span<std::byte> out);
 
-// How many bytes the data decodes to. Time of a full decoding, memory of one chunk.
+// The decoded size in bytes. Takes the time of a full decoding and the memory of one chunk.
 Result<std::uint64_t> gzip_length(const InputFile& file, std::uint64_t offset);
 
 }  // namespace intervale

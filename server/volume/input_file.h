@@ -13,10 +13,10 @@
 
 namespace intervale {
 
-// An open regular file. Reading by position keeps no state, so one file may be read by several threads.
+// An open regular file. Reading by position has no state, so several threads may read one file.
 class InputFile {
  public:
-  static Result<InputFile> open(const std::filesystem::path& path);  // refuses folders, pipes and devices, whose size says nothing
+  static Result<InputFile> open(const std::filesystem::path& path);  // fails on folders, pipes and devices, which have no size
   InputFile(InputFile&& other) noexcept;
   InputFile& operator=(InputFile&&) = delete;
   ~InputFile();
@@ -39,12 +39,12 @@ class InputFile {
 // A path as error messages show it, between apostrophes.
 [[nodiscard]] std::string in_quotes(const std::filesystem::path& path);
 
-// Whether a volume of this shape can be: 2 to 2^20 samples a side; spacing, origin and the far corner finite, spacing above 0.
+// Checks the shape of a volume: 2 to 2^20 samples a side; spacing, origin and the far corner finite, spacing above 0.
 // The message begins with `where`.
 Result<void> check_grid(const std::array<std::int64_t, 3>& dims, const std::array<double, 3>& spacing, const std::array<double, 3>& origin,
                         const std::string& where);
 
-// Turns the bytes of every sample round, in place.
+// Reverses the bytes of every sample, in place.
 void swap_bytes(std::span<std::byte> samples, SampleType type);
 
 }  // namespace intervale

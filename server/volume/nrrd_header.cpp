@@ -1,4 +1,4 @@
-// teem knows the grammar of fields, their aliases and types; it does not expect malice. It overflows buffers by long lines (its
+// teem parses the grammar of fields, their aliases and types, but is not safe with hostile input. It overflows buffers on long lines (its
 // messages) and long words (its text reader), takes the header's file name for a printf format, and leaves gzip's checksum unread. So the header is
 // cut out and screened here, teem parses what is left, from memory and without touching any file, and the data is read in nrrd_reader.cpp.
 #include "server/volume/nrrd_header.h"
@@ -22,7 +22,7 @@ constexpr std::size_t kMaxLine = 512;  // teem formats its messages, with the li
 constexpr std::string_view kMagic = "NRRD000";
 
 struct Screened {
-  std::string text;  // what teem may see
+  std::string text;  // the lines that are passed to teem
   std::optional<std::string> data_file;
   std::uint64_t end = 0;  // where the data begins, if attached
 };
@@ -41,7 +41,7 @@ std::string canonical(std::string_view name) {
   return plain;
 }
 
-// Says nothing about where the samples are and what they are.
+// Fields that describe neither the position nor the type of the samples.
 bool is_decoration(const std::string& field) {
   constexpr std::array<std::string_view, 14> kDecorations{
       "content", "number", "thicknesses", "centers", "centerings",  "labels",     "units",
@@ -52,7 +52,7 @@ bool is_decoration(const std::string& field) {
 Result<Screened> screen(std::string_view file, const std::string& name) {
   Screened screened;
   bool blank_line = false, has_dimension = false;
-  std::string kinds;  // handed over last: teem leaks when it meets them before the dimension
+  std::string kinds;  // passed last: teem leaks if they come before the dimension
   std::size_t position = 0;
   for (bool first = true; position < file.size(); first = false) {
     const auto end = std::min(file.find('\n', position), file.size());
@@ -87,7 +87,7 @@ Result<Screened> screen(std::string_view file, const std::string& name) {
   return screened;
 }
 
-// The innermost of teem's messages, which knows most, without the name of teem's function.
+// The innermost of teem's messages, the most specific, without the name of teem's function.
 std::string last_teem_error() {
   const std::unique_ptr<char, void (*)(void*)> all(biffGetDone(NRRD), std::free);
   if (!all) return "unknown error";
@@ -136,7 +136,7 @@ Result<NrrdHeader::Encoding> encoding_of(const NrrdEncoding* encoding, const std
 
 double usable(double value, double otherwise) { return std::isfinite(value) && value != 0 ? std::abs(value) : otherwise; }
 
-// Samples keep their own axes: of an oblique volume only the distances between samples are kept, not its rotation.
+// Samples keep their own axes: for an oblique volume, the distances between samples are kept, its rotation is dropped.
 void place(const Nrrd& nrrd, Grid& grid) {
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto& info = nrrd.axis[axis];

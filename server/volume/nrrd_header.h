@@ -1,4 +1,4 @@
-// The header of an NRRD file, attached (.nrrd) or by itself (.nhdr): teem.sourceforge.net/nrrd/format.html, versions 1 to 6.
+// The header of an NRRD file, attached (.nrrd) or detached (.nhdr): teem.sourceforge.net/nrrd/format.html, versions 1 to 6.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +17,17 @@ struct NrrdHeader {
   SampleType type = SampleType::u8;
   Encoding encoding = Encoding::raw;
   bool big_endian = false;
-  std::uint32_t line_skip = 0;           // lines to skip in the file that holds the data; then
+  std::uint32_t line_skip = 0;           // lines to skip in the file that holds the data; after them
   std::int64_t byte_skip = 0;            // bytes to skip, of the decoded data; -1 - n: the data ends n bytes before the end
-  std::optional<std::string> data_file;  // as written, not yet judged; none: the data follows the header
+  std::optional<std::string> data_file;  // as written, unchecked; none: the data follows the header
   std::uint64_t data_offset = 0;         // where an attached header ends, in bytes
 
   [[nodiscard]] std::uint64_t data_bytes() const { return grid.sample_count() * size_of(type); }
 };
 
-// Reads and judges a header. Refused with a reason: anything but three spatial axes of 8 to 32-bit integers or floats, encodings other than
-// raw, gzip and text, data spread over several files, a header above 1 MiB. Allocates by the header's own length only: nothing it claims
-// has been compared with the data yet. Any thread; calls take turns, since teem keeps its errors in global variables.
+// Reads and checks a header. Fails on anything but three spatial axes of 8 to 32-bit integers or floats, on encodings other than raw, gzip and text,
+// on data in several files, and on a header above 1 MiB. Allocates by the header's own length only: its claims have not been compared with the data
+// yet. Any thread; calls are serialised, since teem keeps its errors in global variables.
 Result<NrrdHeader> read_nrrd_header(const InputFile& file);
 
 }  // namespace intervale

@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint64_t kGreatestDeflateRatio = 1032;  // zlib's technical notes, "Maximum Compression Factor"
 constexpr std::size_t kChunk = 1 << 16;
 
-// Data files are named by a header that may come from a stranger: it gets no say over other folders.
+// The header that names the data file is untrusted: it must not reach other folders.
 Result<std::filesystem::path> detached_path(const std::filesystem::path& header, const std::string& named) {
   const auto where = in_quotes(header) + ": data file '" + named + "'";
   if (named.empty()) return fail(in_quotes(header) + ": the 'data file' line names none");
@@ -69,7 +69,7 @@ Result<void> read_gzip_data(const InputFile& file, std::uint64_t offset, const N
   if (needed / kGreatestDeflateRatio > packed) return fail(too_short(file, needed, std::to_string(packed) + " bytes of gzip cannot hold as many"));
   std::uint64_t skip = static_cast<std::uint64_t>(std::max<std::int64_t>(header.byte_skip, 0));
   if (header.byte_skip < 0) {
-    // Counted from the end, which only decoding finds. Decoding twice was chosen over keeping what precedes the samples in memory.
+    // Counted from the end, which only decoding finds. It decodes twice rather than keep the bytes before the samples in memory.
     const auto length = gzip_length(file, offset);
     if (!length) return tl::unexpected<Error>(length.error());
     const auto after = static_cast<std::uint64_t>(-(header.byte_skip + 1));
@@ -85,7 +85,7 @@ Result<void> read_gzip_data(const InputFile& file, std::uint64_t offset, const N
 
 bool is_separator(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == ','; }
 
-// One number of a text, into the bytes of a sample. Integers that do not fit their type are refused rather than wrapped.
+// Parses one number of a text into the bytes of a sample. Integers that do not fit their type fail instead of wrapping.
 template <class T>
 bool parse_sample(std::string_view text, std::byte* sample) {
   if (text.starts_with('+')) text.remove_prefix(1);

@@ -1,4 +1,4 @@
-// Volumes into NRRD files.
+// Writes volumes as NRRD files.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace intervale {
 
-// Writes header and samples into one file, raw and little endian, aside and renamed. read_nrrd gives back the same grid, bit by bit.
+// Writes header and samples into one file, raw and little endian: a temporary file that is renamed. read_nrrd returns the same grid, bit by bit.
 Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume);
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// Any volume a user may name, made ready for building.
+// Reads volumes in any supported format, and checks their samples.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,11 @@
 
 namespace intervale {
 
-// .nrrd and .nhdr files describe themselves, and a layout given for one is misuse; anything else is raw and needs a layout, or it is misuse.
+// .nrrd and .nhdr files describe themselves: a layout is misuse. Any other file is raw: no layout is misuse.
 Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout);
 
-// Refuses a volume of floats with a NaN or infinite sample, naming the first one by (i, j, k); with a replacement every such sample becomes
-// that instead. A replacement that is not finite in the volume's type is misuse. Integers always pass.
+// Fails if a sample is NaN or infinite, and gives the (i, j, k) of the first one; a replacement, if given, is stored in all of them instead. A
+// replacement that is not finite in the volume's type is misuse.
 Result<void> check_finite(Volume& volume, std::optional<double> replacement);
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// A regular volume of samples, held in the type it came in.
+// A regular volume of samples, in the type of its file.
 #pragma once
 
 #include <cstddef>

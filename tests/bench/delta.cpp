@@ -14,8 +14,8 @@
 
 #include "common/codec/root_patch.h"
 #include "common/diamond/supercube.h"
+#include "server/builder/border_shape.h"
 #include "server/builder/interpolation_error.h"
-#include "server/builder/outline.h"
 
 namespace intervale::bench {
 namespace {
@@ -115,7 +115,7 @@ class TypedDelta final : public Delta {
         const unsigned tets = domain_.tets(d);
         if (tets == 0 || domain_.is_noop(d)) return;
         Node& node = nodes_[index];
-        node.error = round_up(error_of(d, Outlines::outline_of(domain_, d)));
+        node.error = round_up(error_of(d, BorderShapes::shape_of(domain_, d)));
         node.min = node.max = sample(d.centre);
         const auto take = [&node](T low, T high) {
           node.min = std::min(node.min, low);

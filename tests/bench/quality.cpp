@@ -21,6 +21,7 @@
 
 #include "client/core/stream_client.h"
 #include "common/front/batch_decoder.h"
+#include "common/ivm/batch_encoder.h"
 #include "common/ivm/refinement.h"
 #include "common/mesh/boundary.h"
 #include "common/mesh/io/mesh_writer.h"

@@ -249,7 +249,7 @@ void print_queries(const std::vector<Row>& rows) {
       "paper's queries do. Δ by supercubes descends and looks up neighbours in the front as Σ does: the part of Σ's advantage\n"
       "that comes from supercubes. Δ saturates errors over all children. Σ saturates them over relevant children and rounds\n"
       "them up to one of {} levels: hence the few updates that differ. At error 0 both produce the same mesh.\n",
-      kErrorLevels);
+      kMaxErrorSteps);
 }
 
 void print_speeds(const std::vector<Row>& rows) {

@@ -10,8 +10,8 @@ inline IntervalVolume::Parts parts_of(const IntervalVolume& v) {
           v.set(),
           {v.codes().begin(), v.codes().end()},
           {v.residuals().begin(), v.residuals().end()},
-          {v.error_levels().begin(), v.error_levels().end()},
-          {v.yields().begin(), v.yields().end()}};
+          {v.error_steps().begin(), v.error_steps().end()},
+          {v.error_to_distance().begin(), v.error_to_distance().end()}};
 }
 
 }  // namespace intervale::testing

@@ -15,7 +15,7 @@
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/verify.h"
-#include "server/builder/error_levels.h"
+#include "server/builder/error_steps.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/bisection.h"
 
@@ -192,7 +192,7 @@ TEST_P(Hierarchy, SigmaKeepsTheErrorsAtLeastAndInOrder) {
   EXPECT_EQ(sigma->description().max_error, double(most));
   for (UpdateIndex i = 0; i < delta.set().size(); ++i) {
     EXPECT_GE(sigma->error(i), delta.error(i));
-    if (distinct.size() <= std::size_t(kErrorLevels)) {
+    if (distinct.size() <= std::size_t(kMaxErrorSteps)) {
       EXPECT_EQ(sigma->error(i), delta.error(i));
     }
   }
@@ -267,7 +267,7 @@ TEST(FieldHierarchy, ALinearFieldHasNoErrorAndAllItsUpdates) {
     ASSERT_TRUE(all);
     EXPECT_EQ(all->size(), UpdateIndex(n * n * n - 8)) << "every vertex but the corners";
     EXPECT_EQ(all->description().max_error, 0);
-    EXPECT_EQ(all->error_levels().size(), 1u);
+    EXPECT_EQ(all->error_steps().size(), 1u);
     const auto some = FieldHierarchy(volume, {.range = {-1.5, 0.5}}).compact();
     ASSERT_TRUE(some);
     EXPECT_GT(some->size(), UpdateIndex(n * n));
@@ -275,9 +275,9 @@ TEST(FieldHierarchy, ALinearFieldHasNoErrorAndAllItsUpdates) {
   }
 }
 
-class ErrorLevels : public ::testing::TestWithParam<unsigned> {};
+class ErrorSteps : public ::testing::TestWithParam<unsigned> {};
 
-TEST_P(ErrorLevels, AscendRoundUpAndEndWithTheLargest) {
+TEST_P(ErrorSteps, AscendRoundUpAndEndWithTheLargest) {
   std::mt19937 random(GetParam());
   std::vector<float> errors(1 + random() % 5000);
   const unsigned distinct = 1 + unsigned(random()) % 3000;
@@ -285,7 +285,7 @@ TEST_P(ErrorLevels, AscendRoundUpAndEndWithTheLargest) {
   std::set<float> values(errors.begin(), errors.end());
   for (const std::size_t most : {2u, 3u, 17u, 512u}) {
     SCOPED_TRACE(::testing::Message() << "seed " << GetParam() << ", at most " << most << " of " << values.size());
-    const auto levels = choose_error_levels(errors, most);
+    const auto levels = choose_error_steps(errors, most);
     ASSERT_FALSE(levels.empty());
     EXPECT_LE(levels.size(), most);
     EXPECT_TRUE(std::is_sorted(levels.begin(), levels.end()));
@@ -298,9 +298,9 @@ TEST_P(ErrorLevels, AscendRoundUpAndEndWithTheLargest) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, ErrorLevels, ::testing::Range(0u, 10u));
+INSTANTIATE_TEST_SUITE_P(Random, ErrorSteps, ::testing::Range(0u, 10u));
 
-TEST(ErrorLevels, OfNothingAreNone) { EXPECT_TRUE(choose_error_levels({}, 512).empty()); }
+TEST(ErrorSteps, OfNothingAreNone) { EXPECT_TRUE(choose_error_steps({}, 512).empty()); }
 
 }  // namespace
 }  // namespace intervale

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "server/builder/field_hierarchy.h"
-#include "server/builder/surface_moves.h"
+#include "server/builder/surface_deviation.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/parts.h"
 
@@ -50,7 +50,7 @@ TEST_F(IntervalVolumeValidate, FindsAFullMeshOfAnotherSize) {
 TEST_F(IntervalVolumeValidate, FindsAnErrorGreaterThanItsParents) {
   auto parts = testing::parts_of(*made_);
   UpdateCode& last = parts.codes.back();
-  last = UpdateCode(std::uint16_t((last.bits() & 127) | (parts.error_levels.size() - 1) << 7));
+  last = UpdateCode(std::uint16_t((last.bits() & 127) | (parts.error_steps.size() - 1) << 7));
   UpdateCode& root = parts.codes.front();
   root = UpdateCode(std::uint16_t(root.bits() & 127));
   EXPECT_FALSE(validate(*IntervalVolume::assemble(std::move(parts))));
@@ -68,13 +68,13 @@ TEST_F(IntervalVolumeValidate, FindsASideThatDoesNotFitItsCoefficients) {
   EXPECT_GT(found, 15);
 }
 
-TEST(YieldSteps, RoundUpByAtMostAStep) {
+TEST(ErrorToDistance, RoundUpByAtMostAStep) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> octaves(-11.8, 18.9), units(-20, 20);
   for (int trial = 0; trial < 10000; ++trial) {
     const double unit = std::exp2(units(random)), ratio = unit * std::exp2(octaves(random));
     const bool is_far = trial % 2 == 0;
-    const Yield yield = Yield::at_least(ratio, unit, is_far);
+    const ErrorToDistance yield = ErrorToDistance::at_least(ratio, unit, is_far);
     EXPECT_EQ(yield.is_far(), is_far);
     const double rounded = yield.ratio(float(unit));
     ASSERT_GE(rounded, ratio * (1 - 1e-6)) << ratio / unit;
@@ -82,26 +82,26 @@ TEST(YieldSteps, RoundUpByAtMostAStep) {
   }
 }
 
-TEST(YieldSteps, EachStandsForItself) {
+TEST(ErrorToDistance, EachStandsForItself) {
   for (int step = 1; step < 255; ++step) {
     if (step == 191) continue;  // has no bound
     const bool is_far = step > 191;
     const double ratio = is_far ? 3 * std::exp2((step - 216) / 2.0) : 3 * std::exp2((step - 72) / 6.0);
-    EXPECT_EQ(Yield::at_least(ratio, 3, is_far).step(), step);
-    EXPECT_EQ(Yield::at_least(ratio * (1 + 1e-6), 3, is_far).step(), step + 1);
-    EXPECT_LT(Yield(std::uint8_t(step)).ratio(3), Yield(std::uint8_t(step + 1)).ratio(3));
+    EXPECT_EQ(ErrorToDistance::at_least(ratio, 3, is_far).code(), step);
+    EXPECT_EQ(ErrorToDistance::at_least(ratio * (1 + 1e-6), 3, is_far).code(), step + 1);
+    EXPECT_LT(ErrorToDistance(std::uint8_t(step)).ratio(3), ErrorToDistance(std::uint8_t(step + 1)).ratio(3));
   }
 }
 
-TEST(YieldSteps, NothingIsNothingAndTheLastOnesHaveNoBound) {
+TEST(ErrorToDistance, NothingIsNothingAndTheLastOnesHaveNoBound) {
   for (const bool is_far : {false, true}) {
-    EXPECT_EQ(Yield::at_least(0, 1, is_far).step(), 0);
-    EXPECT_EQ(Yield::at_least(0, 1, is_far).ratio(1), 0);
-    EXPECT_EQ(Yield::at_least(1e-300, 1, is_far).step(), is_far ? 192 : 1);
+    EXPECT_EQ(ErrorToDistance::at_least(0, 1, is_far).code(), 0);
+    EXPECT_EQ(ErrorToDistance::at_least(0, 1, is_far).ratio(1), 0);
+    EXPECT_EQ(ErrorToDistance::at_least(1e-300, 1, is_far).code(), is_far ? 192 : 1);
     for (const double ratio : {std::exp2(20.5), 1e300, std::numeric_limits<double>::infinity()})
-      EXPECT_EQ(Yield::at_least(ratio, 1, is_far).step(), is_far ? 255 : 191);
+      EXPECT_EQ(ErrorToDistance::at_least(ratio, 1, is_far).code(), is_far ? 255 : 191);
   }
-  for (const int last : {191, 255}) EXPECT_EQ(Yield(std::uint8_t(last)).ratio(1e-30f), std::numeric_limits<float>::max());
+  for (const int last : {191, 255}) EXPECT_EQ(ErrorToDistance(std::uint8_t(last)).ratio(1e-30f), std::numeric_limits<float>::max());
 }
 
 // Fields of several kinds, in boxes that nest and that do not.
@@ -133,8 +133,8 @@ class ObjectErrors : public ::testing::TestWithParam<unsigned> {
 TEST_P(ObjectErrors, AreNeverAboveHalfTheDiamondsWidthOrWhatIsFurthest) {
   sigma_->set().for_each_down([&](const Place& p) {
     const double width = diamond_width(volume_.grid) * Diamond(SupercubeSet::centre(p)).h;
-    const float error = sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_level(p.index));
-    const bool is_far = sigma_->yields()[p.supercube].is_far();
+    const float error = sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index));
+    const bool is_far = sigma_->error_to_distance()[p.supercube].is_far();
     ASSERT_LE(error, (is_far ? 64 * diamond_width(volume_.grid) : width) / 2 * (1 + 1e-6));
     ASSERT_GE(error, 0);
     ASSERT_LE(error, sigma_->brick_object_error(p.brick));
@@ -143,13 +143,13 @@ TEST_P(ObjectErrors, AreNeverAboveHalfTheDiamondsWidthOrWhatIsFurthest) {
 
 TEST_P(ObjectErrors, AreNoLessThanHalfOfWhatWasMeasuredAnywhereBelow) {
   const SupercubeSet& set = sigma_->set();
-  std::vector<float> moves = surface_moves(volume_, range_, sigma_->domain(), set).most;
+  std::vector<float> moves = surface_deviation(volume_, range_, sigma_->domain(), set).largest;
   set.for_each_up(
       [&](const Place& p) { for_each_parent(set, p, [&](UpdateIndex parent) { moves[parent] = std::max(moves[parent], moves[p.index]); }); });
   std::size_t told = 0;
   set.for_each_down([&](const Place& p) {
     if (sigma_->error(p.index) == 0) return;  // no factor makes anything of that
-    ASSERT_GE(sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_level(p.index)), moves[p.index] / 2 * (1 - 1e-5));
+    ASSERT_GE(sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index)), moves[p.index] / 2 * (1 - 1e-5));
     told += moves[p.index] > 0;
   });
   EXPECT_GT(told, 10u);
@@ -159,7 +159,7 @@ TEST_P(ObjectErrors, OfABrickAreThoseOfOneOfItsUpdates) {
   const SupercubeSet& set = sigma_->set();
   std::vector<float> largest(set.bricks().size());
   set.for_each_down([&](const Place& p) {
-    largest[p.brick] = std::max(largest[p.brick], sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_level(p.index)));
+    largest[p.brick] = std::max(largest[p.brick], sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index)));
   });
   for (std::uint32_t b = 0; b < largest.size(); ++b) EXPECT_EQ(sigma_->brick_object_error(b), largest[b]);
 }
@@ -170,9 +170,9 @@ TEST(IntervalVolumeAssemble, RefusesYieldsThatAreNotOneForEachSupercube) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const auto made = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
   ASSERT_TRUE(made);
-  for (const std::size_t size : {std::size_t(0), made->yields().size() - 1, made->yields().size() + 1}) {
+  for (const std::size_t size : {std::size_t(0), made->error_to_distance().size() - 1, made->error_to_distance().size() + 1}) {
     auto parts = testing::parts_of(*made);
-    parts.yields.resize(size);
+    parts.error_to_distance.resize(size);
     EXPECT_FALSE(IntervalVolume::assemble(std::move(parts)));
   }
 }
@@ -191,7 +191,7 @@ TEST(IntervalVolumeAssemble, AnotherYieldIsAnotherContent) {
   const auto made = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
   ASSERT_TRUE(made);
   auto parts = testing::parts_of(*made);
-  parts.yields.back() = Yield(std::uint8_t(parts.yields.back().step() ^ 1));
+  parts.error_to_distance.back() = ErrorToDistance(std::uint8_t(parts.error_to_distance.back().code() ^ 1));
   EXPECT_NE(IntervalVolume::assemble(std::move(parts))->description().content_hash, made->description().content_hash);
 }
 

@@ -38,7 +38,7 @@ void expect_equal(const IntervalVolume& a, const IntervalVolume& b) {
   described.name = a.description().name;
   EXPECT_EQ(a.description(), described);
   EXPECT_TRUE(std::ranges::equal(a.set().occupancy(), b.set().occupancy()));
-  EXPECT_TRUE(std::ranges::equal(a.error_levels(), b.error_levels()));
+  EXPECT_TRUE(std::ranges::equal(a.error_steps(), b.error_steps()));
   ASSERT_EQ(a.size(), b.size());
   a.set().for_each_down([&](const Place& p) {
     const auto q = b.set().find(a.set().centre(p));
@@ -179,14 +179,14 @@ TEST(Assemble, PartsThatFitMakeAnEqualVolume) {
 TEST(Assemble, PartsThatDoNotFitAreRefused) {
   using Parts = IntervalVolume::Parts;
   const IntervalVolume sigma = small_volume();
-  ASSERT_GT(sigma.error_levels().size(), 3u);
+  ASSERT_GT(sigma.error_steps().size(), 3u);
   ASSERT_GT(sigma.description().root_patch.size(), 8u);
   const struct {
     const char* what;
     void (*spoil)(Parts&);
   } cases[] = {
       {"too few codes", [](Parts& p) { p.codes.pop_back(); }},
-      {"too few yields", [](Parts& p) { p.yields.pop_back(); }},
+      {"too few error_to_distance codes", [](Parts& p) { p.error_to_distance.pop_back(); }},
       {"too many codes", [](Parts& p) { p.codes.emplace_back(); }},
       {"no codes", [](Parts& p) { p.codes.clear(); }},
       {"no set", [](Parts& p) { p.set = SupercubeSet(); }},
@@ -200,13 +200,13 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
        }},
       {"a code of side 3", [](Parts& p) { p.codes[0] = UpdateCode(std::uint16_t(p.codes[0].bits() | 3)); }},
       {"a code of a level that is not there",
-       [](Parts& p) { p.codes[0] = UpdateCode(std::uint16_t((p.codes[0].bits() & 127) | p.error_levels.size() << 7)); }},
-      {"errors that descend", [](Parts& p) { std::swap(p.error_levels[0], p.error_levels[1]); }},
-      {"a negative error", [](Parts& p) { p.error_levels[0] = -1; }},
-      {"an infinite error", [](Parts& p) { p.error_levels.back() = std::numeric_limits<float>::infinity(); }},
-      {"an error that is no number", [](Parts& p) { p.error_levels[1] = std::numeric_limits<float>::quiet_NaN(); }},
-      {"no errors", [](Parts& p) { p.error_levels.clear(); }},
-      {"too many errors", [](Parts& p) { p.error_levels.resize(kErrorLevels + 1, p.error_levels.back()); }},
+       [](Parts& p) { p.codes[0] = UpdateCode(std::uint16_t((p.codes[0].bits() & 127) | p.error_steps.size() << 7)); }},
+      {"errors that descend", [](Parts& p) { std::swap(p.error_steps[0], p.error_steps[1]); }},
+      {"a negative error", [](Parts& p) { p.error_steps[0] = -1; }},
+      {"an infinite error", [](Parts& p) { p.error_steps.back() = std::numeric_limits<float>::infinity(); }},
+      {"an error that is no number", [](Parts& p) { p.error_steps[1] = std::numeric_limits<float>::quiet_NaN(); }},
+      {"no errors", [](Parts& p) { p.error_steps.clear(); }},
+      {"too many errors", [](Parts& p) { p.error_steps.resize(kMaxErrorSteps + 1, p.error_steps.back()); }},
       {"a root patch too short", [](Parts& p) { p.description.root_patch.pop_back(); }},
       {"a root patch too long", [](Parts& p) { p.description.root_patch.push_back(0); }},
       {"no root patch", [](Parts& p) { p.description.root_patch.clear(); }},

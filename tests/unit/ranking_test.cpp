@@ -55,19 +55,19 @@ void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const Visit&
 // Half of how far the surfaces can move in an update's diamond, from what is stored.
 double object_error(const IntervalVolume& v, const Place& p) {
   const Grid& g = v.description().grid;
-  const std::uint8_t step = v.yields()[p.supercube].step();
+  const std::uint8_t code = v.error_to_distance()[p.supercube].code();
   const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) / 2 * h;
-  if (step == 0 || v.error(p.index) == 0) return 0;
-  if (step == 191) return widest;
+  if (code == 0 || v.error(p.index) == 0) return 0;
+  if (code == 191) return widest;
   const double unit = std::min({g.spacing[0], g.spacing[1], g.spacing[2]}) / v.description().max_error;
   const double furthest = 64 * diamond_width(g) / 2;
-  if (step == 255) return furthest;
-  if (step > 191) return std::min(furthest, double(v.error(p.index)) * unit * std::exp2((step - 216) / 2.0));
-  return std::min(widest, double(v.error(p.index)) * unit * std::exp2((step - 72) / 6.0));
+  if (code == 255) return furthest;
+  if (code > 191) return std::min(furthest, double(v.error(p.index)) * unit * std::exp2((code - 216) / 2.0));
+  return std::min(widest, double(v.error(p.index)) * unit * std::exp2((code - 72) / 6.0));
 }
 
 // The box around all diamonds of a cube of supercubes, given by two opposite corners, as far as there are samples.
-View::Region region_of(const IntervalVolume& v, SupercubeKey first, SupercubeKey last_of_all) {
+ScreenError::Region region_of(const IntervalVolume& v, SupercubeKey first, SupercubeKey last_of_all) {
   const Vertex last = v.domain().last();
   Vector low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
   for (const SupercubeKey key : {first, last_of_all}) {
@@ -80,14 +80,14 @@ View::Region region_of(const IntervalVolume& v, SupercubeKey first, SupercubeKey
       }
     }
   }
-  View::Region region;
+  ScreenError::Region region;
   for (int i = 0; i < 3; ++i) region.middle[i] = (low[i] + high[i]) / 2, region.reach[i] = (high[i] - low[i]) / 2;
   return region;
 }
 
 // Pixels of one world unit around an update: by its supercube, or its brick where that is far away.
-double pixels_per_unit(const IntervalVolume& v, const View& view, const Place& p) {
-  const View::Region brick = region_of(v, p.key & ~SupercubeKey(63), p.key | 63);
+double pixels_per_unit(const IntervalVolume& v, const ScreenError& view, const Place& p) {
+  const ScreenError::Region brick = region_of(v, p.key & ~SupercubeKey(63), p.key | 63);
   return view.pixels_per_unit(view.is_near(brick) ? region_of(v, p.key, p.key) : brick);
 }
 
@@ -120,7 +120,7 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
   for (int trial = 0; trial < 40; ++trial) {
     const Ranking ranking(volume_, random_lod(volume_, random_));
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
-      const unsigned level = volume_.level_of_half(volume_.supercube_half_levels()[p.supercube]);
+      const unsigned level = volume_.step_of_half(volume_.supercube_half_steps()[p.supercube]);
       ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level), rank) << "trial " << trial;
     });
   }
@@ -131,7 +131,7 @@ TEST_P(Ranks, WantedIsWhatTheNaiveModelWants) {
   for (int trial = 0; trial < 40; ++trial) {
     const Lod lod = random_lod(volume_, random_);
     const double threshold = error_of(lod, volume_.description().max_error);
-    std::optional<View> view;
+    std::optional<ScreenError> view;
     if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
     const Ranking ranking(volume_, lod);
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
@@ -176,7 +176,7 @@ TEST_P(Ranks, WhatIsNotWantedDoesNotShow) {
 TEST_P(Ranks, BoundIsNoLessThanWhatIsLeft) {
   for (int trial = 0; trial < 40; ++trial) {
     const Lod lod = random_lod(volume_, random_);
-    std::optional<View> view;
+    std::optional<ScreenError> view;
     if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
     const Ranking ranking(volume_, lod);
     EXPECT_EQ(ranking.bound(0), 0);

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "client/view/boundary_surface.h"
 #include "client/view/cross_section.h"
-#include "client/view/skin.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
 #include "common/mesh/io/mesh_writer.h"
@@ -145,11 +145,11 @@ class Viewer {
   // A Skin of messages.ts without its version: what changed since the last one, or all of it.
   val skin(bool edges, bool all) {
     stale_ = false;
-    const Skin::Change change = all ? skin_->all() : skin_->update();
+    const BoundarySurface::Change change = all ? skin_->all() : skin_->update();
     val skin = val::object(), pieces = val::array(), removed = val::array();
     std::size_t n = 0;
     for (const std::uint32_t id : change.pieces) {
-      const SkinPiece p = skin_->piece(id, edges);
+      const SurfacePiece p = skin_->piece(id, edges);
       val piece = val::object();
       piece.set("id", p.id);
       piece.set("vertices", buffer_of(p.vertices));
@@ -207,7 +207,7 @@ class Viewer {
   }
 
   ViewingSession session_;
-  std::optional<Skin> skin_;
+  std::optional<BoundarySurface> skin_;
   std::vector<std::uint8_t> inbox_;
   ClientSession::Event event_;  // of the last message
   bool stale_ = true;           // the mesh may have changed since the last skin

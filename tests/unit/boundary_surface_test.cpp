@@ -1,4 +1,4 @@
-#include "client/view/skin.h"
+#include "client/view/boundary_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -68,11 +68,11 @@ std::multiset<Triangle> boundary_of(const Mesh& mesh, const Grid& grid) {
 // What a page has that takes up each change.
 class Page {
  public:
-  void take(Skin& skin, const Skin::Change& change, bool edges) {
+  void take(BoundarySurface& surface, const BoundarySurface::Change& change, bool edges) {
     if (change.reset) pieces_.clear();
     for (const std::uint32_t id : change.removed) EXPECT_EQ(pieces_.erase(id), 1u);
     for (const std::uint32_t id : change.pieces) {
-      const SkinPiece piece = skin.piece(id, edges);
+      const SurfacePiece piece = surface.piece(id, edges);
       EXPECT_EQ(piece.id, id);
       EXPECT_FALSE(piece.vertices.empty());
       EXPECT_EQ(piece.indices.size(), 3 * std::size_t(piece.triangles[0] + piece.triangles[1] + piece.triangles[2]));
@@ -87,7 +87,7 @@ class Page {
       for (std::size_t i = 0; i < piece.indices.size(); i += 3) {
         Triangle t;
         for (int k = 0; k < 3; ++k) {
-          const SkinVertex& v = piece.vertices[piece.indices[i + k]];
+          const SurfaceVertex& v = piece.vertices[piece.indices[i + k]];
           t[k] = {v.x, v.y, v.z};
         }
         if (!is_flat(t)) triangles.insert(turned(t));
@@ -95,25 +95,25 @@ class Page {
     }
     return triangles;
   }
-  [[nodiscard]] const std::map<std::uint32_t, SkinPiece>& pieces() const { return pieces_; }
+  [[nodiscard]] const std::map<std::uint32_t, SurfacePiece>& pieces() const { return pieces_; }
 
  private:
-  std::map<std::uint32_t, SkinPiece> pieces_;
+  std::map<std::uint32_t, SurfacePiece> pieces_;
 };
 
-class SkinOf : public ::testing::TestWithParam<unsigned> {
+class BoundarySurfaceOf : public ::testing::TestWithParam<unsigned> {
  protected:
   std::shared_ptr<const IntervalVolume> volume = volume_of_seed(GetParam());
   const Grid& grid = volume->description().grid;
   std::mt19937 random{GetParam()};
 };
 
-TEST_P(SkinOf, WhatChangesAddsUpToTheMeshsBoundary) {
+TEST_P(BoundarySurfaceOf, WhatChangesAddsUpToTheMeshsBoundary) {
   const std::uint64_t full = volume->description().full.tets;
   StreamPlan plan(volume);
   auto client = StreamClient::start(volume->description());
   ASSERT_TRUE(client);
-  Skin skin(client->front());
+  BoundarySurface surface(client->front());
   Page page;
   plan.set_lod({});
   for (int step = 0; step < 12; ++step) {
@@ -126,44 +126,43 @@ TEST_P(SkinOf, WhatChangesAddsUpToTheMeshsBoundary) {
       client->look(camera);
       client->set_budget({.max_tets = full * (1 + random() % 4) / 4}, 0);
     }
-    page.take(skin, skin.update(), step % 2 == 0);
+    page.take(surface, surface.update(), step % 2 == 0);
     const Mesh mesh = client->mesh();
     ASSERT_EQ(page.triangles(), boundary_of(mesh, grid)) << "step " << step;
-    ASSERT_NEAR(skin.volume(), volume_of(mesh), 1e-9 * (1 + volume_of(mesh)));
+    ASSERT_NEAR(surface.volume(), volume_of(mesh), 1e-9 * (1 + volume_of(mesh)));
   }
 }
 
-TEST_P(SkinOf, PiecesMadeByAndByAreThoseMadeAtOnce) {
+TEST_P(BoundarySurfaceOf, PiecesMadeByAndByAreThoseMadeAtOnce) {
   StreamPlan plan(volume);
   auto client = StreamClient::start(volume->description());
   ASSERT_TRUE(client);
-  Skin skin(client->front());
+  BoundarySurface surface(client->front());
   plan.set_lod({});
   while (const auto batch = plan.next(4096)) {
     ASSERT_TRUE(client->apply(batch->payload));
-    (void)skin.update();
+    (void)surface.update();
   }
   Page by_and_by, at_once;
-  by_and_by.take(skin, skin.all(), true);
-  Skin again(client->front());
+  by_and_by.take(surface, surface.all(), true);
+  BoundarySurface again(client->front());
   at_once.take(again, again.update(), true);
-  EXPECT_EQ(skin.triangles(), again.triangles());
-  EXPECT_EQ(skin.volume_bound(), 0) << "all is split";
+  EXPECT_EQ(surface.triangles(), again.triangles());
+  EXPECT_EQ(surface.volume_bound(), 0) << "all is split";
   ASSERT_EQ(by_and_by.pieces().size(), at_once.pieces().size());
   for (const auto& [id, piece] : at_once.pieces()) {
-    const SkinPiece& other = by_and_by.pieces().at(id);
+    const SurfacePiece& other = by_and_by.pieces().at(id);
     EXPECT_EQ(piece.indices, other.indices);
     EXPECT_EQ(piece.edges, other.edges);
     ASSERT_EQ(piece.vertices.size(), other.vertices.size());
     for (std::size_t i = 0; i < piece.vertices.size(); ++i) {
-      const SkinVertex &a = piece.vertices[i], &b = other.vertices[i];
-      EXPECT_EQ(std::tuple(a.x, a.y, a.z, a.nx, a.ny, a.nz, a.level), std::tuple(b.x, b.y, b.z, b.nx, b.ny, b.nz, b.level))
-          << "normals are exact sums";
+      const SurfaceVertex &a = piece.vertices[i], &b = other.vertices[i];
+      EXPECT_EQ(std::tuple(a.x, a.y, a.z, a.nx, a.ny, a.nz, a.lod), std::tuple(b.x, b.y, b.z, b.nx, b.ny, b.nz, b.lod)) << "normals are exact sums";
     }
   }
 }
 
-TEST_P(SkinOf, AllTetrahedraLieInTheWholeBox) {
+TEST_P(BoundarySurfaceOf, AllTetrahedraLieInTheWholeBox) {
   auto client = StreamClient::start(volume->description());
   ASSERT_TRUE(client);
   StreamPlan plan(volume);
@@ -171,10 +170,10 @@ TEST_P(SkinOf, AllTetrahedraLieInTheWholeBox) {
   if (const auto batch = plan.next(2048)) {
     ASSERT_TRUE(client->apply(batch->payload));
   }
-  Skin skin(client->front());
-  (void)skin.update();
+  BoundarySurface surface(client->front());
+  (void)surface.update();
   const Box all{{-1000, -1000, -1000}, {1000, 1000, 1000}};
-  const TetsInBox tets = tets_in_box(skin, all, UINT64_MAX);
+  const TetsInBox tets = tets_in_box(surface, all, UINT64_MAX);
   EXPECT_EQ(tets.count, client->tet_count());
   EXPECT_EQ(tets.vertices.size(), 4 * tets.count);
   EXPECT_EQ(tets.indices.size(), 12 * tets.count);
@@ -187,21 +186,21 @@ TEST_P(SkinOf, AllTetrahedraLieInTheWholeBox) {
     const Point a = from(1), b = from(2), c = from(3);
     volume_sum += (a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6;
   }
-  EXPECT_NEAR(volume_sum * grid.spacing[0] * grid.spacing[1] * grid.spacing[2], skin.volume(), 1e-4 * (1 + skin.volume()));
-  const TetsInBox some = tets_in_box(skin, all, 5);
+  EXPECT_NEAR(volume_sum * grid.spacing[0] * grid.spacing[1] * grid.spacing[2], surface.volume(), 1e-4 * (1 + surface.volume()));
+  const TetsInBox some = tets_in_box(surface, all, 5);
   EXPECT_EQ(some.count, std::min<std::uint64_t>(5, tets.count));
   EXPECT_EQ(some.out_of, tets.count);
 }
 
 // The areas of all cuts across one direction are the volume.
-TEST_P(SkinOf, CutsAddUpToTheVolume) {
+TEST_P(BoundarySurfaceOf, CutsAddUpToTheVolume) {
   auto client = StreamClient::start(volume->description());
   ASSERT_TRUE(client);
   StreamPlan plan(volume);
   plan.set_lod({});
   while (const auto batch = plan.next(4096)) ASSERT_TRUE(client->apply(batch->payload));
-  Skin skin(client->front());
-  (void)skin.update();
+  BoundarySurface surface(client->front());
+  (void)surface.update();
   for (const Point direction : {Point{1, 0, 0}, Point{0.6, 0, 0.8}, Point{-2.0 / 3, 1.0 / 3, 2.0 / 3}}) {
     double low = kInf, high = -kInf;
     for (int corner = 0; corner < 8; ++corner) {
@@ -214,7 +213,7 @@ TEST_P(SkinOf, CutsAddUpToTheVolume) {
     const double step = (high - low) / kCuts;
     double sum = 0;
     for (int n = 0; n < kCuts; ++n) {
-      const auto cut = cross_section(skin, {direction, low + (n + 0.5) * step});
+      const auto cut = cross_section(surface, {direction, low + (n + 0.5) * step});
       ASSERT_EQ(cut.size() % 3, 0u);
       for (std::size_t i = 0; i < cut.size(); i += 3) {
         const auto from = [&](std::size_t k) {
@@ -229,22 +228,22 @@ TEST_P(SkinOf, CutsAddUpToTheVolume) {
         sum += area * step;
       }
     }
-    EXPECT_NEAR(sum, skin.volume(), 0.04 * skin.volume() + 1e-6);
+    EXPECT_NEAR(sum, surface.volume(), 0.04 * surface.volume() + 1e-6);
   }
 }
 
 // A side of a section's triangle is drawn exactly if it is one of the cut tetrahedron's, and not a diagonal of a quadrilateral.
-TEST_P(SkinOf, CutsDrawTheSidesOfTheirPolygons) {
+TEST_P(BoundarySurfaceOf, CutsDrawTheSidesOfTheirPolygons) {
   auto client = StreamClient::start(volume->description());
   ASSERT_TRUE(client);
   StreamPlan plan(volume);
   plan.set_lod({});
   while (const auto batch = plan.next(4096)) ASSERT_TRUE(client->apply(batch->payload));
-  Skin skin(client->front());
-  (void)skin.update();
+  BoundarySurface surface(client->front());
+  (void)surface.update();
   double offset = 0.0123;  // beside the samples
   for (int i = 0; i < 3; ++i) offset += (grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1) / 2) * std::array{0.6, 0.64, 0.48}[i];
-  const auto cut = cross_section(skin, {{0.6, 0.64, 0.48}, offset});
+  const auto cut = cross_section(surface, {{0.6, 0.64, 0.48}, offset});
   ASSERT_FALSE(cut.empty());
   std::multiset<std::array<std::array<float, 3>, 2>> drawn, diagonals;
   for (std::size_t first = 0; first < cut.size(); first += 3) {
@@ -263,44 +262,44 @@ TEST_P(SkinOf, CutsDrawTheSidesOfTheirPolygons) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, SkinOf, ::testing::Range(0u, 8u));
+INSTANTIATE_TEST_SUITE_P(Random, BoundarySurfaceOf, ::testing::Range(0u, 8u));
 
 // Where nothing hides in diamonds that look empty, the bound holds at every level of detail.
-TEST(Skin, TheFullVolumeIsWithinTheBound) {
+TEST(BoundarySurface, TheFullVolumeIsWithinTheBound) {
   const auto volume = stretched_volume(testing::gyroid({33, 33, 33}), {-0.3, 0.2});
   const double full = volume_of(extract(*volume, {})->front.mesh());
   StreamPlan plan(volume);
   auto client = StreamClient::start(volume->description());
   ASSERT_TRUE(client);
-  Skin skin(client->front());
+  BoundarySurface surface(client->front());
   plan.set_lod({});
   double last = kInf;
   while (const auto batch = plan.next(2048)) {
     ASSERT_TRUE(client->apply(batch->payload));
-    (void)skin.update();
-    EXPECT_LE(std::abs(skin.volume() - full), skin.volume_bound() + 1e-9 * full);
-    last = skin.volume_bound();
+    (void)surface.update();
+    EXPECT_LE(std::abs(surface.volume() - full), surface.volume_bound() + 1e-9 * full);
+    last = surface.volume_bound();
   }
   EXPECT_EQ(last, 0);
 }
 
-TEST(Skin, WhatForgetsIsMadeAfresh) {
+TEST(BoundarySurface, WhatForgetsIsMadeAfresh) {
   const auto volume = stretched_volume(testing::gyroid({17, 17, 17}), {-0.3, 0.2});
   StreamPlan plan(volume);
   auto client = StreamClient::start(volume->description(), {.max_updates = 400});
   ASSERT_TRUE(client);
-  Skin skin(client->front());
+  BoundarySurface surface(client->front());
   Page page;
   plan.set_lod({});
   ASSERT_TRUE(client->apply(plan.next(1024)->payload));
-  page.take(skin, skin.update(), false);
+  page.take(surface, surface.update(), false);
   client->look({.eye = {50, 60, 70}, .look_at = {0, 8, 20}});
   client->set_budget({.max_updates = client->updates() / 2}, 7);
   ASSERT_FALSE(client->give_up(7, 1000).empty());
   client->arrived(7);
-  const auto change = skin.update();
+  const auto change = surface.update();
   EXPECT_TRUE(change.reset);
-  page.take(skin, change, false);
+  page.take(surface, change, false);
   EXPECT_EQ(page.triangles(), boundary_of(client->mesh(), volume->description().grid));
 }
 

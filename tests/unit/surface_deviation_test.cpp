@@ -1,4 +1,4 @@
-#include "server/builder/surface_moves.h"
+#include "server/builder/surface_deviation.h"
 
 #include <gtest/gtest.h>
 
@@ -226,7 +226,7 @@ TEST_P(Moves, AreThoseOfTheFurthestCrossing) {
   const FieldHierarchy delta(c.volume, {.range = c.range});
   const SupercubeSet& set = delta.set();
   const Domain& domain = delta.domain();
-  const std::vector<float> moves = surface_moves(c.volume, c.range, domain, set).most;
+  const std::vector<float> moves = surface_deviation(c.volume, c.range, domain, set).largest;
   ASSERT_EQ(moves.size(), set.size());
   const std::vector<Crossing> crossings = crossings_of(c.volume, c.range);
   ASSERT_FALSE(crossings.empty());
@@ -283,10 +283,10 @@ TEST_P(Moves, AreThoseOfTheFurthestCrossing) {
 INSTANTIATE_TEST_SUITE_P(Fields, Moves, ::testing::Range(0u, 16u));
 
 // Some samples stand out alone, away from a wall.
-TEST(SurfaceMoves, SpecksThatLieApartMoveAsFarAsToTheNextSurface) {
+TEST(SurfaceDeviation, SpecksThatLieApartMoveAsFarAsToTheNextSurface) {
   const Volume volume = testing::specks({33, 33, 33}, 1);
   const FieldHierarchy delta(volume, {.range = {5, kInf}});
-  const std::vector<float> moves = surface_moves(volume, {5, kInf}, delta.domain(), delta.set()).most;
+  const std::vector<float> moves = surface_deviation(volume, {5, kInf}, delta.domain(), delta.set()).largest;
   std::size_t far = 0;
   delta.set().for_each_down([&](const Place& p) {
     const Diamond d(SupercubeSet::centre(p));
@@ -305,21 +305,21 @@ TEST(SurfaceMoves, SpecksThatLieApartMoveAsFarAsToTheNextSurface) {
 }
 
 // Labels: a surface that passes exactly at samples, with nothing on its other side.
-TEST(SurfaceMoves, ASurfaceAtTheLeastOrTheLargestSamplesMoves) {
+TEST(SurfaceDeviation, ASurfaceAtTheLeastOrTheLargestSamplesMoves) {
   std::vector<std::uint8_t> labels(9 * 9 * 9);
   for (int i = 0; i < 9 * 9 * 9; ++i)
     labels[std::size_t(i)] = (i % 9 - 4) * (i % 9 - 4) + (i / 9 % 9 - 3) * (i / 9 % 9 - 3) + (i / 81 - 4) * (i / 81 - 4) < 9;
   const Volume volume = testing::volume_of_type(SampleType::u8, {9, 9, 9}, labels);
   for (const Range range : {Range{1, kInf}, Range{1, 1}, Range{-kInf, 0}, Range{0, 0}}) {
     const FieldHierarchy delta(volume, {.range = range});
-    const std::vector<float> moves = surface_moves(volume, range, delta.domain(), delta.set()).most;
+    const std::vector<float> moves = surface_deviation(volume, range, delta.domain(), delta.set()).largest;
     ASSERT_GT(moves.size(), 0u);
     EXPECT_GT(std::count_if(moves.begin(), moves.end(), [](float m) { return m > 0; }), 100) << "[" << range.alpha << ", " << range.beta << "]";
   }
 }
 
 // What is far from 0 is as good as what is not.
-TEST(SurfaceMoves, DoNotDependOnTheFieldsZero) {
+TEST(SurfaceDeviation, DoNotDependOnTheFieldsZero) {
   const Volume volume = testing::gyroid({17, 17, 17});
   std::vector<double> near, far;
   for (std::uint64_t i = 0; i < volume.grid.sample_count(); ++i) {
@@ -330,7 +330,7 @@ TEST(SurfaceMoves, DoNotDependOnTheFieldsZero) {
   const auto moves_of = [&](const std::vector<double>& samples, const Range& range) {
     const Volume v = testing::volume_of_type(SampleType::f64, volume.grid.dims, samples);
     const FieldHierarchy delta(v, {.range = range});
-    return surface_moves(v, range, delta.domain(), delta.set()).most;
+    return surface_deviation(v, range, delta.domain(), delta.set()).largest;
   };
   const auto expected = moves_of(near, {-0.25, 0.25}), got = moves_of(far, {1e9 - 0.25, 1e9 + 0.25});
   ASSERT_EQ(got.size(), expected.size());

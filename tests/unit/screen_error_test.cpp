@@ -22,8 +22,8 @@ Vector world(const Grid& g, const Vector& sample) {
 }
 
 // The region of this size in world units that has its middle there.
-View::Region region_at(const Grid& g, const Vector& middle, const Vector& reach = {}) {
-  View::Region region;
+ScreenError::Region region_at(const Grid& g, const Vector& middle, const Vector& reach = {}) {
+  ScreenError::Region region;
   for (int i = 0; i < 3; ++i) {
     region.middle[i] = (middle[i] - g.origin[i]) / g.spacing[i];
     region.reach[i] = reach[i] / g.spacing[i];
@@ -31,8 +31,8 @@ View::Region region_at(const Grid& g, const Vector& middle, const Vector& reach 
   return region;
 }
 
-View::Region random_region(const Grid& g, std::mt19937& random) {
-  View::Region region;
+ScreenError::Region random_region(const Grid& g, std::mt19937& random) {
+  ScreenError::Region region;
   const double size = std::pow(10.0, testing::uniform(random, -2, 0));
   for (int i = 0; i < 3; ++i) {
     region.middle[i] = testing::uniform(random, 0, 1) * g.dims[i];
@@ -50,9 +50,9 @@ TEST_P(Views, NothingInThePictureShowsLarger) {
   std::size_t seen = 0;
   for (int trial = 0; trial < 300; ++trial) {
     const Camera camera = testing::random_camera(kGrid, random_);
-    const View view(camera, kGrid);
+    const ScreenError view(camera, kGrid);
     const NaiveCamera naive(camera);
-    const View::Region region = random_region(kGrid, random_);
+    const ScreenError::Region region = random_region(kGrid, random_);
     const double pixels = view.pixels_per_unit(region);
     for (int i = 0; i < 40; ++i) {
       Vector sample;
@@ -75,9 +75,9 @@ TEST_P(Views, NothingInThePictureShowsLarger) {
 // What bricks are passed over by.
 TEST_P(Views, ARegionHasNoFewerPixelsThanAnythingInIt) {
   for (int trial = 0; trial < 2000; ++trial) {
-    const View view(testing::random_camera(kGrid, random_), kGrid);
-    const View::Region whole = random_region(kGrid, random_);
-    View::Region part;
+    const ScreenError view(testing::random_camera(kGrid, random_), kGrid);
+    const ScreenError::Region whole = random_region(kGrid, random_);
+    ScreenError::Region part;
     for (int k = 0; k < 3; ++k) {
       part.reach[k] = whole.reach[k] * testing::uniform(random_, 0, 0.5);
       part.middle[k] = whole.middle[k] + (whole.reach[k] - part.reach[k]) * testing::uniform(random_, -1, 1);
@@ -89,7 +89,7 @@ TEST_P(Views, ARegionHasNoFewerPixelsThanAnythingInIt) {
 TEST_P(Views, PixelsAreFiniteAndAboveZeroEvenAroundTheEye) {
   for (int trial = 0; trial < 500; ++trial) {
     Camera camera = testing::random_camera(kGrid, random_);
-    View::Region region = random_region(kGrid, random_);
+    ScreenError::Region region = random_region(kGrid, random_);
     switch (trial % 4) {
       case 0:  // the eye in the region's middle, then in a corner of it, then anywhere inside, then anywhere
         camera.eye = world(kGrid, region.middle);
@@ -106,7 +106,7 @@ TEST_P(Views, PixelsAreFiniteAndAboveZeroEvenAroundTheEye) {
         break;
     }
     if (!check_lod({.camera = camera})) continue;
-    const double pixels = View(camera, kGrid).pixels_per_unit(region);
+    const double pixels = ScreenError(camera, kGrid).pixels_per_unit(region);
     EXPECT_TRUE(std::isfinite(pixels) && pixels > 0) << "trial " << trial << ": " << pixels;
   }
 }
@@ -115,7 +115,7 @@ TEST_P(Views, PixelsAreFiniteAndAboveZeroEvenAroundTheEye) {
 TEST_P(Views, NothingJumpsAtThePicturesEdge) {
   for (int trial = 0; trial < 40; ++trial) {
     const Camera camera = testing::random_camera(kGrid, random_);
-    const View view(camera, kGrid);
+    const ScreenError view(camera, kGrid);
     const NaiveCamera naive(camera);
     const double distance = testing::uniform(random_, 5, 100), step = distance / 5000;
     const Vector reach{distance * testing::uniform(random_, 0, 0.05), distance * testing::uniform(random_, 0, 0.05), 0};
@@ -142,7 +142,7 @@ TEST_P(Views, TheFurtherRoundTheSmaller) {
     Camera camera = testing::random_camera(kGrid, random_);
     camera.fov = testing::uniform(random_, 2, 90);
     camera.viewport = trial % 2 == 0 ? std::array<int, 2>{1920, 1080} : std::array<int, 2>{600, 800};
-    const View view(camera, kGrid);
+    const ScreenError view(camera, kGrid);
     const NaiveCamera naive(camera);
     const double distance = testing::uniform(random_, 5, 100);
     const Vector across = trial % 3 == 0 ? naive.right() : trial % 3 == 1 ? naive.up() : testing::along(testing::Vector{}, -1, naive.right());
@@ -166,7 +166,7 @@ TEST_P(Views, TheFurtherRoundTheSmaller) {
 TEST_P(Views, TheFurtherBehindTheSmaller) {
   for (int trial = 0; trial < 100; ++trial) {
     const Camera camera = testing::random_camera(kGrid, random_);
-    const View view(camera, kGrid);
+    const ScreenError view(camera, kGrid);
     const NaiveCamera naive(camera);
     const double size = testing::uniform(random_, 0, 5), step = testing::uniform(random_, 0.1, 2);
     const Vector reach{size * testing::uniform(random_, 0, 1), size * testing::uniform(random_, 0, 1), size * testing::uniform(random_, 0, 1)};
@@ -187,13 +187,13 @@ TEST_P(Views, CentralIsTheMiddleHalfOfThePictureEachWay) {
   for (int trial = 0; trial < 2000; ++trial) {
     const Camera camera = testing::random_camera(kGrid, random_);
     const NaiveCamera naive(camera);
-    const View::Region region = random_region(kGrid, random_);
+    const ScreenError::Region region = random_region(kGrid, random_);
     const Vector p = world(kGrid, region.middle);
     const auto [x, y] = naive.project(p);
     const double across = std::abs(x) / (camera.viewport[0] / 4.0), up = std::abs(y) / (camera.viewport[1] / 4.0);
     if (std::abs(across - 1) < 1e-9 || std::abs(up - 1) < 1e-9) continue;
     const bool expected = naive.depth(p) > 0 && across < 1 && up < 1;
-    EXPECT_EQ(View(camera, kGrid).is_central(region), expected) << "trial " << trial;
+    EXPECT_EQ(ScreenError(camera, kGrid).is_central(region), expected) << "trial " << trial;
     central += expected;
   }
   EXPECT_GT(central, 50u);
@@ -213,9 +213,9 @@ TEST_P(Views, SpacingAndOriginAreWhereTheSamplesLie) {
       same.look_at[k] = shift[k] + scale * camera.look_at[k];
       same.up[k] = scale * camera.up[k];
     }
-    const View::Region region = random_region(unit, random_);
-    const double pixels = View(camera, unit).pixels_per_unit(region);
-    EXPECT_NEAR(View(same, moved).pixels_per_unit(region) * scale, pixels, 1e-6 * pixels) << "trial " << trial;
+    const ScreenError::Region region = random_region(unit, random_);
+    const double pixels = ScreenError(camera, unit).pixels_per_unit(region);
+    EXPECT_NEAR(ScreenError(same, moved).pixels_per_unit(region) * scale, pixels, 1e-6 * pixels) << "trial " << trial;
   }
 }
 

@@ -1,4 +1,4 @@
-#include "client/view/skin.h"
+#include "client/view/boundary_surface.h"
 
 #include <algorithm>
 #include <bit>
@@ -16,6 +16,10 @@ namespace {
 using Tet = FrontMesher::Tet;
 using Position = FrontMesher::Position;
 
+// Volumes are summed up in cubes of samples / kSteps.
+constexpr double kStepsCubed = double(FrontMesher::kSteps) * FrontMesher::kSteps * FrontMesher::kSteps;
+double in_world(double volume, const Grid& grid) { return volume * grid.spacing[0] * grid.spacing[1] * grid.spacing[2] / kStepsCubed; }
+
 constexpr int kCellsAcross = 8;  // pieces along the virtual grid's side, at most
 constexpr int kLeastCell = 16;   // samples
 
@@ -26,13 +30,32 @@ double arc_cosine(double x) {
   return x < 0 ? std::numbers::pi - angle : angle;
 }
 
+// Appends the edges of triangles, each once; returns how many.
+std::size_t add_edges(std::span<const std::uint32_t> triangles, std::vector<std::uint32_t>& edges) {
+  std::vector<std::uint64_t> pairs;
+  pairs.reserve(triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); i += 3) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax(triangles[i + k], triangles[i + (k + 1) % 3]);
+      pairs.push_back(std::uint64_t(low) << 32 | high);
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  for (const std::uint64_t pair : pairs) {
+    edges.push_back(std::uint32_t(pair >> 32));
+    edges.push_back(std::uint32_t(pair));
+  }
+  return pairs.size();
+}
+
 }  // namespace
 
-void Skin::forget_all() {
+void BoundarySurface::forget_all() {
   position_.clear();
   surface_.clear();
   normal_.clear();
-  there_.clear();
+  vertex_of_.clear();
   parts_.clear();
   members_.clear();
   drawn_.clear();
@@ -40,7 +63,7 @@ void Skin::forget_all() {
   point_generation_ = mesher_.state().point_generation;
 }
 
-std::uint32_t Skin::piece_of(std::size_t number) const {
+std::uint32_t BoundarySurface::piece_of(std::size_t number) const {
   const int cell = std::max(std::countr_zero(unsigned(kLeastCell)), mesher_.state().domain.levels() - std::countr_zero(unsigned(kCellsAcross)));
   const int up = mesher_.block(number).scale + 2;
   const Vertex p = mesher_.block(number).position;
@@ -49,9 +72,9 @@ std::uint32_t Skin::piece_of(std::size_t number) const {
 }
 
 // What the parents of diamonds left for them is no longer there, or there again.
-void Skin::mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const {
+void BoundarySurface::mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const {
   const FrontState& front = mesher_.state();
-  const int scale = mesher_.block(number).scale, levels = front.domain.levels();
+  const int scale = mesher_.block(number).scale, root_scale = front.domain.levels();
   const Vertex position = mesher_.block(number).position;
   const auto mark = [&](int of_scale, Vertex at) {
     if (const std::uint32_t found = front.find_number(of_scale, at); found != FrontState::kNone) dirty[found] = 1;
@@ -59,7 +82,7 @@ void Skin::mark_parents(std::size_t number, std::uint64_t slots, std::vector<std
   for (const int slot : set_bits(slots)) {
     const Diamond d(centre_of(scale, position, slot), scale, kTypeOfSlot[slot]);
     if (d.centre == front.domain.root()) {
-      mark(levels, {});
+      mark(root_scale, {});
       continue;
     }
     for (int k = 0; k < d.row->parents; ++k) {
@@ -72,7 +95,7 @@ void Skin::mark_parents(std::size_t number, std::uint64_t slots, std::vector<std
 }
 
 // By number of the supercube: whether what it left is to be made again.
-std::vector<std::uint8_t> Skin::find_changes() {
+std::vector<std::uint8_t> BoundarySurface::find_changes() {
   const std::size_t count = mesher_.state().blocks.size(), before = parts_.size();
   std::vector<std::uint8_t> dirty(count);
   const auto grow = [points = mesher_.state().q.size()](auto& items) {  // by less than doubling, for these are most of a viewer's memory
@@ -82,7 +105,7 @@ std::vector<std::uint8_t> Skin::find_changes() {
   grow(position_);
   grow(surface_);
   grow(normal_);
-  grow(there_);
+  grow(vertex_of_);
   parts_.resize(count);
   for (std::size_t i = before; i < count; ++i) {
     parts_[i].piece = piece_of(i);
@@ -108,31 +131,31 @@ std::vector<std::uint8_t> Skin::find_changes() {
   return dirty;
 }
 
-double Skin::volume_of(const Tet& tet) const {
+double BoundarySurface::volume_of(const Tet& tet) const {
   const Position &o = position_[tet[0]], &a = position_[tet[1]], &b = position_[tet[2]], &c = position_[tet[3]];
   const auto from = [&o](const Position& p) { return Vec3{double(p[0] - o[0]), double(p[1] - o[1]), double(p[2] - o[2])}; };
   return triple_product(from(a), from(b), from(c)) / 6;
 }
 
-int Skin::kind_of(const std::array<PointId, 3>& points, bool at_border) const {
+int BoundarySurface::kind_of(const std::array<PointId, 3>& points, bool at_border) const {
   const Surface s = surface_[points[0]];
-  if (s != Surface::inside && surface_[points[1]] == s && surface_[points[2]] == s) return s == Surface::alpha ? 0 : 1;
-  if (!at_border) return -1;
+  if (s != Surface::inside && surface_[points[1]] == s && surface_[points[2]] == s) return s == Surface::alpha ? kAlpha : kBeta;
+  if (!at_border) return kNone;
   const Vertex last = mesher_.state().domain.last();
   const std::array<std::int32_t, 3> far{last.x * FrontMesher::kSteps, last.y * FrontMesher::kSteps, last.z * FrontMesher::kSteps};
   for (int axis = 0; axis < 3; ++axis) {
     const std::int32_t at = position_[points[0]][axis];
     if (position_[points[1]][axis] != at || position_[points[2]][axis] != at) continue;
-    if (at == 0) return 2 + 2 * axis;
-    if (at == far[axis]) return 3 + 2 * axis;
+    if (at == 0) return kBox + 2 * axis;
+    if (at == far[axis]) return kBox + 2 * axis + 1;
   }
-  return -1;
+  return kNone;
 }
 
-void Skin::add_normals(const std::vector<Triangle>& triangles, int sign) {
+void BoundarySurface::add_normals(const std::vector<Triangle>& triangles, int sign) {
   const auto& spacing = mesher_.state().grid.spacing;
   for (const Triangle& t : triangles) {
-    if (t.kind > 1) continue;
+    if (t.kind >= kBox) continue;
     std::array<Vec3, 3> corners;
     for (std::size_t k = 0; k < 3; ++k) {
       const Position& p = position_[t.points[k]];
@@ -144,11 +167,18 @@ void Skin::add_normals(const std::vector<Triangle>& triangles, int sign) {
   }
 }
 
-void Skin::remake(std::size_t number) {
+void BoundarySurface::remake(std::size_t number) {
   Part& part = parts_[number];
   add_normals(part.triangles, -1);
   triangles_ -= part.triangles.size();
-  part.triangles.clear();
+  cut_tets(number, part);
+  find_triangles(number, part.triangles);
+  add_normals(part.triangles, 1);
+  triangles_ += part.triangles.size();
+}
+
+// Makes a supercube's tetrahedra, in tets_, and sums up their volumes.
+void BoundarySurface::cut_tets(std::size_t number, Part& part) {
   part.volume = part.bound = 0;
   tets_.clear();
   halves_.clear();
@@ -160,93 +190,89 @@ void Skin::remake(std::size_t number) {
     part.volume += inside;
     if (!half.can_change) continue;
     const auto from = [&c = half.corners](int k) { return Vec3{double(c[k].x - c[0].x), double(c[k].y - c[0].y), double(c[k].z - c[0].z)}; };
-    const double whole = std::abs(triple_product(from(1), from(2), from(3))) / 6 * std::pow(double(FrontMesher::kSteps), 3);
+    const double whole = std::abs(triple_product(from(1), from(2), from(3))) / 6 * kStepsCubed;
     part.bound += std::max(inside, whole - inside);
   }
+}
 
+// The faces of tets_ that lie on a surface or on the box.
+void BoundarySurface::find_triangles(std::size_t number, std::vector<Triangle>& triangles) const {
   const Vertex p = mesher_.block(number).position, last = mesher_.state().domain.last();
   const auto reaches = [up = mesher_.block(number).scale + 2](std::int32_t at, std::int32_t end) {
     return at == 0 || std::int64_t(at + 1) << up >= end;
   };
   const bool at_border = reaches(p.x, last.x) || reaches(p.y, last.y) || reaches(p.z, last.z);
-  const auto level = std::uint8_t(mesher_.block(number).scale);
+  const auto lod = std::uint8_t(mesher_.block(number).scale);
+  triangles.clear();
   for (const Tet& tet : tets_) {
     for (const auto& face : kTetFaces) {
       const std::array<PointId, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
       const int kind = kind_of(points, at_border);
-      if (kind >= 0) part.triangles.push_back({points, std::uint8_t(kind), level});
+      if (kind != kNone) triangles.push_back({points, std::uint8_t(kind), lod});
     }
   }
-  part.triangles.shrink_to_fit();
-  add_normals(part.triangles, 1);
-  triangles_ += part.triangles.size();
+  triangles.shrink_to_fit();
 }
 
-bool Skin::is_empty(std::uint32_t piece) const {
+bool BoundarySurface::is_empty(std::uint32_t piece) const {
   return std::all_of(members_[piece].begin(), members_[piece].end(), [this](std::uint32_t number) { return parts_[number].triangles.empty(); });
 }
 
-SkinPiece Skin::piece(std::uint32_t id, bool edges) {
+SurfaceVertex BoundarySurface::vertex(PointId point, const Triangle& t) const {
+  const Position& p = position_[point];
+  SurfaceVertex v{float(p[0]) / FrontMesher::kSteps, float(p[1]) / FrontMesher::kSteps, float(p[2]) / FrontMesher::kSteps};
+  Vec3 normal{};
+  if (t.kind >= kBox) {
+    normal[(t.kind - kBox) / 2] = (t.kind - kBox) % 2 == 0 ? -1 : 1;
+  } else {
+    const NormalSum& sum = normal_[point];
+    normal = normalized({double(sum[0]), double(sum[1]), double(sum[2])});
+  }
+  const auto coded = [](double c) { return std::int8_t(std::lrint(127 * c)); };
+  v.nx = coded(normal[0]);
+  v.ny = coded(normal[1]);
+  v.nz = coded(normal[2]);
+  v.lod = t.lod;
+  return v;
+}
+
+// Appends triangles of one kind, with their vertices. points: of the piece's vertices.
+void BoundarySurface::add_triangles(const std::vector<const Triangle*>& triangles, std::vector<PointId>& points, SurfacePiece& piece) {
+  const std::size_t first = points.size();  // of this kind's vertices
+  for (const Triangle* t : triangles) {
+    for (const PointId point : t->points) {
+      // A sparse set (Briggs and Torczon 1993): vertex_of_ is not cleared; its entry counts if that vertex is this point's.
+      std::uint32_t& number = vertex_of_[point];
+      if (number < first || number >= points.size() || points[number] != point) {
+        number = std::uint32_t(points.size());
+        points.push_back(point);
+        piece.vertices.push_back(vertex(point, *t));
+      }
+      piece.indices.push_back(number);
+      auto& lod = piece.vertices[number].lod;
+      lod = std::min(lod, t->lod);
+    }
+  }
+}
+
+SurfacePiece BoundarySurface::piece(std::uint32_t id, bool edges) {
   std::array<std::vector<const Triangle*>, kKinds> by_kind;
   for (const std::uint32_t number : members_[id]) {
     for (const Triangle& t : parts_[number].triangles) by_kind[t.kind].push_back(&t);
   }
-  SkinPiece piece;
+  SurfacePiece piece;
   piece.id = id;
   std::vector<PointId> points;  // of the vertices
-  std::vector<std::uint64_t> pairs;
   for (int kind = 0; kind < kKinds; ++kind) {
-    if (by_kind[kind].empty()) continue;
-    const int group = std::min(kind, 2);
-    const std::size_t first = points.size();  // of this kind's vertices
-    pairs.clear();
-    for (const Triangle* t : by_kind[kind]) {
-      std::array<std::uint32_t, 3> corner;
-      for (int k = 0; k < 3; ++k) {
-        const PointId point = t->points[k];
-        // A sparse set (Briggs and Torczon 1993): an entry of there_ counts if points has the point at that place.
-        if (there_[point] < first || there_[point] >= points.size() || points[there_[point]] != point) {
-          there_[point] = std::uint32_t(points.size());
-          points.push_back(point);
-          const Position& p = position_[point];
-          SkinVertex v{float(p[0]) / FrontMesher::kSteps, float(p[1]) / FrontMesher::kSteps, float(p[2]) / FrontMesher::kSteps};
-          std::array<std::int8_t, 3> n{};
-          if (kind > 1) {
-            n[(kind - 2) / 2] = kind % 2 == 0 ? -127 : 127;
-          } else {
-            const NormalSum& sum = normal_[point];
-            const Vec3 normal = normalized({double(sum[0]), double(sum[1]), double(sum[2])});
-            for (int i = 0; i < 3; ++i) n[i] = std::int8_t(std::lrint(127 * normal[i]));
-          }
-          v.nx = n[0];
-          v.ny = n[1];
-          v.nz = n[2];
-          v.level = t->level;
-          piece.vertices.push_back(v);
-        }
-        corner[k] = there_[point];
-        auto& level = piece.vertices[corner[k]].level;
-        level = std::min(level, t->level);
-      }
-      piece.indices.insert(piece.indices.end(), corner.begin(), corner.end());
-      if (!edges) continue;
-      for (int k = 0; k < 3; ++k) {
-        const auto [low, high] = std::minmax(corner[k], corner[(k + 1) % 3]);
-        pairs.push_back(std::uint64_t(low) << 32 | high);
-      }
-    }
+    const int group = std::min(kind, kBox);
+    const std::size_t first = piece.indices.size();
+    add_triangles(by_kind[kind], points, piece);
     piece.triangles[group] += std::uint32_t(by_kind[kind].size());
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-    for (const std::uint64_t pair : pairs) {
-      piece.edges.push_back(std::uint32_t(pair >> 32));
-      piece.edges.push_back(std::uint32_t(pair));
-    }
-    piece.edge_counts[group] += std::uint32_t(pairs.size());
+    if (edges) piece.edge_counts[group] += std::uint32_t(add_edges(std::span(piece.indices).subspan(first), piece.edges));
   }
   if (piece.vertices.empty()) return piece;
   piece.min = piece.max = {piece.vertices[0].x, piece.vertices[0].y, piece.vertices[0].z};
-  for (const SkinVertex& v : piece.vertices) {
+  for (const SurfaceVertex& v : piece.vertices) {
     const std::array<float, 3> p{v.x, v.y, v.z};
     for (int i = 0; i < 3; ++i) {
       piece.min[i] = std::min(piece.min[i], p[i]);
@@ -256,7 +282,7 @@ SkinPiece Skin::piece(std::uint32_t id, bool edges) {
   return piece;
 }
 
-Skin::Change Skin::update() {
+BoundarySurface::Change BoundarySurface::update() {
   Change change;
   if (mesher_.state().point_generation != point_generation_ || parts_.empty()) {
     forget_all();
@@ -281,7 +307,7 @@ Skin::Change Skin::update() {
   return change;
 }
 
-Skin::Change Skin::all() {
+BoundarySurface::Change BoundarySurface::all() {
   (void)update();
   Change change;
   change.reset = true;
@@ -291,23 +317,21 @@ Skin::Change Skin::all() {
   return change;
 }
 
-double Skin::volume() const {
+double BoundarySurface::volume() const {
   double sum = 0;
   for (const Part& part : parts_) sum += part.volume;
-  const auto& s = mesher_.state().grid.spacing;
-  return sum * s[0] * s[1] * s[2] / std::pow(double(FrontMesher::kSteps), 3);
+  return in_world(sum, mesher_.state().grid);
 }
 
-double Skin::volume_bound() const {
+double BoundarySurface::volume_bound() const {
   double sum = 0;
   for (const Part& part : parts_) sum += part.bound;
-  const auto& s = mesher_.state().grid.spacing;
-  return sum * s[0] * s[1] * s[2] / std::pow(double(FrontMesher::kSteps), 3);
+  return in_world(sum, mesher_.state().grid);
 }
 
-std::size_t Skin::memory_bytes() const {
+std::size_t BoundarySurface::memory_bytes() const {
   std::size_t bytes = position_.capacity() * sizeof(Position) + surface_.capacity() + normal_.capacity() * sizeof(NormalSum) +
-                      there_.capacity() * sizeof(std::uint32_t) + parts_.capacity() * sizeof(Part);
+                      vertex_of_.capacity() * sizeof(std::uint32_t) + parts_.capacity() * sizeof(Part);
   for (const Part& part : parts_) bytes += part.triangles.capacity() * sizeof(Triangle);
   return bytes;
 }

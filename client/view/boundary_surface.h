@@ -1,0 +1,113 @@
+// The boundary surface of a mesh that changes: where the interval volume ends. It comes in pieces, and only those are remade in which something
+// changed.
+//
+// A tetrahedron's patch ends at the alpha surface, at the beta surface, or at the box. Each of its faces tells by itself which, if any: three cuts by
+// alpha lie on no face that two patches share. So no faces are matched, and what one supercube leaves can be exchanged alone.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/front/front.h"
+#include "common/front/front_mesher.h"
+#include "common/mesh/normals.h"
+
+namespace intervale {
+
+// A vertex as it is drawn. Position in samples; normal in world space, of length 127.
+struct SurfaceVertex {
+  float x = 0, y = 0, z = 0;
+  std::int8_t nx = 0, ny = 0, nz = 0;
+  std::uint8_t lod = 0;  // level of detail: the finest scale of the triangles at this vertex, 0 the finest of all
+};
+static_assert(sizeof(SurfaceVertex) == 16);
+
+// Groups of triangles: on the alpha surface, on the beta surface, and on the box.
+inline constexpr int kSurfaceGroups = 3;
+
+struct SurfacePiece {
+  std::uint32_t id = 0;
+  std::vector<SurfaceVertex> vertices;
+  std::vector<std::uint32_t> indices;  // three a triangle, counterclockwise seen from outside; by group
+  std::vector<std::uint32_t> edges;    // two an edge, each once in its group; by group
+  std::array<std::uint32_t, kSurfaceGroups> triangles{}, edge_counts{};
+  std::array<float, 3> min{}, max{};  // bounds of its vertices
+};
+
+class BoundarySurface {
+ public:
+  explicit BoundarySurface(const Front& front) : mesher_(front.state()) {}  // the front must outlive it
+
+  struct Change {
+    bool reset = false;                  // nothing of the former surface stays
+    std::vector<std::uint32_t> pieces;   // ids of pieces that exist and changed
+    std::vector<std::uint32_t> removed;  // ids of pieces that have become empty
+  };
+  // What changed since the last update. O(changes), and a little for each supercube.
+  [[nodiscard]] Change update();
+  // Updates, and reports every piece as changed.
+  [[nodiscard]] Change all();
+  // A piece as of the last update, with or without edges. O(its size).
+  [[nodiscard]] SurfacePiece piece(std::uint32_t id, bool edges);
+
+  // As of the last update.
+  [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
+  [[nodiscard]] double volume() const;  // of the mesh, world units cubed
+  // How much splits can change that volume: for each tetrahedron of a diamond that can be split and whose vertices lie on different sides, the larger
+  // of its part in the mesh and the rest. Surfaces inside diamonds whose vertices all lie on one side are not known and not counted. 0 when
+  // everything is split.
+  [[nodiscard]] double volume_bound() const;
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+  // What the mesh is made of, and its points.
+  [[nodiscard]] const FrontMesher& mesher() const { return mesher_; }
+  [[nodiscard]] const FrontMesher::Position& position(PointId id) const { return position_[id]; }
+  [[nodiscard]] Surface surface(PointId id) const { return surface_[id]; }
+
+ private:
+  // What a triangle lies on: alpha, beta, or a side of the box: kBox + 2 * axis + (1 at the far side).
+  static constexpr int kAlpha = 0, kBeta = 1, kBox = 2, kKinds = 8, kNone = -1;
+  struct Triangle {
+    std::array<PointId, 3> points;
+    std::uint8_t kind = 0, lod = 0;
+  };
+  struct Part {  // what a supercube left
+    std::uint64_t shown = 0;
+    std::uint32_t piece = 0;
+    double volume = 0, bound = 0;
+    std::vector<Triangle> triangles;
+  };
+
+  void forget_all();
+  std::vector<std::uint8_t> find_changes();
+  void mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const;
+  [[nodiscard]] std::uint32_t piece_of(std::size_t number) const;
+  void remake(std::size_t number);
+  void cut_tets(std::size_t number, Part& part);
+  void find_triangles(std::size_t number, std::vector<Triangle>& triangles) const;
+  [[nodiscard]] int kind_of(const std::array<PointId, 3>& points, bool at_border) const;
+  void add_normals(const std::vector<Triangle>& triangles, int sign);
+  [[nodiscard]] bool is_empty(std::uint32_t piece) const;
+  [[nodiscard]] double volume_of(const FrontMesher::Tet& tet) const;
+  [[nodiscard]] SurfaceVertex vertex(PointId point, const Triangle& t) const;
+  void add_triangles(const std::vector<const Triangle*>& triangles, std::vector<PointId>& points, SurfacePiece& piece);
+
+  FrontMesher mesher_;
+  std::uint64_t point_generation_ = 0;
+  std::vector<FrontMesher::Position> position_;      // by PointId
+  std::vector<Surface> surface_;                     // by PointId
+  std::vector<NormalSum> normal_;                    // by PointId: of the triangles of the point's own surface
+  std::vector<std::uint32_t> vertex_of_;             // by PointId: its vertex in the piece being assembled, if that vertex has this id
+  std::vector<Part> parts_;                          // by number of the supercube
+  std::vector<std::vector<std::uint32_t>> members_;  // of a piece, by id
+  std::vector<std::uint8_t> drawn_;                  // whether a piece had triangles, by id
+  std::uint64_t triangles_ = 0;
+  // Room to work in.
+  std::vector<FrontMesher::Point> points_;
+  std::vector<FrontMesher::Tet> tets_;
+  std::vector<FrontMesher::Half> halves_;
+};
+
+}  // namespace intervale
