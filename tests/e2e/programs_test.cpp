@@ -249,7 +249,7 @@ TEST(Programs, AListThatIsNestedWithoutEndIsOneLine) {
   const std::string deep = std::string(1 << 20, '[') + std::string(1 << 20, ']');
   for (const std::string& body : {deep, "{\"datasets\":[{\"name\":" + deep + "}]}"}) {
     const Stranger stranger("HTTP/1.1 200 OK\r\nServer: intervale\r\nContent-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
-    expect_complaint(run({client(), "list", stranger.url("")}), 1, "makes no sense");
+    expect_complaint(run({client(), "list", stranger.url("")}), 1, "is invalid");
   }
 }
 
