@@ -7,7 +7,8 @@ namespace intervale {
 void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> plane, int compression) {
   append_varint(out, plane.size());
   if (plane.empty()) return;
-#ifdef INTERVALE_STORED_PLANES  // the browser has no compressor: a client names what it has, and that takes little as it is
+// The browser's module has no compressor: it sends only names of splits, which are small as they are
+#ifdef INTERVALE_STORED_PLANES
   (void)compression;
   append_varint(out, plane.size());
   out.insert(out.end(), plane.begin(), plane.end());
@@ -33,7 +34,7 @@ std::optional<std::vector<std::uint8_t>> take_plane(std::span<const std::uint8_t
   const auto from = bytes.first(*stored);
   bytes = bytes.subspan(*stored);
   if (*stored == *size) return std::vector<std::uint8_t>(from.begin(), from.end());
-  // The frame itself must claim the same size before it is given room.
+  // The frame must declare the same size before memory is allocated for it.
   if (ZSTD_getFrameContentSize(from.data(), from.size()) != *size) return {};
   std::vector<std::uint8_t> plane(*size);
   if (ZSTD_decompress(plane.data(), plane.size(), from.data(), from.size()) != *size) return {};

@@ -1,4 +1,5 @@
-// Planes: like symbols side by side, each plane compressed by itself, so that each has a code table of its own.
+// Byte planes: bytes of one meaning side by side, each plane compressed by itself, so that each has a code table of its
+// own.
 #pragma once
 
 #include <cstddef>
@@ -9,19 +10,21 @@
 
 namespace intervale {
 
-// Appends a plane to out: its length, the length it is stored in (both variable-length), and its bytes, compressed (zstd) unless that gains nothing.
+// Appends a plane to out: its length, the length it is stored in (both variable-length), and its bytes, compressed
+// (zstd) unless that gains nothing.
 void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> plane, int compression);
 
-// Takes one plane off the front of bytes from outside. Nothing if they are no plane, or one of more than most bytes. Allocates no more than it gives
-// back.
+// Takes one plane off the front of bytes from outside. Nothing if they do not begin with a plane of at most `most`
+// bytes. Allocates no more than it returns.
 [[nodiscard]] std::optional<std::vector<std::uint8_t>> take_plane(std::span<const std::uint8_t>& bytes, std::size_t most);
 
-// Variable-length numbers: seven bits a byte, lowest first, the top bit set on all but the last.
+// Variable-length integers: seven bits a byte, lowest first, the top bit set on all but the last.
 void append_varint(std::vector<std::uint8_t>& out, std::uint64_t value);
 [[nodiscard]] std::optional<std::uint64_t> take_varint(std::span<const std::uint8_t>& bytes);
 
-// width-byte words turned to planes: all lowest bytes, then all second ones, ...; and back.
+// Converts words of `width` bytes to planes: all lowest bytes, then all second ones, and so on; and back.
 [[nodiscard]] std::vector<std::uint8_t> split_bytes(std::span<const std::uint64_t> words, unsigned width);
-[[nodiscard]] std::vector<std::uint64_t> join_bytes(std::span<const std::uint8_t> bytes, unsigned width);  // bytes.size() a multiple of width
+// bytes.size(): a multiple of width
+[[nodiscard]] std::vector<std::uint64_t> join_bytes(std::span<const std::uint8_t> bytes, unsigned width);
 
 }  // namespace intervale

@@ -8,12 +8,13 @@
 namespace intervale {
 namespace {
 
-// The distance of a centre that lies on the other side of the surface than predicted, as a share of the vertex's: measured on real volumes.
+// The distance of a centre that lies on the other side of the surface than predicted, as a share of the vertex's:
+// measured on real volumes.
 constexpr double kAcross = 0.125;
 constexpr double kGuessVariance = 1e5;  // of a distance that is a guess
 
-// Of a cut q, seen from an edge's first end: the second end's distance over the first's; the variance of that ratio's relative error; and 1 /
-// variance. From the other end it is the cut 255 - q.
+// Of a cut q, seen from an edge's first end: the second end's distance over the first's; the variance of that ratio's
+// relative error; and 1 / variance. From the other end it is the cut 255 - q.
 struct Step {
   double ratio, variance, weight;
 };
@@ -66,7 +67,7 @@ void Prediction::measure(int s) {
   surface.centre = predict_centre(surface);
 }
 
-// The spine's ends as the unit; each belt vertex from that end from which it lies across.
+// The spine's length is the unit; each belt vertex is measured from the spine's end on the other side of the surface.
 void Prediction::measure_from_parted_spine(int s) {
   Surface& surface = surface_[s];
   const int n = context_.row->belt;
@@ -88,7 +89,8 @@ void Prediction::measure_from_parted_spine(int s) {
   }
 }
 
-// Adds what a belt vertex's neighbours in the ring say of its distance, those among `which` that lie on the other side of the surface.
+// Adds what a belt vertex's neighbours in the ring say of its distance, those among `which` that lie on the other side
+// of the surface.
 void Prediction::add_neighbours(int s, int v, std::uint32_t which, Estimate& estimate) const {
   const Surface& surface = surface_[s];
   const int n = context_.row->belt, before = v == 2 ? n + 1 : v - 1, after = v == n + 1 ? 2 : v + 1, first = 2 * n - 1;
@@ -101,7 +103,8 @@ void Prediction::add_neighbours(int s, int v, std::uint32_t which, Estimate& est
   if ((which >> after & 1) != 0 && is_cut(first + v, s)) add(after, kSteps[255 - step(first + v, s)]);
 }
 
-// Both ends on one side: belt vertices on the other side give the ratio of the ends' distances, and the distances of their neighbours in the ring.
+// Both ends on one side: belt vertices on the other side give the ratio of the ends' distances, and the distances of
+// their neighbours in the ring.
 void Prediction::measure_from_belt(int s) {
   Surface& surface = surface_[s];
   const int n = context_.row->belt;
@@ -140,10 +143,11 @@ void Prediction::measure_from_belt(int s) {
   }
 }
 
-// The centre's distance, above the surface where positive, from the pairs of vertices that stand opposite each other around it. Along an edge of
-// class 0 all pairs are equally far: the belt's mean. In class 1 one pair of the belt is the nearest by far. In class 2, pairs at 1 and at sqrt(2):
-// twice the mean of the near ones less that of the far ones has no error of second order in the belt's plane. Least squares on real volumes gives
-// these same coefficients, and the spine none. Where pairs are missing, half way from the spine's mean to those there are.
+// The centre's distance, above the surface where positive, from the pairs of vertices that stand opposite each other
+// around it. Along an edge of class 0 all pairs are equally far: the belt's mean. In class 1 one pair of the belt is
+// the nearest by far. In class 2, pairs at 1 and at sqrt(2): twice the mean of the near ones less that of the far ones
+// has no error of second order in the belt's plane. Least squares on real volumes gives these same coefficients, and
+// the spine none. Where pairs are missing, half way from the spine's mean to those there are.
 double Prediction::predict_centre(const Surface& surface) const {
   if ((surface.known & 3) == 0) return (surface.above & 1) != 0 ? 1 : -1;
   const int n = context_.row->belt, half = n / 2;
@@ -168,8 +172,8 @@ double Prediction::predict_centre(const Surface& surface) const {
   return (spine + mean / std::popcount(near)) / 2;
 }
 
-// A vertex's distance from all that is known around it: where the surface cuts the spine, its neighbours in the ring on the other side have been
-// measured from the spine's other end.
+// A vertex's distance from all that is known around it: where the surface cuts the spine, its neighbours in the ring on
+// the other side have been measured from the spine's other end.
 Prediction::Measure Prediction::measured(int s, int v) const {
   const Surface& surface = surface_[s];
   if ((surface.known >> v & 1) == 0) return {surface.guess, kGuessVariance};
@@ -184,7 +188,8 @@ Prediction::Measure Prediction::measured(int s, int v) const {
 void Prediction::find_gap() {
   const DiamondType& row = *context_.row;
   const Surface& alpha = surface_[0];
-  if (alpha.above == context_.vertices || surface_[1].above == 0) return;  // nothing below, or nothing above: no such edge
+  // Nothing below, or nothing above: no such edge
+  if (alpha.above == context_.vertices || surface_[1].above == 0) return;
   double sum = 0;
   int edges = 0;
   for (int e = 0; e < row.edges; ++e) {
@@ -198,8 +203,8 @@ void Prediction::find_gap() {
   if (edges > 0) gap_ = sum / edges;
 }
 
-// Goes through the cuts of an update in order, `bits` being which: code(is_first, prediction) gives the true cut for each, from which the next are
-// predicted.
+// Visits the cuts of an update in order; bits: which (see cut_bits). code(is_first, prediction) returns the true cut,
+// from which the next ones are predicted.
 template <class Code>
 void Prediction::walk(Side centre, std::uint32_t bits, Code&& code) {
   double sum[2] = {0, 0}, weight[2] = {0, 0};  // of the centre's distance, from the cuts so far

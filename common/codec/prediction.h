@@ -1,13 +1,16 @@
 // Predicts a diamond's split from what is around it: the side of its centre, and the cuts on the subdivision edges.
 //
-// All cuts of one surface around one diamond depend on the same few values. A cut at the fraction t of an edge means that the field's distances from
-// the surface's value at the edge's ends are as t to 1 - t. Along the spine and the edges around it that gives the vertices' distances in one unit,
-// and these predict the centre's: its side, and the first cut. Where a diamond's vertices stand around its centre in pairs, the nearest pairs, or
-// pairs at two distances, predict the centre better than the spine does. The first cut in turn determines the centre's true distance, and so the
-// other cuts, up to their rounding. Where alpha and beta both cut one edge, that is beta - alpha in the same unit, and alpha's cuts predict beta's.
+// All cuts of one surface around one diamond depend on the same few values. A cut at the fraction t of an edge means
+// that the field's distances from the surface's value at the edge's ends are as t to 1 - t. Along the spine and the
+// edges around it that gives the vertices' distances in one unit, and these predict the centre's: its side, and the
+// first cut. Where a diamond's vertices stand around its centre in pairs, the nearest pairs, or pairs at two distances,
+// predict the centre better than the spine does. The first cut in turn determines the centre's true distance, and so
+// the other cuts, up to their rounding. Where alpha and beta both cut one edge, that is beta - alpha in the same unit,
+// and alpha's cuts predict beta's.
 //
-// An update therefore keeps the residuals of the prediction, which are small. A prediction reads nothing but the diamond, so residuals are computed
-// once and are right in whatever order updates arrive. Arithmetic is plain double precision in a fixed order: every machine predicts alike.
+// An update therefore keeps the residuals of the prediction, which are small. A prediction reads nothing but the
+// diamond, so residuals are computed once and are right in whatever order updates arrive. Arithmetic is plain double
+// precision in a fixed order: every machine predicts alike.
 #pragma once
 
 #include <array>
@@ -26,7 +29,8 @@ struct DiamondContext {
   const DiamondType* row = nullptr;
   std::uint32_t sides = 0;     // two bits each, by local vertex; 0 for one that does not exist
   std::uint32_t vertices = 0;  // a bit for each local vertex that exists
-  // Of each edge, by surface (0 alpha, 1 beta): 2 q + 1, the cut's place from the first of edge_ends in 1/512; 0 where there is none.
+  // Of each edge, by surface (0 alpha, 1 beta): 2 q + 1, the cut's place from the first of edge_ends in 1/512; 0 where
+  // there is none.
   std::array<std::array<std::uint16_t, 2>, kMaxEdges> cut{};
 
   [[nodiscard]] Side side(int v) const { return Side(sides >> (2 * v) & 3); }
@@ -40,7 +44,8 @@ struct DiamondContext {
     return (exists | exists << 1) & 0x55555;
   }
 
-  // Which subdivision edges are cut if the centre lies there: bit 2 v by alpha and bit 2 v + 1 by beta on the edge to local vertex v.
+  // Which subdivision edges are cut if the centre lies there: bit 2 v by alpha and bit 2 v + 1 by beta on the edge to
+  // local vertex v.
   [[nodiscard]] std::uint32_t cut_bits(Side centre) const {
     const std::uint32_t exists = pairs(), inside = sides & exists, above = sides >> 1 & exists, below = exists & ~(inside | above);
     const std::uint32_t alpha = centre == Side::below ? inside | above : below, beta = centre == Side::above ? inside | below : above;
@@ -50,7 +55,8 @@ struct DiamondContext {
   // Whether vertices lie on different sides: such a diamond is relevant.
   [[nodiscard]] bool is_mixed() const { return sides != 0 && sides != pairs() && sides != pairs() << 1; }
 
-  // How many cuts there are on the subdivision edges if the centre lies there, and how many of them are the first of their surface.
+  // How many cuts there are on the subdivision edges if the centre lies there, and how many of them are the first of
+  // their surface.
   struct CutCount {
     int all = 0, first = 0;
   };
@@ -63,21 +69,24 @@ class Prediction {
 
   [[nodiscard]] Side side() const { return side_; }
 
-  // Residuals of the cuts q from their prediction, modulo 256, and back; count_cuts(centre).all of them. Cuts in order of local vertices, alpha
-  // before beta; residuals with each surface's first cut before all others, for its prediction is further off than theirs. Once only.
+  // Residuals of the cuts q from their prediction, modulo 256, and back; count_cuts(centre).all of them. Cuts in order
+  // of local vertices, alpha before beta; residuals with each surface's first cut before all others, for its prediction
+  // is further off than theirs. Once only.
   void encode(Side centre, std::span<const std::uint8_t> q, std::uint8_t* residuals);
   void decode(Side centre, std::span<const std::uint8_t> residuals, std::uint8_t* q);
 
  private:
   // Distances of the field from one surface's value, in a unit of the surface's own.
   struct Surface {
-    std::uint32_t above = 0;                    // a bit for each vertex
-    std::uint32_t known = 0;                    // a bit for each vertex with a known distance; none where the surface does not cut the diamond
+    std::uint32_t above = 0;  // a bit for each vertex
+    // A bit for each vertex with a known distance; none where the surface does not cut the diamond
+    std::uint32_t known = 0;
     bool parts_spine = false;                   // the spine's ends lie on different sides
     std::array<double, kMaxVertices> distance;  // of each vertex known
-    std::array<double, kMaxVertices> variance;  // of each vertex known: of the distance's relative error, in steps of 1/256
-    double guess = 1;                           // the distance of all others
-    double centre = 0;                          // of the centre: above the value where positive
+    // Of each vertex known: of the distance's relative error, in steps of 1/256
+    std::array<double, kMaxVertices> variance;
+    double guess = 1;   // the distance of all others
+    double centre = 0;  // of the centre: above the value where positive
   };
   // A distance, and the variance of its relative error.
   struct Measure {

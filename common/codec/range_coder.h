@@ -1,8 +1,8 @@
 // Adaptive binary range coder.
 //
-// G. N. N. Martin, "Range encoding: an algorithm for removing redundancy from a digitised message", 1979; adaptive bit models as in Igor Pavlov's
-// LZMA. Encoder and decoder share each model's code: its function takes either coder and a value. An encoder writes the value and returns it; a
-// decoder ignores it and returns the value read.
+// G. N. N. Martin, "Range encoding: an algorithm for removing redundancy from a digitised message", 1979; adaptive bit
+// models as in Igor Pavlov's LZMA. Encoder and decoder share each model's code: its function takes either coder and a
+// value. An encoder writes the value and returns it; a decoder ignores it and returns the value read.
 #pragma once
 
 #include <array>
@@ -14,7 +14,8 @@
 
 namespace intervale {
 
-// An estimate of the probability that a bit is 0, in 1/65536: the mean of the bits so far, of the last few dozen at most.
+// An estimate of the probability that a bit is 0, in 1/65536: the mean of the bits so far, of the last few dozen at
+// most.
 class BitModel {
  public:
   [[nodiscard]] std::uint32_t of_zero() const { return zero_; }
@@ -45,7 +46,7 @@ class RangeEncoder {
     narrow(value ? split : 0, value ? range_ - split : split);
     return value;
   }
-  unsigned raw_bits(int count, unsigned value) {  // all equally likely, highest first
+  unsigned raw_bits(int count, unsigned value) {  // without a model, highest first
     for (int i = count; i-- > 0;) narrow((value >> i & 1) != 0 ? range_ >> 1 : 0, (value >> i & 1) != 0 ? range_ - (range_ >> 1) : range_ >> 1);
     return value;
   }
@@ -89,7 +90,7 @@ class RangeDecoder {
     }
     return value;
   }
-  // Whether more was asked for than the bytes hold; whether they held just what was asked for.
+  // Whether more was read than the bytes hold; whether exactly all of them were read.
   [[nodiscard]] bool is_overdrawn() const { return at_ > bytes_.size() + 4; }
   [[nodiscard]] bool is_spent() const { return at_ == bytes_.size() + 4; }
 
@@ -101,7 +102,7 @@ class RangeDecoder {
     range_ <<= 32;
     code_ = code_ << 32 | next();
   }
-  std::uint32_t next() {  // four bytes; zeros behind the end, of which a reader sees the first four
+  std::uint32_t next() {  // four bytes; zeros after the end, of which the first four are allowed
     std::uint32_t word = 0;
     for (std::size_t i = at_; i < at_ + 4; ++i) word = word << 8 | (i < bytes_.size() ? bytes_[i] : 0u);
     at_ += 4;
@@ -125,7 +126,8 @@ struct NumberModel {
   }
 };
 
-// A number n from 0 to 2^16 - 2 that is mostly small: how many bits n + 1 has, the two below the highest, and the rest as raw bits.
+// A number n from 0 to 2^16 - 2 that is mostly small: how many bits n + 1 has, the two below the highest, and the rest
+// as raw bits.
 struct SmallNumberModel {
   std::array<BitModel, 16> longer;
   std::array<std::array<BitModel, 4>, 16> below;

@@ -1,7 +1,7 @@
 // The residuals of updates as bits, in file and on the wire alike.
 //
-// The models depend only on what both sides know. A server has no mesh, so that is the update itself, its class, and what precedes the residual in
-// it.
+// The models depend only on what both sides know. A server has no mesh, so that is the update itself, its class, and
+// what precedes the residual in it.
 #pragma once
 
 #include <algorithm>
@@ -18,9 +18,11 @@ struct ResidualCoder {
   // Without models: 2 bits a side and 8 a cut. This bounds what an update takes, however unlike those before it is.
   bool is_plain = false;
   std::array<BitModel, 2> side;
-  // By class; whether it is the second surface's, which the first's predicts; whether the centre's side was predicted wrongly; how many cuts.
+  // By class; whether it is the second surface's, which the first's predicts; whether the centre's side was predicted
+  // wrongly; how many cuts.
   std::array<std::array<std::array<std::array<ResidualModel, 5>, 2>, 2>, 3> first;
-  // By which one it is, the third standing for all further ones; how many bits the one before has. The nearer the last, the nearer the next.
+  // By which one it is, the third standing for all further ones; how many bits the one before has. Small
+  // residuals follow small ones.
   std::array<std::array<ResidualModel, 9>, 3> other;
 
   // The residual of the centre's side, 0 to 2.
@@ -31,8 +33,8 @@ struct ResidualCoder {
     return coder.bit(side[1], value == 2) ? 2 : 1;
   }
 
-  // The residuals of an update's `all` cuts, `firsts` of them the first of their surface; see Prediction::encode. Written from there, or read into
-  // there.
+  // The residuals of an update's `all` cuts, `firsts` of them the first of their surface; see Prediction::encode.
+  // Written from there, or read into there.
   template <class Coder>
   void code_cuts(Coder& coder, int cls, unsigned side_residual, unsigned all, unsigned firsts, std::uint8_t* residuals) {
     if (is_plain) {

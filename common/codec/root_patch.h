@@ -1,7 +1,8 @@
 // The root patch: the coarse mesh that every stream starts from (paper, section 6).
 //
-// As bytes: the sides of the root's 8 vertices in local order (0 below, 1 inside, 2 above), then the cuts of those of its 19 edges that belong to a
-// tetrahedron which is not flat, in local order (edge_ends gives each edge's direction), alpha before beta.
+// As bytes: the sides of the root's 8 vertices in local order (0 below, 1 inside, 2 above), then the cuts of those of
+// its 19 edges that belong to a tetrahedron which is not flat, in local order (edge_ends gives each edge's direction),
+// alpha before beta.
 #pragma once
 
 #include <array>

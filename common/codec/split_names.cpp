@@ -15,7 +15,7 @@ static_assert(kSlots == 8 * kSlotBytes);
 }  // namespace
 
 void append_supercubes(std::vector<std::uint8_t>& out, std::span<const SlotGroup> groups) {
-  // Bricks as steps from one to the next, each with a word for which supercubes.
+  // Each brick as the step from the one before, and a word: which of its supercubes are there.
   std::vector<std::uint8_t> steps;
   std::vector<std::uint64_t> masks;
   std::uint64_t previous = 0;

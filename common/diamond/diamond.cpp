@@ -1,4 +1,5 @@
-// The 56 types of diamonds, from one rule (paper, section 5; the offsets are those of the recursive bisection, which the tests repeat).
+// The 56 types of diamonds, from one rule (paper, section 5; the offsets are those of the recursive bisection, which
+// the tests repeat).
 #include "common/diamond/diamond.h"
 
 namespace intervale {
@@ -52,8 +53,8 @@ constexpr TetShape shape(std::array<std::array<T, 3>, 4> p, std::array<std::uint
   return s;
 }
 
-// Vertices, tetrahedra and parents. odd: bit `scale` of each coordinate; g = -1 where the coordinate is 1 modulo 4h, +1 where it is 3: it points at
-// the neighbour that is 0 modulo 4h.
+// Vertices, tetrahedra and parents. odd: bit `scale` of each coordinate; g = -1 where the coordinate is 1 modulo 4h, +1
+// where it is 3: it points at the neighbour that is 0 modulo 4h.
 constexpr DiamondType around(unsigned type) {
   DiamondType t;
   Int3 bits{int(type & 3), int(type >> 2 & 3), int(type >> 4 & 3)}, odd{}, g{};

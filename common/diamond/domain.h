@@ -1,7 +1,7 @@
-// The sampled box inside the virtual grid of (2^N + 1)^3 vertices (design note in FORMAT.md, "The box").
+// The sampled box inside the virtual grid of (2^N + 1)^3 vertices (FORMAT.md, "The box").
 //
-// A vertex stands for the sample that its coordinates clamp to, in value and in position. Clamping is monotone on each axis, so no tetrahedron is
-// turned inside out; those outside the box become flat and do not exist.
+// A vertex stands for the sample that its coordinates clamp to, in value and in position. Clamping is monotone on each
+// axis, so no tetrahedron is turned inside out; those outside the box become flat and do not exist.
 #pragma once
 
 #include <algorithm>
@@ -21,9 +21,11 @@ class Domain {
       : last_{dims[0] - 1, dims[1] - 1, dims[2] - 1},
         levels_(std::max(1, int(std::bit_width(std::uint32_t(std::max({last_.x, last_.y, last_.z}) - 1))))) {}
 
-  [[nodiscard]] int levels() const { return levels_; }  // N: smallest, at least 1, with a virtual grid no smaller than the box
-  [[nodiscard]] Vertex last() const { return last_; }   // the sample furthest from (0, 0, 0)
-  [[nodiscard]] Vertex root() const { return {1 << (levels_ - 1), 1 << (levels_ - 1), 1 << (levels_ - 1)}; }  // centre of the root
+  // N: the smallest, at least 1, for which the virtual grid contains the box
+  [[nodiscard]] int levels() const { return levels_; }
+  [[nodiscard]] Vertex last() const { return last_; }  // the sample furthest from (0, 0, 0)
+  // Centre of the root
+  [[nodiscard]] Vertex root() const { return {1 << (levels_ - 1), 1 << (levels_ - 1), 1 << (levels_ - 1)}; }
   [[nodiscard]] bool is_whole() const {  // whether the box is the whole virtual grid, so that nothing ever clamps
     return last_.x == 1 << levels_ && last_.y == 1 << levels_ && last_.z == 1 << levels_;
   }
@@ -36,18 +38,21 @@ class Domain {
     return contains({d.centre.x - d.h, d.centre.y - d.h, d.centre.z - d.h}) && contains({d.centre.x + d.h, d.centre.y + d.h, d.centre.z + d.h});
   }
 
-  // Whether no vertex is moved by clamping but those of tetrahedra that lie outside the virtual grid: the others are as they are in the interior.
+  // Whether clamping moves only vertices of tetrahedra that lie outside the virtual grid. The other tetrahedra have the
+  // shapes that they have in the interior.
   [[nodiscard]] bool is_unmoved(const Diamond& d) const {
     const auto unmoved = [&d, n = std::int32_t(1) << levels_](std::int32_t c, std::int32_t last) { return c + d.h <= last || (last == n && c == n); };
     return unmoved(d.centre.x, last_.x) && unmoved(d.centre.y, last_.y) && unmoved(d.centre.z, last_.z);
   }
 
-  // One bit for each tetrahedron of the diamond that exists: that is not flat once clamped. 0: the diamond is as good as absent.
+  // One bit for each tetrahedron of the diamond that exists, because it is not flat after clamping. 0: nothing of the
+  // diamond exists.
   [[nodiscard]] unsigned tets(const Diamond& d) const {
     const unsigned all = (1u << d.row->tets) - 1;
     if (is_interior(d)) return all;
     if ((d.centre.x | d.centre.y | d.centre.z) >= 0 && is_unmoved(d)) {
-      // Only a diamond in a face of the virtual grid reaches beyond it, with half of what it has.
+      // Only a diamond whose centre lies in a face of the virtual grid reaches beyond the grid, with half of its
+      // tetrahedra.
       const auto outside = [&d](int axis, std::int32_t c, std::int32_t last) {
         return (c == 0 ? d.row->beyond[axis][0] : 0) | (c == last ? d.row->beyond[axis][1] : 0);
       };
@@ -72,8 +77,8 @@ class Domain {
     return mask;
   }
 
-  // Whether splitting the diamond would change nothing: class 2 with h = 1 whose clamped centre is an end of its spine. It needs no update, and is
-  // never split.
+  // Whether splitting the diamond would change nothing: class 2 with h = 1 whose clamped centre is an end of its spine.
+  // It needs no update, and is never split.
   [[nodiscard]] bool is_noop(const Diamond& d) const {
     if (d.row->cls != 2 || d.h != 1) return false;
     const Vertex c = clamp(d.centre);

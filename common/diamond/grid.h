@@ -9,8 +9,8 @@ namespace intervale {
 inline constexpr std::int32_t kMinSide = 2;        // samples on an axis, fewest
 inline constexpr std::int32_t kMaxSide = 1 << 20;  // samples on an axis, most
 
-// A regular grid of samples. Sample (i, j, k), 0 <= i < dims[0] and so on, lies at origin + spacing * (i, j, k) in world units.
-// Every spacing is finite and greater than 0, every origin finite.
+// A regular grid of samples. Sample (i, j, k), 0 <= i < dims[0] and so on, lies at origin + spacing * (i, j, k) in
+// world units. Every spacing is finite and greater than 0, every origin finite.
 struct Grid {
   std::array<std::int32_t, 3> dims{};
   std::array<double, 3> spacing{1, 1, 1};

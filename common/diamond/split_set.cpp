@@ -10,18 +10,18 @@ namespace intervale {
 
 namespace {
 
-// Puts the lowest bits of `bits` where `mask` has ones, in their order.
-std::uint64_t deposit_by_hand(std::uint64_t bits, std::uint64_t mask) {
+// Moves the lowest bits of `bits`, in their order, to the positions of the ones of `mask`.
+std::uint64_t deposit_portably(std::uint64_t bits, std::uint64_t mask) {
   std::uint64_t result = 0;
   for (std::uint64_t left = mask; left != 0; left &= left - 1, bits >>= 1) result |= left & (~left + 1) & (~(bits & 1) + 1);
   return result;
 }
 #if defined(__x86_64__)
-__attribute__((target("bmi2"))) std::uint64_t deposit_at_once(std::uint64_t bits, std::uint64_t mask) { return _pdep_u64(bits, mask); }
-const bool kAtOnce = __builtin_cpu_supports("bmi2") != 0;
-std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return kAtOnce ? deposit_at_once(bits, mask) : deposit_by_hand(bits, mask); }
+__attribute__((target("bmi2"))) std::uint64_t deposit_bmi2(std::uint64_t bits, std::uint64_t mask) { return _pdep_u64(bits, mask); }
+const bool kHasBmi2 = __builtin_cpu_supports("bmi2") != 0;
+std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return kHasBmi2 ? deposit_bmi2(bits, mask) : deposit_portably(bits, mask); }
 #else
-std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return deposit_by_hand(bits, mask); }
+std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return deposit_portably(bits, mask); }
 #endif
 
 }  // namespace
@@ -52,44 +52,45 @@ std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {
 
 namespace {
 
-// What the diamonds of a supercube inside the box wait for, by the supercubes where their parents are.
-struct Need {
+// The parents that one neighbour holds of the diamonds of a supercube inside the box.
+struct Parents {
   int where = 0;
-  std::uint64_t parents = 0;             // slots there
-  std::uint64_t all = 0;                 // slots here that wait for any of them
-  std::vector<std::uint64_t> by_parent;  // slots here, for each of `parents`
+  std::uint64_t parents = 0;             // slots in the neighbour
+  std::uint64_t all = 0;                 // slots here of diamonds with any of those parents
+  std::vector<std::uint64_t> by_parent;  // slots here of its children, for each of `parents`
 };
 
-std::vector<Need> needs_of(const std::array<Links, kSlots>& links) {
-  std::array<std::array<std::uint64_t, 64>, kCorner> waiting{};
+std::vector<Parents> parents_of(const std::array<Links, kSlots>& links) {
+  std::array<std::array<std::uint64_t, 64>, kCorner> children{};
   for (int slot = 0; slot < kSlots; ++slot) {
     for (int k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
       const Link link = links[slot].vertex[links[slot].parent[k]];
-      waiting[link.where][link.slot] |= std::uint64_t(1) << slot;
+      children[link.where][link.slot] |= std::uint64_t(1) << slot;
     }
   }
-  std::vector<Need> needs;
+  std::vector<Parents> by_neighbour;
   for (int where = 0; where < kCorner; ++where) {
-    Need need;
-    need.where = where;
+    Parents some;
+    some.where = where;
     for (int slot = 0; slot < kSlots; ++slot) {
-      if (waiting[where][slot] == 0) continue;
-      need.parents |= std::uint64_t(1) << slot;
-      need.all |= waiting[where][slot];
-      need.by_parent.push_back(waiting[where][slot]);
+      if (children[where][slot] == 0) continue;
+      some.parents |= std::uint64_t(1) << slot;
+      some.all |= children[where][slot];
+      some.by_parent.push_back(children[where][slot]);
     }
-    if (need.parents != 0) needs.push_back(std::move(need));
+    if (some.parents != 0) by_neighbour.push_back(std::move(some));
   }
-  // Those that most wait for come first: where they are missing, the others are not looked for.
-  std::stable_sort(needs.begin(), needs.end(), [](const Need& a, const Need& b) { return std::popcount(a.all) > std::popcount(b.all); });
-  return needs;
+  // Those with the most children come first: where their parents are not split, the other neighbours are not looked up.
+  std::stable_sort(by_neighbour.begin(), by_neighbour.end(),
+                   [](const Parents& a, const Parents& b) { return std::popcount(a.all) > std::popcount(b.all); });
+  return by_neighbour;
 }
 
 // By the parity of the supercube's position, as in link_table().
-const std::vector<Need>& needs(Vertex position) {
+const std::vector<Parents>& parents_of(Vertex position) {
   static const auto table = [] {
-    std::array<std::vector<Need>, 8> all;
-    for (std::size_t parity = 0; parity < 8; ++parity) all[parity] = needs_of(link_table()[parity]);
+    std::array<std::vector<Parents>, 8> all;
+    for (std::size_t parity = 0; parity < 8; ++parity) all[parity] = parents_of(link_table()[parity]);
     return all;
   }();
   return table[parity_of(position)];
@@ -118,10 +119,10 @@ std::uint64_t SplittableSlots::split_slots(int where) {
 
 std::uint64_t SplittableSlots::slots_inside() {
   std::uint64_t ready = (std::uint64_t(1) << kSlots) - 1;
-  for (const Need& need : needs(around_.position())) {
-    if ((need.all & ready) == 0) continue;
-    for (const int missing : set_bits(need.parents & ~split_slots(need.where))) {
-      ready &= ~need.by_parent[std::size_t(count_below(need.parents, missing))];
+  for (const Parents& some : parents_of(around_.position())) {
+    if ((some.all & ready) == 0) continue;
+    for (const int missing : set_bits(some.parents & ~split_slots(some.where))) {
+      ready &= ~some.by_parent[std::size_t(count_below(some.parents, missing))];
     }
   }
   return ready;

@@ -1,4 +1,5 @@
-// Split diamonds as a set of updates, and what can be split next: all that a server knows of a client's mesh.
+// The split diamonds as a set of updates, and the diamonds that can be split next: all that a server knows of a
+// client's mesh.
 #pragma once
 
 #include <array>
@@ -26,7 +27,8 @@ class SplitSet {
   void insert(UpdateIndex i) { words_[i / 64] |= std::uint64_t(1) << (i % 64); }
   void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }
   [[nodiscard]] std::uint64_t count() const;
-  // The slots of a supercube's diamonds that are in it. occupancy: of that supercube, not 0; first: the number of its first diamond.
+  // The slots of a supercube's diamonds that are in it. occupancy: of that supercube, not 0; first: the number of its
+  // first diamond.
   [[nodiscard]] std::uint64_t slots(UpdateIndex first, std::uint64_t occupancy) const;
   [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;  // all of it, in order
   [[nodiscard]] std::vector<std::uint64_t>& words() { return words_; }
@@ -39,13 +41,13 @@ class SplitSet {
 // Tells which diamonds of a supercube have all their parents split.
 class SplittableSlots {
  public:
-  // All must outlive it; `split` is not to change between move_to() and slots().
+  // All must outlive it; `split` must not change between move_to() and slots().
   SplittableSlots(const SupercubeSet& set, const Domain& domain, const SplitSet& split) : domain_(domain), split_(split), around_(set) {}
 
   void move_to(SupercubeKey key);
 
-  // The slots of diamonds that exist, would change when split (Domain::is_noop), and whose parents are split, whether they are split themselves or
-  // not.
+  // The slots of diamonds that exist, whose split would not be a no-op, and whose parents are split, whether they are
+  // split themselves or not.
   [[nodiscard]] std::uint64_t slots();
 
  private:
@@ -55,7 +57,7 @@ class SplittableSlots {
   const Domain& domain_;
   const SplitSet& split_;
   SetNeighbours around_;
-  std::array<std::uint64_t, kCorner> split_slots_{};  // of the neighbours
+  std::array<std::uint64_t, kCorner> split_slots_{};  // by neighbour
   std::uint64_t known_ = 0;                           // a bit for each that was looked up
 };
 

@@ -76,9 +76,9 @@ SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::
     while (directory_[i] != 0) i = i + 1 == directory_.size() ? 0 : i + 1;
     directory_[i] = b + 1;
   }
-  for (std::size_t level = 0; level < scale_begin_.size(); ++level) {
+  for (std::size_t i = 0; i < scale_begin_.size(); ++i) {
     const auto before = [](const Brick& b, SupercubeKey key) { return b.key < key; };
-    scale_begin_[level] = std::uint32_t(std::lower_bound(bricks_.begin(), bricks_.end(), std::uint64_t(level) << 57, before) - bricks_.begin());
+    scale_begin_[i] = std::uint32_t(std::lower_bound(bricks_.begin(), bricks_.end(), std::uint64_t(i) << 57, before) - bricks_.begin());
   }
 }
 

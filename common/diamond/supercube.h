@@ -1,8 +1,9 @@
 // Supercubes: sets of diamonds found by their centres, at a little over a bit for each.
 //
-// Kenneth Weiss and Leila De Floriani, "Supercubes: A High-Level Primitive for Diamond Hierarchies", 2009. The 56 types of diamonds of one
-// scale that share the centre's higher bits, centre >> (scale + 2), form one supercube. A set of diamonds holds, for each supercube that is not
-// empty, its name and one word of occupancy; counting bits gives each diamond its number.
+// Kenneth Weiss and Leila De Floriani, "Supercubes: A High-Level Primitive for Diamond Hierarchies", 2009. The 56 types
+// of diamonds of one scale that share the centre's higher bits, centre >> (scale + 2), form one supercube. A set of
+// diamonds holds, for each supercube that is not empty, its name and one word of occupancy; counting bits gives each
+// diamond its number.
 #pragma once
 
 #include <array>
@@ -17,7 +18,8 @@
 
 namespace intervale {
 
-// A diamond's place in its supercube: 0..7 class 0, 8..31 class 1, 32..55 class 2, so that parents come before children.
+// A diamond's place in its supercube: 0..7 class 0, 8..31 class 1, 32..55 class 2, so that parents come before
+// children.
 inline constexpr int kSlots = 56;
 extern const std::array<std::uint8_t, kSlots> kTypeOfSlot;
 extern const std::array<std::uint8_t, 64> kSlotOfType;
@@ -26,7 +28,8 @@ inline constexpr std::array<std::uint64_t, 3> kSlotsOfClass{0xffu, 0xffffff00u, 
 
 // A supercube's name. Ascending: coarse scales before fine ones, then along a Morton curve.
 using SupercubeKey = std::uint64_t;
-[[nodiscard]] SupercubeKey supercube_key(int scale, Vertex position);  // position: centre >> (scale + 2); coordinates below 2^19
+// position: centre >> (scale + 2); coordinates below 2^19
+[[nodiscard]] SupercubeKey supercube_key(int scale, Vertex position);
 [[nodiscard]] inline int scale_of_key(SupercubeKey key) { return kMaxLevels - int(key >> 57); }
 [[nodiscard]] Vertex position_of_key(SupercubeKey key);
 [[nodiscard]] Vertex centre_of(SupercubeKey key, int slot);
@@ -54,8 +57,8 @@ struct SlotGroup {
   friend bool operator==(const SlotGroup&, const SlotGroup&) = default;
 };
 
-// Goes through groups whose keys ascend strictly, children before parents: visit(group, slots) with some of the group's slots at a time, none of
-// which is another's ancestor.
+// Visits groups whose keys ascend strictly, children before parents: calls visit(group, slots) with some of the group's
+// slots at a time, none of which is another's ancestor.
 template <class Visit>
 void for_each_finest_first(std::span<const SlotGroup> groups, Visit&& visit) {
   for (std::size_t end = groups.size(), begin = end; end > 0; end = begin) {
@@ -68,7 +71,8 @@ void for_each_finest_first(std::span<const SlotGroup> groups, Visit&& visit) {
   }
 }
 
-// An immutable set of diamonds. Supercubes in turn stand in bricks: the 4 x 4 x 4 of one scale whose keys differ in the lowest six bits only.
+// An immutable set of diamonds. Supercubes are grouped in bricks: the 4 x 4 x 4 of one scale whose keys differ in the
+// lowest six bits only.
 class SupercubeSet {
  public:
   SupercubeSet() = default;
@@ -76,7 +80,7 @@ class SupercubeSet {
   SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy);
 
   struct Brick {
-    SupercubeKey key = 0;    // of its first supercube, were that there: the lowest six bits are 0
+    SupercubeKey key = 0;    // the supercubes' keys with the lowest six bits 0
     std::uint64_t mask = 0;  // which of its 64 supercubes are there
     std::uint32_t first_supercube = 0;
     UpdateIndex first = 0;  // number of its first diamond
@@ -103,7 +107,7 @@ class SupercubeSet {
 
   [[nodiscard]] static Vertex centre(const Place& p) { return centre_of(p.key, int(p.slot)); }
 
-  // The place of a number. O(log bricks).
+  // The place of the diamond with a number. O(log bricks).
   [[nodiscard]] Place place(UpdateIndex index) const;
 
   // Bricks of one scale: [begin, end).
@@ -125,13 +129,13 @@ class SupercubeSet {
       for (const int slot : set_bits(occupancy_[s] & slots)) visit(place_in(brick, s, key, slot));
     });
   }
-  // ... of one scale and class.
+  // The same, for all diamonds of one scale and class.
   template <class Visit>
   void for_each(int scale, int cls, Visit&& visit) const {
     const auto [begin, end] = of_scale(scale);
     for (std::uint32_t b = begin; b < end; ++b) for_each_in_brick(b, kSlotsOfClass[cls], visit);
   }
-  // ... of all, parents before children; or children before parents.
+  // The same, for all diamonds: parents before children; or children before parents.
   template <class Visit>
   void for_each_down(Visit&& visit) const {
     for (int scale = kMaxLevels - 1; scale >= 0; --scale) {

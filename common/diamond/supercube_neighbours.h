@@ -1,9 +1,11 @@
-// The supercubes around one, where its diamonds' vertices, parents, edges and children are found: one table, and one lookup.
+// The supercubes around one, where its diamonds' vertices, parents, edges and children are found: one table, and one
+// lookup.
 //
-// Every vertex of a diamond is itself the centre of a diamond that was split before, or a corner of the domain. Every edge came into being when the
-// younger of its ends was inserted: it is one of that diamond's subdivision edges. So a diamond finds everything around it in its vertices' updates.
-// Where those are kept follows from the diamond's slot and from the parity of its supercube's position: in one of the 27 supercubes of the same
-// scale, in one of 8 of the next coarser scale, or, for a vertex that is 0 modulo 4h, at one of the 8 corners of the supercube. Children are of the
+// Every vertex of a diamond is itself the centre of a diamond that was split before, or a corner of the domain. Every
+// edge came into being when the younger of its ends was inserted: it is one of that diamond's subdivision edges. So a
+// diamond finds everything around it in its vertices' updates. Where those are kept follows from the diamond's slot and
+// from the parity of its supercube's position: in one of the 27 supercubes of the same scale, in one of 8 of the next
+// coarser scale, or, for a vertex that is 0 modulo 4h, at one of the 8 corners of the supercube. Children are of the
 // same scale, or in one of 27 supercubes of the next finer one.
 #pragma once
 
@@ -21,10 +23,10 @@
 namespace intervale {
 
 // The number of a neighbour, seen from a supercube at position P whose cells are 4h wide.
-//   kSame + (x + 1) + 3 (y + 1) + 9 (z + 1):  the supercube at P + (x, y, z), of the same scale; x, y, z in {-1, 0, 1}
-//   kCoarser + x + 2 y + 4 z:                 the one at P / 2 + (x, y, z), of the next coarser scale; x, y, z in {0, 1}
-//   kCorner + x + 2 y + 4 z:                  the one that holds the grid vertex at 4h (P + (x, y, z)), of whatever scale; x, y, z in {0, 1}
-//   kFiner + (x + 1) + 3 (y + 1) + 9 (z + 1): the one at 2 P + (x, y, z), of the next finer scale; x, y, z in {-1, 0, 1}
+//   kSame + (x + 1) + 3 (y + 1) + 9 (z + 1):  at P + (x, y, z), of the same scale; x, y, z in {-1, 0, 1}
+//   kCoarser + x + 2 y + 4 z:                 at P / 2 + (x, y, z), of the next coarser scale; x, y, z in {0, 1}
+//   kCorner + x + 2 y + 4 z:                  with the vertex 4h (P + (x, y, z)), of any scale; x, y, z in {0, 1}
+//   kFiner + (x + 1) + 3 (y + 1) + 9 (z + 1): at 2 P + (x, y, z), of the next finer scale; x, y, z in {-1, 0, 1}
 inline constexpr int kSame = 0, kCoarser = 27, kCorner = 35, kFiner = 43, kNeighbours = 70;
 inline constexpr int kHere = 13;  // the supercube itself
 
@@ -41,13 +43,15 @@ struct Links {
   struct Edge {
     std::uint8_t owner = 0;  // local number of the younger end
     std::uint8_t other = 0;  // the older end's local number in the owner's diamond
-    std::uint8_t flip = 0;   // 255 if the edge's first end is the older one, so that q of each cut must be inverted; else 0
+    // 255 if the edge's first end is the older one, so that q of each cut must be inverted; else 0
+    std::uint8_t flip = 0;
   };
   std::array<Edge, kMaxEdges> edge{};      // by local edge
   std::array<Link, kMaxChildren> child{};  // by number of the child
 };
 
-// Row for a slot of a supercube whose position has the parities p = (x & 1) + 2 (y & 1) + 4 (z & 1). Computed at first use.
+// Row for a slot of a supercube whose position has the parities p = (x & 1) + 2 (y & 1) + 4 (z & 1). Computed at first
+// use.
 using LinkTable = std::array<std::array<Links, kSlots>, 8>;
 [[nodiscard]] const LinkTable& link_table();
 [[nodiscard]] inline unsigned parity_of(Vertex position) {
@@ -70,13 +74,15 @@ inline constexpr int kOriginScale = 32;  // scale_of((0, 0, 0)): that corner of 
   return domain.contains({corner(p.x, -1), corner(p.y, -1), corner(p.z, -1)}) && domain.contains({corner(p.x, 4), corner(p.y, 4), corner(p.z, 4)});
 }
 
-// Looks up the neighbours of one supercube at a time, each at most once until it moves. Finder says how supercubes are found:
+// Looks up the neighbours of one supercube at a time, each at most once until it moves. Finder says how supercubes are
+// found:
 //   Found                      what is known of one
 //   void move_to(scale, position)
-//   Found find(where, place)   of the neighbour `where` of the supercube last moved to; place: where that is. Not called outside the domain.
+//   Found find(where, place)   of the neighbour `where` of the supercube last moved to; place: its scale and position.
+//                              Not called for places with negative coordinates
 //   Found none()               for what is not there
 //   void set_here(found)       only if SupercubeNeighbours::set_here is called
-//   bool kImmutable            whether what it finds never changes, so that moving to the same supercube keeps what was found
+//   bool kImmutable            whether what it finds never changes: moving to the same supercube keeps what was found
 template <class Finder>
 class SupercubeNeighbours {
  public:
@@ -144,7 +150,8 @@ class SupercubeNeighbours {
   std::array<std::uint8_t, kNeighbours> corner_slot_{};  // of a corner's vertex; 0 elsewhere
 };
 
-// Finds the supercubes of a set. Bricks that were found stay known while it moves within one brick, so it is fastest along ascending keys.
+// Finds the supercubes of a set. Bricks that were found stay known while it moves within one brick, so it is fastest
+// along ascending keys.
 class SetFinder {
  public:
   static constexpr bool kImmutable = true;
@@ -178,9 +185,9 @@ class SetFinder {
 };
 using SetNeighbours = SupercubeNeighbours<SetFinder>;
 
-// Which of the diamonds named can be merged, finest first: calls merge(group, slot) for each that is split and by then has no split child. A child is
-// one by its place, whether it was handed tetrahedra or not, so that a client's front and its server's plan agree. groups: keys strictly ascending.
-// split_slots(Found): of a supercube.
+// Which of the diamonds named can be merged, finest first: calls merge(group, slot) for each that is split and by then
+// has no split child. A child is one by its place, whether it was handed tetrahedra or not, so that a client's front
+// and its server's plan agree. groups: keys strictly ascending. split_slots(Found): of a supercube.
 template <class Finder, class SplitSlots, class Merge>
 void merge_finest_first(std::span<const SlotGroup> groups, SupercubeNeighbours<Finder>& around, const SplitSlots& split_slots, const Merge& merge) {
   const auto has_split_child = [&](int slot) {

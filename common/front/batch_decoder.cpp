@@ -19,7 +19,7 @@ Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> by
   const auto keys = take_supercubes(bytes, kBatchUpdatesMost);
   if (!keys) return damaged(keys.error().message.c_str());
   const auto length = take_varint(bytes);
-  if (!length || *length != bytes.size()) return damaged("its length");
+  if (!length || *length != bytes.size()) return damaged("its length is wrong");
 
   std::uint64_t updates = 0;
   const char* wrong = nullptr;
@@ -28,11 +28,12 @@ Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> by
   ResidualCoder residuals;
   residuals.is_plain = coder.raw_bits(1) != 0;
   FrontCursor cursor(front.state());
-  // Splits the diamond looked at if the batch says so. False if that is the end.
+  // Reads the flag of the diamond that the cursor found, and splits it if the flag is set. False if the batch is
+  // damaged.
   const auto take = [&](int cls) {
     const bool is_split = flags.code(coder, cls, cursor.context().is_mixed(), residuals.is_plain);
     if (coder.is_overdrawn()) {
-      wrong = "it says too little of what it splits";
+      wrong = "it has fewer flags than its supercubes call for";
       return false;
     }
     if (!is_split) return true;

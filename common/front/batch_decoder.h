@@ -9,8 +9,9 @@
 
 namespace intervale {
 
-// Applies a batch from outside, and returns how many updates it had. Those that the mesh has no room for below max_tets, and all after them, are
-// hidden (Front::hide). Fails where the bytes are no batch or an update does not fit the front, which is then of no more use.
+// Applies a batch from outside, and returns how many updates it had. Those that would give the mesh more than max_tets
+// tetrahedra, and all after them, are hidden (Front::hide). Fails if the bytes are not a batch, or an update does not
+// fit the front; the front must then not be used any more.
 [[nodiscard]] Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0));
 
 }  // namespace intervale

@@ -25,8 +25,8 @@ struct DiamondParts {
 [[nodiscard]] TetShape tet_shape(const Domain& domain, const Diamond& d, const DiamondParts& parts, int tet);
 [[nodiscard]] TetShape half_shape(const Domain& domain, const Diamond& d, const DiamondParts& parts, int tet, int end);
 
-// How many tetrahedra the patches of the diamond's tetrahedra have, and those of their halves. sides: two bits for each local vertex; of halves, also
-// for the centre.
+// How many tetrahedra the patches of the diamond's tetrahedra have, and those of their halves. sides: two bits for each
+// local vertex; of halves, also for the centre.
 [[nodiscard]] std::uint64_t count_tets(const Domain& domain, const Diamond& d, const DiamondParts& parts, std::uint32_t sides);
 [[nodiscard]] std::uint64_t count_halves(const Domain& domain, const Diamond& d, const DiamondParts& parts, std::uint32_t sides);
 

@@ -14,7 +14,8 @@ using Split = FrontState::Split;
 
 constexpr std::uint64_t bit(int slot) { return std::uint64_t(1) << slot; }
 
-// The cuts of the root's edges that a corner of the domain owns: its split's bits, and q of each cut in order of the bits.
+// The cuts of the root's edges that a corner of the domain owns: its split's bits, and q of each cut in order of the
+// bits.
 void add_corner(FrontState& state, const RootPatch& root_patch, const DiamondParts& parts, const Diamond& root, int corner) {
   const Links& links = link_table()[0][kSlotOfType[root.type]];
   const Vertex at = root.vertex(corner);
@@ -43,8 +44,8 @@ void add_corner(FrontState& state, const RootPatch& root_patch, const DiamondPar
 
 }  // namespace
 
-// The corners of the domain are no diamonds, but seven of them have the offsets of diamonds of scale N whose centres lie there, and the root's edges
-// are those diamonds' subdivision edges. So the root patch is one more supercube.
+// The corners of the domain are no diamonds, but seven of them have the offsets of diamonds of scale N whose centres
+// lie there, and the root's edges are those diamonds' subdivision edges. So the root patch is one more supercube.
 Front::Front(const Grid& grid, const RootPatch& root_patch) : state_(grid) {
   const Diamond root(state_.domain.root());
   const DiamondParts parts = parts_of(state_.domain, root);

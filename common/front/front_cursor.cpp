@@ -54,7 +54,8 @@ bool FrontCursor::gather(int slot) {
   return true;
 }
 
-// Rejects most of the diamonds that cannot be split, at a fraction of gather()'s cost. At the border some parents may not exist: gather() decides.
+// Rejects most of the diamonds that cannot be split, at a fraction of gather()'s cost. At the border some parents may
+// not exist: gather() decides.
 bool FrontCursor::parents_are_split(int slot) {
   if (!is_interior_) return true;
   const Links& links = neighbours_.links(slot);

@@ -1,4 +1,5 @@
-// Looks at the diamonds of a front, one supercube at a time: what of a diamond exists, its vertices' splits, and the cuts on its edges.
+// Looks at the diamonds of a front, one supercube at a time: what of a diamond exists, its vertices' splits, and the
+// cuts on its edges.
 #pragma once
 
 #include <array>
@@ -30,7 +31,8 @@ class BlockFinder {
   Found here_ = nullptr;  // null if there is none
 };
 
-// Sees the state as it was when the cursor last moved, and splits that Front::split made through this cursor since. One thread at a time.
+// Sees the state as it was when the cursor last moved, and splits that Front::split made through this cursor since. One
+// thread at a time.
 class FrontCursor {
  public:
   using Block = FrontState::Block;
@@ -42,8 +44,8 @@ class FrontCursor {
   void move_to(int scale, Vertex position);  // position: a diamond's centre >> (scale + 2)
   void move_to(const Diamond& d);            // to its supercube
 
-  // Finds the diamond in a slot if it exists and all its vertices' diamonds are split: if it is split, or in the front with all its tetrahedra. The
-  // functions below are of the diamond found last.
+  // Finds the diamond in a slot if it exists and all its vertices' diamonds are split: if it is split, or in the front
+  // with all its tetrahedra. The functions below are of the diamond found last.
   bool gather(int slot);
   // The same, if it can be split now.
   bool find(int slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
@@ -52,9 +54,12 @@ class FrontCursor {
   [[nodiscard]] int slot() const { return slot_; }
   [[nodiscard]] const DiamondParts& parts() const { return parts_; }
   [[nodiscard]] const Links& links() const { return neighbours_.links(slot_); }
-  [[nodiscard]] const Split& split_of(int vertex) const { return split_[std::size_t(vertex)]; }  // of the vertex's diamond
-  [[nodiscard]] const DiamondContext& context() const { return context_; }                       // its cuts may be those of another diamond
-  const DiamondContext& gather_cuts();                                                           // the same, with its own cuts
+  // Of the vertex's diamond
+  [[nodiscard]] const Split& split_of(int vertex) const { return split_[std::size_t(vertex)]; }
+  // Its cuts may be those of another diamond
+  [[nodiscard]] const DiamondContext& context() const { return context_; }
+  // The same, with its own cuts
+  const DiamondContext& gather_cuts();
   [[nodiscard]] bool is_split() { return here().is_split(slot_); }
   [[nodiscard]] bool is_shown() { return here().is_shown(slot_); }
   [[nodiscard]] bool is_noop() const { return parts_.straddles && state_.domain.is_noop(*diamond_); }

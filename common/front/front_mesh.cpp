@@ -1,8 +1,8 @@
 // The mesh of a front, indexed.
 //
-// Which points it has is known before its tetrahedra: a cut is a point until its edge is split, by the diamond whose spine that is; and a centre
-// inside the range stays a point. Only on the far faces of a box that clamps (domain.h), where edges may fall together or vanish, the tetrahedra
-// decide.
+// Which points it has is known before its tetrahedra: a cut is a point until its edge is split, by the diamond whose
+// spine that is; and a centre inside the range stays a point. Only on the far faces of a box that clamps (domain.h),
+// where edges may fall together or vanish, the tetrahedra decide.
 #include <algorithm>
 #include <cassert>
 

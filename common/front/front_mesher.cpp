@@ -27,7 +27,8 @@ const FrontMesher::HalfCorners& FrontMesher::half_corners() {
   return *table;
 }
 
-// On an axis that clamps, at or beyond the last sample. Only edges with such an end can share their place with another edge.
+// On an axis that clamps, at or beyond the last sample. Only edges with such an end can share their place with another
+// edge.
 bool FrontMesher::is_on_border(Vertex v) const {
   const std::int32_t n = 1 << state_.domain.levels();
   const Vertex last = state_.domain.last();

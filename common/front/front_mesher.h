@@ -1,7 +1,9 @@
-// The mesh of a front, supercube by supercube: the halves that split diamonds leave to children that are not split, each cut into its patch.
+// The mesh of a front, supercube by supercube: the halves that split diamonds leave to children that are not split,
+// each cut into its patch.
 //
-// The tetrahedra that a supercube's splits leave stay the same until splits in it, or children of them, are shown or hidden. So a mesh that changes
-// is updated by those supercubes alone. Points keep their ids, too, until FrontState::point_generation changes.
+// The tetrahedra that a supercube's splits leave stay the same until splits in it, or children of them, are shown or
+// hidden. So a mesh that changes is updated by those supercubes alone. Points keep their ids, too, until
+// FrontState::point_generation changes.
 #pragma once
 
 #include <array>
@@ -19,10 +21,12 @@ namespace intervale {
 
 class FrontMesher {
  public:
-  explicit FrontMesher(const FrontState& state) : state_(state) {}  // which must outlive it, and may change between calls
+  // Which must outlive it, and may change between calls
+  explicit FrontMesher(const FrontState& state) : state_(state) {}
 
-  using Tet = std::array<PointId, 4>;            // positively oriented
-  using Position = std::array<std::int32_t, 3>;  // in 1 / kSteps of a sample: every cut of every edge is a whole number there
+  using Tet = std::array<PointId, 4>;  // positively oriented
+  // In 1 / kSteps of a sample: every cut of every edge is a whole number there
+  using Position = std::array<std::int32_t, 3>;
   static constexpr std::int32_t kSteps = 512;
   struct Point {
     PointId id = 0;
@@ -41,8 +45,9 @@ class FrontMesher {
     std::size_t end = 0;            // its patch ends before this tetrahedron, and begins where the half before it ends
   };
 
-  // Supercubes have the numbers of their blocks: 0, 1, ... in the order in which they were added. Number 0 has the domain's corners; what they leave
-  // is the root's patch. All functions below append what one supercube's splits left, and leave what is there.
+  // Supercubes have the numbers of their blocks: 0, 1, ... in the order in which they were added. Number 0 has the
+  // domain's corners; what they leave is the root's patch. All functions below append what one supercube's splits left,
+  // and leave what is there.
   [[nodiscard]] const FrontState& state() const { return state_; }
   [[nodiscard]] const FrontState::Block& block(std::size_t number) const { return state_.blocks[number]; }
 
@@ -68,7 +73,8 @@ class FrontMesher {
   using PointsAround = std::array<std::uint32_t, kCutsFrom + 2 * (kMaxEdges + kMaxVertices)>;
   // Where among the points around a diamond the corners of a tetrahedron's patch are.
   using Corners = std::array<std::uint8_t, kPatchCorners>;
-  using HalfCorners = std::array<std::array<std::array<Corners, 2>, kMaxTets>, kSlots>;  // of the halves of all types' tetrahedra
+  // Of the halves of all types' tetrahedra
+  using HalfCorners = std::array<std::array<std::array<Corners, 2>, kMaxTets>, kSlots>;
   struct Output {
     std::vector<Tet>& tets;
     std::vector<Half>* halves;  // may be null

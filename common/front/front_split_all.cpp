@@ -13,8 +13,9 @@ using Updates = std::array<UpdateView, kSlots>;
 
 constexpr std::size_t kPiece = 32, kPiecesBetweenProgress = 512;  // in supercubes; in pieces
 
-// Splits the diamonds of groups pass by pass: scale by scale, and class by class within a scale. Within a pass no diamond is another's ancestor, so
-// its pieces can run on many threads: each writes its own splits and their cuts, and reads those of earlier passes.
+// Splits the diamonds of groups pass by pass: scale by scale, and class by class within a scale. Within a pass no
+// diamond is another's ancestor, so its pieces can run on many threads: each writes its own splits and their cuts, and
+// reads those of earlier passes.
 class AllSplits {
  public:
   AllSplits(FrontState& state, std::span<const SlotGroup> groups, const Front::GroupUpdates& updates_of)

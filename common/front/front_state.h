@@ -1,14 +1,17 @@
 // What a front consists of: the split diamonds by supercube, their cuts, and how many there are.
 //
-// Weiss and De Floriani 2008, sections 6 and 7. In the paper each diamond of the front holds its vertices and edges, and a split hands each child its
-// duet. Here what a split brought (the side of the centre, the cuts on the subdivision edges) stays with the split diamond, supercube by supercube,
-// and a diamond gathers its vertices and edges from its ancestors' splits (supercube_neighbours.h). A split then writes eight bytes and its cuts, a
-// merge clears one bit, and the front itself is implied.
+// Weiss and De Floriani 2008, sections 6 and 7. In the paper each diamond of the front holds its vertices and edges,
+// and a split hands each child its duet. Here what a split brought (the side of the centre, the cuts on the subdivision
+// edges) stays with the split diamond, supercube by supercube, and a diamond gathers its vertices and edges from its
+// ancestors' splits (supercube_neighbours.h). A split then writes eight bytes and its cuts, a merge clears one bit, and
+// the front itself is implied.
 //
 // Invariants, which Front keeps and Front::validate checks:
-//   1. Of each split diamond, all parents that exist are split; of each shown one, all are shown. shown is part of split.
+//   1. Of each split diamond, all parents that exist are split; of each shown one, all are shown. shown is a subset of
+//      split.
 //   2. A split has the cuts that its side and its diamond's vertices call for.
-//   3. index has the number of each block under its scale and position, and no other. A block stays where it is until pack().
+//   3. index has the number of each block under its scale and position, and no other. A block stays where it is until
+//      pack().
 //   4. The counters are those of the splits and of the mesh that the shown ones make.
 #pragma once
 
@@ -30,12 +33,14 @@
 
 namespace intervale {
 
-// A point of the mesh: a cut, or a centre inside the range. It stays the same until the front forgets splits (FrontState::point_generation).
+// A point of the mesh: a cut, or a centre inside the range. It stays the same until the front forgets splits
+// (FrontState::point_generation).
 using PointId = std::uint32_t;
 
-// Numbers of the neighbours of one supercube that were found before; it fills up while readers look. Thread rule: any number of threads may read and
-// store at the same time while no block is added or removed. An entry is one word that is loaded and stored atomically (relaxed), all threads store
-// the same value, and who does not see it yet searches again; nothing else is published by it.
+// Numbers of the neighbours of one supercube that were found before; it fills up while readers look. Thread rule: any
+// number of threads may read and store at the same time while no block is added or removed. An entry is one word that
+// is loaded and stored atomically (relaxed), all threads store the same value, and who does not see it yet searches
+// again; nothing else is published by it.
 class NeighbourCache {
  public:
   static constexpr std::uint32_t kUnknown = 0;
@@ -44,16 +49,19 @@ class NeighbourCache {
   void store(int where, std::uint32_t number) const { __atomic_store_n(&number_[std::size_t(where)], number, __ATOMIC_RELAXED); }
 
  private:
-  mutable std::array<std::uint32_t, kCorner> number_{};  // no std::atomic, which cannot be copied; no std::atomic_ref, which Emscripten lacks
+  // No std::atomic, which cannot be copied; no std::atomic_ref, which Emscripten lacks
+  mutable std::array<std::uint32_t, kCorner> number_{};
 };
 
 struct FrontState {
-  // A split, as bits: 2 v for a cut of alpha on the edge from the centre to local vertex v, 2 v + 1 for one of beta; above them the centre's side.
+  // A split, as bits: 2 v for a cut of alpha on the edge from the centre to local vertex v, 2 v + 1 for one of beta;
+  // above them the centre's side.
   static constexpr int kSideBit = 2 * kMaxVertices;
   static constexpr std::uint32_t kCutBits = (1u << kSideBit) - 1;
   struct Split {
     std::uint32_t bits = 0;
-    PointId first = 0;  // of its cuts, in order of their bits; if the centre is inside, that is the point after the last one
+    // Of its cuts, in order of their bits; if the centre is inside, that is the point after the last one
+    PointId first = 0;
     [[nodiscard]] Side side() const { return Side(bits >> kSideBit); }
     [[nodiscard]] std::uint32_t cut_bits() const { return bits & kCutBits; }
     [[nodiscard]] PointId cut(int bit) const { return first + PointId(count_below(bits, bit)); }
@@ -95,10 +103,12 @@ struct FrontState {
 
   Grid grid;
   Domain domain;
-  std::deque<Block> blocks;                                       // the first has the domain's corners but (0, 0, 0), as diamonds of scale `levels`
+  // The first has the domain's corners but (0, 0, 0), as diamonds of scale `levels`
+  std::deque<Block> blocks;
   boost::unordered_flat_map<std::uint64_t, std::uint32_t> index;  // of blocks
   Block origin;                                                   // the domain's corner (0, 0, 0): slot 0
-  std::vector<std::uint8_t> q;                                    // by PointId: of each cut its q (see Cuts); unused for a centre
+  // By PointId: of each cut its q (see Cuts); unused for a centre
+  std::vector<std::uint8_t> q;
   std::uint64_t tet_count = 0, split_count = 0, shown_count = 0;
   std::uint64_t point_generation = 0;  // how often points got other numbers
 };

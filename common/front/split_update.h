@@ -9,7 +9,8 @@
 
 namespace intervale {
 
-// Splits one diamond by its update. False, and nothing done, if the update has not as many coefficients as its side calls for.
+// Splits one diamond by its update. False, and nothing done, if the number of the update's coefficients does not fit
+// its side.
 [[nodiscard]] inline bool apply_update(Front& front, Front::Handle handle, const UpdateView& update) {
   const DiamondContext context = front.context(handle);
   std::array<std::uint8_t, kMaxCuts> cuts;
