@@ -241,7 +241,8 @@ void BoundarySurface::add_triangles(const std::vector<const Triangle*>& triangle
   const std::size_t first = points.size();  // of this kind's vertices
   for (const Triangle* t : triangles) {
     for (const PointId point : t->points) {
-      // A sparse set (Briggs and Torczon 1993): vertex_of_ is not cleared; its entry counts if that vertex is this point's.
+      // A sparse set (Briggs and Torczon 1993): vertex_of_ is not cleared; its entry counts if that vertex is this
+      // point's.
       std::uint32_t& number = vertex_of_[point];
       if (number < first || number >= points.size() || points[number] != point) {
         number = std::uint32_t(points.size());

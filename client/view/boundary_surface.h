@@ -1,8 +1,9 @@
-// The boundary surface of a mesh that changes: where the interval volume ends. It comes in pieces, and only those are remade in which something
-// changed.
+// The boundary surface of a mesh that changes: where the interval volume ends. It comes in pieces, and only those are
+// remade in which something changed.
 //
-// A tetrahedron's patch ends at the alpha surface, at the beta surface, or at the box. Each of its faces tells by itself which, if any: three cuts by
-// alpha lie on no face that two patches share. So no faces are matched, and what one supercube leaves can be exchanged alone.
+// A tetrahedron's patch ends at the alpha surface, at the beta surface, or at the box. Each of its faces tells by
+// itself which, if any: three cuts by alpha lie on no face that two patches share. So no faces are matched, and what
+// one supercube leaves can be exchanged alone.
 #pragma once
 
 #include <array>
@@ -55,9 +56,9 @@ class BoundarySurface {
   // As of the last update.
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
   [[nodiscard]] double volume() const;  // of the mesh, world units cubed
-  // How much splits can change that volume: for each tetrahedron of a diamond that can be split and whose vertices lie on different sides, the larger
-  // of its part in the mesh and the rest. Surfaces inside diamonds whose vertices all lie on one side are not known and not counted. 0 when
-  // everything is split.
+  // How much splits can change that volume: for each tetrahedron of a diamond that can be split and whose vertices lie
+  // on different sides, the larger of its part in the mesh and the rest. Surfaces inside diamonds whose vertices all
+  // lie on one side are not known and not counted. 0 when everything is split.
   [[nodiscard]] double volume_bound() const;
   [[nodiscard]] std::size_t memory_bytes() const;
 

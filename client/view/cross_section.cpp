@@ -59,7 +59,8 @@ class Cutter {
     }
     const TetCut polygon = cut_tet(corners, distances);
     for (std::size_t i = 1; i + 1 < polygon.count; ++i) {
-      // The triangle of corners 0, i and i + 1: whether its side opposite to each is a side of the polygon, or else a diagonal.
+      // The triangle of corners 0, i and i + 1: whether its side opposite to each is a side of the polygon, or else a
+      // diagonal.
       const std::array<bool, 3> is_side{true, i + 2 == polygon.count, i == 1};
       const std::array<std::size_t, 3> corner{0, i, i + 1};
       for (std::size_t k = 0; k < 3; ++k) {

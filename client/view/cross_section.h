@@ -10,15 +10,15 @@
 
 namespace intervale {
 
-// What lies strictly behind the plane, dot(normal, p) < offset, is kept; what lies in it, or on the normal's side, is cut away (plane_cut.h). World
-// coordinates; normal: of length 1.
+// What lies strictly behind the plane, dot(normal, p) < offset, is kept; what lies in it, or on the normal's side, is
+// cut away (plane_cut.h). World coordinates; normal: of length 1.
 struct CutPlane {
   Vec3 normal{};
   double offset = 0;
 };
 
-// side[k]: the distance from the triangle's side opposite to corner k, 255 there and 0 on that side; 255 at all three corners where that side is not
-// one of the cut tetrahedron's. So a shader can draw the cut tetrahedra's outlines.
+// side[k]: the distance from the triangle's side opposite to corner k, 255 there and 0 on that side; 255 at all three
+// corners where that side is not one of the cut tetrahedron's. So a shader can draw the cut tetrahedra's outlines.
 struct SectionVertex {
   float x = 0, y = 0, z = 0;  // samples
   std::array<std::uint8_t, 3> side{};

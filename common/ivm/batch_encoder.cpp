@@ -11,7 +11,8 @@
 namespace intervale {
 namespace {
 
-// Whether the vertices of an update's diamond lie on different sides. If they do not, all of them or none are across a surface from the centre.
+// Whether the vertices of an update's diamond lie on different sides. If they do not, all of them or none are across a
+// surface from the centre.
 bool is_mixed(UpdateCode code, int vertices) {
   const int cuts = int(code.coefficients());
   return cuts != 0 && cuts != 2 * vertices && !(cuts == vertices && code.first_cuts() == 1);

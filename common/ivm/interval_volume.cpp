@@ -38,7 +38,8 @@ std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& pa
   return hash(std::span<const ErrorToDistance>(parts.error_to_distance), h);
 }
 
-// Codes an octave, the code of a ratio of 1, and the code without a bound. Both near and far ratios go from 2^-12 to 2^20.
+// Codes an octave, the code of a ratio of 1, and the code without a bound. Both near and far ratios go from 2^-12 to
+// 2^20.
 constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
 constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
 

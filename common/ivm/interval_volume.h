@@ -1,9 +1,10 @@
 // Sigma: a compact multiresolution interval volume. Updates only, no field; immutable, shared by all that read it.
 //
-// Weiss and De Floriani 2008, section 6. For each relevant diamond it holds what splitting it takes: the side of its centre and the cuts on its
-// subdivision edges, and the saturated error that says when. The paper spends 12 bytes on each and one on each cut; here supercubes (supercube.h)
-// replace the coordinates and the pointer. Sides and cuts are stored as residuals from what the diamond itself predicts (prediction.h): no larger
-// in memory, and ready for file and wire.
+// Weiss and De Floriani 2008, section 6. For each relevant diamond it holds what splitting it takes: the side of its
+// centre and the cuts on its subdivision edges, and the saturated error that says when. The paper spends 12 bytes on
+// each and one on each cut; here supercubes (supercube.h) replace the coordinates and the pointer. Sides and cuts are
+// stored as residuals from what the diamond itself predicts (prediction.h): no larger in memory, and ready for file and
+// wire.
 #pragma once
 
 #include <algorithm>
@@ -24,10 +25,11 @@
 
 namespace intervale {
 
-// Converts errors to distances: how far the surfaces can still move, in world units, for each unit of field error. One byte a supercube, a
-// logarithmic code rounded up; 0: nothing moves. Most distances are also bounded by the width of the diamond; their codes are sixths of an octave,
-// and the last one has no other bound. Where a speck has no patch and the next one is far, the bound is kMaxFarDeviation instead of the diamond's
-// width; those codes are halves of an octave, and the last one has no other bound.
+// Converts errors to distances: how far the surfaces can still move, in world units, for each unit of field error. One
+// byte a supercube, a logarithmic code rounded up; 0: nothing moves. Most distances are also bounded by the width of
+// the diamond; their codes are sixths of an octave, and the last one has no other bound. Where a speck has no patch and
+// the next one is far, the bound is kMaxFarDeviation instead of the diamond's width; those codes are halves of an
+// octave, and the last one has no other bound.
 class ErrorToDistance {
  public:
   ErrorToDistance() = default;
@@ -52,7 +54,8 @@ class UpdateCode {
  public:
   UpdateCode() = default;
   explicit UpdateCode(std::uint16_t bits) : bits_(bits) {}
-  // Of `all` coefficients (at most 20), `first` are the first of their surface: none, one (then at most 10 in all) or two.
+  // Of `all` coefficients (at most 20), `first` are the first of their surface: none, one (then at most 10 in all) or
+  // two.
   UpdateCode(unsigned side_residual, unsigned all, unsigned first, unsigned error_step)
       : bits_(std::uint16_t(side_residual | (first == 2 ? all + 9 : all) << 2 | error_step << 7)) {}
   [[nodiscard]] std::uint16_t bits() const { return bits_; }
@@ -98,9 +101,9 @@ class IntervalVolume {
   [[nodiscard]] static std::uint8_t half_of_step(unsigned step) { return std::uint8_t(step / 2); }
   // No lower than the argument of half_of_step(), and higher by one at most.
   [[nodiscard]] unsigned step_of_half(std::uint8_t half) const { return std::min(2u * half + 1, unsigned(error_steps_.size()) - 1); }
-  // Half of how far the surfaces can still move, in world units, where an update's diamond is refined to the end: hardly anything moves further than
-  // this, and nothing twice as far, as far as is known. It depends on the update's supercube, that one's scale, and the update's error step, with
-  // which it grows. Not saturated.
+  // Half of how far the surfaces can still move, in world units, where an update's diamond is refined to the end:
+  // hardly anything moves further than this, and nothing twice as far, as far as is known. It depends on the update's
+  // supercube, that one's scale, and the update's error step, with which it grows. Not saturated.
   [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned step) const {
     const ErrorToDistance to_distance = error_to_distance_[supercube];
     const float distance = error_steps_[step] * factor_[to_distance.code()];
@@ -109,7 +112,8 @@ class IntervalVolume {
   [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
   [[nodiscard]] std::span<const ErrorToDistance> error_to_distance() const { return error_to_distance_; }
   [[nodiscard]] UpdateView update(const Place& p) const;  // O(1): at most 55 codes are summed
-  // The same, in steps, for loops over a supercube that keep the sum: its first residual, and an update by the number of its first residual.
+  // The same, in steps, for loops over a supercube that keep the sum: its first residual, and an update by the number
+  // of its first residual.
   [[nodiscard]] std::uint32_t first_residual(std::uint32_t brick, std::uint32_t supercube) const {
     return brick_first_[brick] + first_in_brick_[supercube];
   }

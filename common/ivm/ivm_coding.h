@@ -1,5 +1,5 @@
-// Range coding of the arrays that an .ivm file holds for all updates. Coder is a RangeEncoder, which writes the last argument, or a RangeDecoder,
-// which fills it. FORMAT.md is the specification.
+// Range coding of the arrays that an .ivm file holds for all updates. Coder is a RangeEncoder, which writes the last
+// argument, or a RangeDecoder, which fills it. FORMAT.md is the specification.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,8 @@
 
 namespace intervale {
 
-// Error steps, by update, from fine to coarse: an error is no smaller than its children's, and often equal to the largest of them.
+// Error steps, by update, from fine to coarse: an error is no smaller than its children's, and often equal to the
+// largest of them.
 template <class Coder>
 void code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint16_t> steps) {
   std::array<std::array<NumberModel<9>, 2>, 3> without_children;

@@ -18,14 +18,15 @@ inline constexpr std::uint32_t kIvmVersion = 4;
 // The file's bytes. Equal volumes give equal bytes; the name is not stored.
 [[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
-// The inverse, for bytes from outside: checks every checksum, and every count against the number of bytes before it allocates.
+// The inverse, for bytes from outside: checks every checksum, and every count against the number of bytes before it
+// allocates.
 [[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name);
 
 // Writes a temporary file and renames it.
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
-// The bytes of an .ivm file, for decode_ivm. Checks the header and the length first, and allocates nothing for another file. Errors begin with the
-// path.
+// The bytes of an .ivm file, for decode_ivm. Checks the header and the length first, and allocates nothing for another
+// file. Errors begin with the path.
 [[nodiscard]] Result<std::vector<std::byte>> read_ivm(const std::filesystem::path& path);
 
 // read_ivm, then decode_ivm; the name is the file's, without folders and extension. Errors begin with the path.

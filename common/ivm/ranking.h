@@ -1,8 +1,9 @@
-// Which updates a level of detail wants for their own sake, not as an ancestor of another, and in which order. Pure: a function of the data set and
-// the level of detail.
+// Which updates a level of detail wants for their own sake, not as an ancestor of another, and in which order. Pure: a
+// function of the data set and the level of detail.
 //
-// Without a camera, updates are ranked by their field error; with one, by the deviation in pixels, on the screen, of the surfaces that they move.
-// Pixels a world unit are computed once a supercube, or once a brick that is far away, for its nearest visible point.
+// Without a camera, updates are ranked by their field error; with one, by the deviation in pixels, on the screen, of
+// the surfaces that they move. Pixels a world unit are computed once a supercube, or once a brick that is far away, for
+// its nearest visible point.
 #pragma once
 
 #include <array>
@@ -28,8 +29,8 @@ class Ranking {
   // Ranks the updates of one supercube.
   class Supercube {
    public:
-    // The importance of an update with this error step, with which it grows: 0 if it is not wanted for its own sake. The region of interest is not
-    // considered.
+    // The importance of an update with this error step, with which it grows: 0 if it is not wanted for its own sake.
+    // The region of interest is not considered.
     [[nodiscard]] float importance(unsigned step) const {
       if (step < ranking_->least_step_) return 0;
       if (!ranking_->screen_) return float(step + 1);
@@ -84,16 +85,18 @@ class Ranking {
   // The same, if only updates with no higher error step and no larger object error remain.
   [[nodiscard]] Brick of_brick(std::uint32_t brick, unsigned step, float object_error) const;
 
-  // The error that remains once all updates of higher ranks are applied: the largest field error, or the pixels on the screen, of this rank.
+  // The error that remains once all updates of higher ranks are applied: the largest field error, or the pixels on the
+  // screen, of this rank.
   [[nodiscard]] double bound(Rank rank) const;
-  // The lowest rank of the band that is sent as one with `top`: errors on the screen differ by a factor of 2 at most, field errors by 4.
+  // The lowest rank of the band that is sent as one with `top`: errors on the screen differ by a factor of 2 at most,
+  // field errors by 4.
   [[nodiscard]] Rank band_below(Rank top) const;
 
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
 
  private:
-  // Pixels as ranks: sixteen an octave, from the bits of the float. The lowest is kLast; pixels are capped at 2^100, so that bound() is finite for
-  // any camera. Outside the middle of the picture, ranks are lower by kOffCentre.
+  // Pixels as ranks: sixteen an octave, from the bits of the float. The lowest is kLast; pixels are capped at 2^100, so
+  // that bound() is finite for any camera. Outside the middle of the picture, ranks are lower by kOffCentre.
   static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 16, kOffCentre = 4, kLast = kOffCentre + 1;
   [[nodiscard]] static Rank rank_of(float pixels) {
     const int rank = int(std::bit_cast<std::uint32_t>(pixels < 0x1p100f ? pixels : 0x1p100f) >> kRankShift) - kRankFrom;

@@ -1,7 +1,7 @@
 // Which updates a level of detail needs, and in which order. Pure functions of the updates' errors and positions.
 //
-// Weiss and De Floriani 2008, section 7. Errors are saturated, so the updates with an error above a threshold are closed under parents. A selection
-// that depends on positions too is closed by one pass from fine to coarse.
+// Weiss and De Floriani 2008, section 7. Errors are saturated, so the updates with an error above a threshold are
+// closed under parents. A selection that depends on positions too is closed by one pass from fine to coarse.
 #pragma once
 
 #include <array>
@@ -24,8 +24,8 @@ namespace intervale {
 // The updates that a level of detail needs, closed under parents. Budgets are not applied.
 [[nodiscard]] SplitSet select(const IntervalVolume& volume, const Lod& lod);
 
-// `updates`, closed under parents, in descending order of rank (ranking.h), where an ancestor has at least the rank of its descendants; equal ranks
-// from coarse to fine, then by number. So parents always come before children.
+// `updates`, closed under parents, in descending order of rank (ranking.h), where an ancestor has at least the rank of
+// its descendants; equal ranks from coarse to fine, then by number. So parents always come before children.
 [[nodiscard]] std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& updates, const Lod& lod);
 
 }  // namespace intervale

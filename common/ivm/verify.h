@@ -6,8 +6,9 @@
 
 namespace intervale {
 
-// Checks that every parent of an update is present, updates lie in the box, errors are saturated, sides match coefficients, and full refinement gives
-// the mesh that the description states. Fails with the first violation. Takes as long as an extraction.
+// Checks that every parent of an update is present, updates lie in the box, errors are saturated, sides match
+// coefficients, and full refinement gives the mesh that the description states. Fails with the first violation. Takes
+// as long as an extraction.
 [[nodiscard]] Result<void> validate(const IntervalVolume& volume);
 
 }  // namespace intervale

@@ -1,6 +1,6 @@
-// Finds the faces of one tetrahedron only by a counting sort of all faces by their smallest point: 4 bytes a face and 4 a point beside the mesh. A
-// hash table of open faces was rejected: it is smaller on well-ordered meshes, but holds half of all faces of a shuffled one, and each of its steps
-// misses the cache.
+// Finds the faces of one tetrahedron only by a counting sort of all faces by their smallest point: 4 bytes a face and 4
+// a point beside the mesh. A hash table of open faces was rejected: it is smaller on well-ordered meshes, but holds
+// half of all faces of a shuffled one, and each of its steps misses the cache.
 #include "common/mesh/boundary.h"
 
 #include <algorithm>

@@ -32,15 +32,16 @@ struct DefaultInit : std::allocator<T> {
 template <class T>
 using MeshArray = std::vector<T, DefaultInit<T>>;
 
-// Points in world coordinates, each used by a tetrahedron and given once; tetrahedra as four point indices, positively oriented:
-// (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).
+// Points in world coordinates, each used by a tetrahedron and given once; tetrahedra as four point indices, positively
+// oriented: (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).
 struct Mesh {
   MeshArray<std::array<double, 3>> points;
   MeshArray<Surface> surface;  // one for each point
   MeshArray<std::array<std::uint32_t, 4>> tets;
 };
 
-// The sum of the volumes of the tetrahedra, in world units cubed; compensated, so that their order changes it by less than 1e-12 relative.
+// The sum of the volumes of the tetrahedra, in world units cubed; compensated, so that their order changes it by less
+// than 1e-12 relative.
 [[nodiscard]] double volume_of(const Mesh& mesh);
 
 }  // namespace intervale

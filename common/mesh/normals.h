@@ -1,7 +1,9 @@
-// Smooth normals of a surface of triangles: at each point the sum of the triangles' unit normals, weighted by their angles there.
+// Smooth normals of a surface of triangles: at each point the sum of the triangles' unit normals, weighted by their
+// angles there.
 //
-// G. Thürmer and C. A. Wüthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools 3(1), 1998. Sums are whole numbers: they
-// do not depend on the order of the triangles, and what a triangle added can be subtracted again exactly.
+// G. Thürmer and C. A. Wüthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools 3(1), 1998.
+// Sums are whole numbers: they do not depend on the order of the triangles, and what a triangle added can be subtracted
+// again exactly.
 #pragma once
 
 #include <array>
@@ -15,9 +17,9 @@ namespace intervale {
 // In steps of 2^-20; only its direction matters.
 using NormalSum = std::array<std::int32_t, 3>;
 
-// What a triangle, counterclockwise seen from outside, adds at each of its corners; 0 if it has no area. Directions are those of the space of the
-// corners: scale samples by the grid's spacing first. arc_cosine: of a number that rounding may bring slightly beyond -1 or 1. Its precision is the
-// caller's choice, since it takes much of the time.
+// What a triangle, counterclockwise seen from outside, adds at each of its corners; 0 if it has no area. Directions are
+// those of the space of the corners: scale samples by the grid's spacing first. arc_cosine: of a number that rounding
+// may bring slightly beyond -1 or 1. Its precision is the caller's choice, since it takes much of the time.
 template <class ArcCosine>
 [[nodiscard]] std::array<NormalSum, 3> angle_weighted_normals(const std::array<Vec3, 3>& corners, const ArcCosine& arc_cosine) {
   constexpr double kSteps = 1 << 20;

@@ -5,7 +5,8 @@
 namespace intervale {
 namespace {
 
-// By the set of kept corners, a bit each: the edges that are cut, from the kept end to the other, in the order of the polygon's corners.
+// By the set of kept corners, a bit each: the edges that are cut, from the kept end to the other, in the order of the
+// polygon's corners.
 struct Edge {
   std::uint8_t kept, away;
 };

@@ -1,8 +1,9 @@
 // Cutting a tetrahedral mesh open with a plane.
 //
-// The rule for points in the plane: what lies strictly behind the plane (distance < 0) is kept; what lies in it, or on its normal's side, is cut
-// away. So a plane through a face of the mesh gives no cut with nothing behind it, and the cuts and the kept parts of the boundary triangles close
-// around what is kept without a gap: where they share an edge of the mesh, both have the same point on it, to the last bit.
+// The rule for points in the plane: what lies strictly behind the plane (distance < 0) is kept; what lies in it, or on
+// its normal's side, is cut away. So a plane through a face of the mesh gives no cut with nothing behind it, and the
+// cuts and the kept parts of the boundary triangles close around what is kept without a gap: where they share an edge
+// of the mesh, both have the same point on it, to the last bit.
 #pragma once
 
 #include <array>
@@ -31,15 +32,15 @@ struct Plane {
 // Where the edge between a kept end (distance < 0) and one cut away (distance >= 0) crosses the plane.
 [[nodiscard]] Vec3 crossing(const Vec3& kept, double kept_distance, const Vec3& away, double away_distance);
 
-// A convex polygon: the first `count` corners, 0 (no cut), 3 or 4, counterclockwise seen from the normal's side. Each side lies in a face of the
-// tetrahedron.
+// A convex polygon: the first `count` corners, 0 (no cut), 3 or 4, counterclockwise seen from the normal's side. Each
+// side lies in a face of the tetrahedron.
 struct TetCut {
   std::uint8_t count = 0;
   std::array<Vec3, 4> corners{};
 };
 
-// The cut through a positive tetrahedron, from its corners' distances, in any unit. A tetrahedron that the plane only touches, in a corner or along
-// an edge, has none; one that lies behind the plane, with a face in it, has that face.
+// The cut through a positive tetrahedron, from its corners' distances, in any unit. A tetrahedron that the plane only
+// touches, in a corner or along an edge, has none; one that lies behind the plane, with a face in it, has that face.
 [[nodiscard]] TetCut cut_tet(const std::array<Vec3, 4>& corners, const std::array<double, 4>& distances);
 
 // The cuts through the tetrahedra of a mesh that have one, in the order of mesh.tets. O(points + tetrahedra).

@@ -21,7 +21,8 @@ enum class Side : std::uint8_t { below = 0, inside = 1, above = 2 };
 [[nodiscard]] constexpr bool beta_cuts(Side a, Side b) { return (a == Side::above) != (b == Side::above); }
 [[nodiscard]] constexpr int cut_count(Side a, Side b) { return a > b ? int(a) - int(b) : int(b) - int(a); }
 
-// The cuts on one edge, alpha before beta, as steps of 1/256 of the edge from its first end: the cut lies at (q + 0.5) / 256.
+// The cuts on one edge, alpha before beta, as steps of 1/256 of the edge from its first end: the cut lies at (q + 0.5)
+// / 256.
 struct Cuts {
   std::uint8_t count = 0;
   std::uint8_t q[2] = {0, 0};
@@ -34,8 +35,9 @@ struct Cuts {
   return c;
 }
 
-// The cuts of an edge whose ends have the finite values `from` and `to`; exchanging the ends gives the reversed cuts. Where alpha < beta and both
-// surfaces cut, the cut nearer to `from` stays strictly nearer: if quantisation makes them equal, one moves by a step.
+// The cuts of an edge whose ends have the finite values `from` and `to`; exchanging the ends gives the reversed cuts.
+// Where alpha < beta and both surfaces cut, the cut nearer to `from` stays strictly nearer: if quantisation makes them
+// equal, one moves by a step.
 [[nodiscard]] inline Cuts cuts_between(double from, double to, const Range& range) {
   const double low = std::min(from, to), high = std::max(from, to);
   const Side a = side_of(low, range), b = side_of(high, range);

@@ -12,7 +12,8 @@ constexpr int kEdge[4][4] = {{-1, 0, 1, 2}, {0, -1, 3, 4}, {1, 3, -1, 5}, {2, 4,
 
 using Polygon = std::vector<PatchCorner>;
 
-// Places 0..9 are the vertices, then the midpoints of the edges. Whether place a comes before place b in the given order.
+// Places 0..9 are the vertices, then the midpoints of the edges. Whether place a comes before place b in the given
+// order.
 bool place_less(int order, int a, int b) {
   constexpr int ends[10][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
   if (a == b) return false;

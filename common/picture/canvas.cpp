@@ -51,7 +51,8 @@ void attach(const Gl& gl, GLenum attachment, GLenum format, const std::array<int
   gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, attachment, GL_RENDERBUFFER, buffer);
 }
 
-// A framebuffer, bound. With as many samples as there can be, up to kSamples: where multisampling fails, edges are rough, but there they are.
+// A framebuffer, bound. With as many samples as there can be, up to kSamples: where multisampling fails, edges are
+// rough, but there they are.
 Result<GLuint> framebuffer(const Gl& gl, const std::array<int, 2>& size, bool is_drawn_into) {
   GLint most = 0;
   gl.GetIntegerv(GL_MAX_SAMPLES, &most);

@@ -22,14 +22,15 @@ struct Pixels {
 // Belongs to one thread from creation to destruction.
 class Canvas {
  public:
-  // Draws the background. size: width and height, at least 1. Fails where OpenGL ES is missing, or the size is too large for it.
+  // Draws the background. size: width and height, at least 1. Fails where OpenGL ES is missing, or the size is too
+  // large for it.
   static Result<Canvas> create(const std::array<int, 2>& size, const Viewpoint& viewpoint);
   Canvas(Canvas&&) noexcept;
   Canvas& operator=(Canvas&&) = delete;
   ~Canvas();
 
-  // Three corners a triangle, counterclockwise seen from outside; both sides are visible. Where two triangles coincide, the one that faces the eye
-  // wins.
+  // Three corners a triangle, counterclockwise seen from outside; both sides are visible. Where two triangles coincide,
+  // the one that faces the eye wins.
   void draw(std::span<const Corner> corners);
 
   // Fails if the graphics library ran out of memory.

@@ -15,8 +15,9 @@ tl::unexpected<Error> no_gl(const std::string& why) {
   return fail("cannot draw a picture: " + why + "; install Mesa's software renderer (Debian: libegl1 libgl1-mesa-dri)");
 }
 
-// Before the library is there to read them; what the user has set stays. Processors draw the same picture on every machine, and need no permission
-// to use a device; nothing is told on stderr but our own one line; nothing is left in the user's cache.
+// Before the library is there to read them; what the user has set stays. Processors draw the same picture on every
+// machine, and need no permission to use a device; nothing is told on stderr but our own one line; nothing is left in
+// the user's cache.
 void choose_software() {
   constexpr int kKeep = 0;
   ::setenv("LIBGL_ALWAYS_SOFTWARE", "true", kKeep);
@@ -36,7 +37,8 @@ struct GlContext::Egl {
 #undef INTERVALE_EGL_MEMBER
   EGLDisplay display = EGL_NO_DISPLAY;
 
-  // The library and its display stay once they are there: to end a display unloads its driver, which loses memory thereby.
+  // The library and its display stay once they are there: to end a display unloads its driver, which loses memory
+  // thereby.
   static Result<Egl> load() {
     choose_software();
     void* const library = ::dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);

@@ -1,4 +1,5 @@
-// OpenGL ES 3 without a display, by Mesa's EGL. Loaded when the first picture is drawn, so that machines that draw none do not need it.
+// OpenGL ES 3 without a display, by Mesa's EGL. Loaded when the first picture is drawn, so that machines that draw none
+// do not need it.
 #pragma once
 
 #include <EGL/egl.h>

@@ -19,13 +19,15 @@ struct PictureOptions {
   bool edges = false;         // whether the mesh's edges are drawn on its boundary too
 };
 
-// Misuse if the options are invalid for every mesh: call this before long work. camera: valid by check_lod; see write_picture.
+// Misuse if the options are invalid for every mesh: call this before long work. camera: valid by check_lod; see
+// write_picture.
 [[nodiscard]] Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera);
 
-// Draws what the camera sees, in the size of its viewport, and writes it to a temporary file that is renamed. Without a camera: the whole box in a
-// three-quarter view, 1280 x 960 pixels. An empty mesh gives the background. Equal meshes give equal pictures on one machine, whatever
-// the order of their points and tetrahedra. The options are valid by check_picture. Takes some 0.3 s, and a second for a million triangles; fails
-// where there is no EGL, with what to install. One thread at a time.
+// Draws what the camera sees, in the size of its viewport, and writes it to a temporary file that is renamed. Without a
+// camera: the whole box in a three-quarter view, 1280 x 960 pixels. An empty mesh gives the background. Equal meshes
+// give equal pictures on one machine, whatever the order of their points and tetrahedra. The options are valid by
+// check_picture. Takes some 0.3 s, and a second for a million triangles; fails where there is no EGL, with what to
+// install. One thread at a time.
 [[nodiscard]] Result<void> write_picture(const PictureOptions& options, const Mesh& mesh, const Box& box, const std::optional<Camera>& camera);
 
 }  // namespace intervale

@@ -44,7 +44,8 @@ void main() {
 })";
 
 // A light beside the eye and a soft one from above. Distant parts are paler, as a cue for depth.
-// Sides are drawn about a pixel wide; where triangles are only a few pixels wide, they fade, or they would hide everything else.
+// Sides are drawn about a pixel wide; where triangles are only a few pixels wide, they fade, or they would hide
+// everything else.
 inline constexpr char kMeshFragmentShader[] = R"(in vec3 v_normal;
 in vec3 v_to_eye;
 in vec3 v_sides;

@@ -18,15 +18,16 @@ constexpr std::size_t kAtOnce = 3 * 16384;
 
 Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) { return normalized(cross(subtract(b, a), subtract(c, a))); }
 
-// A triangle of a surface has all its points on it; every other triangle is part of a side of the box, which surfaces meet in lines only.
+// A triangle of a surface has all its points on it; every other triangle is part of a side of the box, which surfaces
+// meet in lines only.
 Part part_of(const Mesh& mesh, const Triangle& t) {
   const Surface surface = mesh.surface[t[0]];
   if (surface == Surface::inside || mesh.surface[t[1]] != surface || mesh.surface[t[2]] != surface) return Part::box;
   return surface == Surface::alpha ? Part::alpha : Part::beta;
 }
 
-// Each begins with the corner of least coordinates. Rounding follows the order of corners, and a picture must not depend on the order of the mesh's
-// points and tetrahedra, which is arbitrary.
+// Each begins with the corner of least coordinates. Rounding follows the order of corners, and a picture must not
+// depend on the order of the mesh's points and tetrahedra, which is arbitrary.
 std::vector<Triangle> ordered_boundary(const Mesh& mesh) {
   std::vector<Triangle> triangles = boundary_triangles(mesh);
   for (Triangle& t : triangles)

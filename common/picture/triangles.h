@@ -27,9 +27,10 @@ struct TriangleOptions {
   bool edges = false;         // whether the edges of the boundary are drawn; those of a cut always are
 };
 
-// Calls take() with corners, three a triangle, counterclockwise seen from outside; some ten thousand at a time, valid during the call. Normals of the
-// alpha and of the beta surface are smooth (normals.h). Triangles without an area are left out. The triangles and the order of their corners depend
-// on the positions of points, not on their numbers. O(points + tetrahedra).
+// Calls take() with corners, three a triangle, counterclockwise seen from outside; some ten thousand at a time, valid
+// during the call. Normals of the alpha and of the beta surface are smooth (normals.h). Triangles without an area are
+// left out. The triangles and the order of their corners depend on the positions of points, not on their numbers.
+// O(points + tetrahedra).
 void for_each_triangle(const Mesh& mesh, const TriangleOptions& options, const Viewpoint& viewpoint,
                        const std::function<void(std::span<const Corner>)>& take);
 

@@ -32,9 +32,10 @@ struct Camera {
   friend bool operator==(const Camera&, const Camera&) = default;
 };
 
-// Updates are wanted where their saturated error is greater than `error` (every relevant update for error 0), inside `roi` if there is one, and where
-// their deviation on the screen of `camera` is greater than its pixel error if there is one; everything else is only as fine as conformity needs.
-// Budgets end refinement early, most important updates first.
+// Updates are wanted where their saturated error is greater than `error` (every relevant update for error 0), inside
+// `roi` if there is one, and where their deviation on the screen of `camera` is greater than its pixel error if there
+// is one; everything else is only as fine as conformity needs. Budgets end refinement early, most important updates
+// first.
 struct Lod {
   double error = 0;                     // in the field's units, at least 0
   std::optional<double> error_percent;  // instead of `error`: 0 to 100 percent of the data set's max_error

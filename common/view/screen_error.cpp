@@ -46,7 +46,8 @@ double ScreenError::pixels_per_unit(const Region& region) const {
   }
   // The visible part of the region is no nearer than that.
   const double depth = std::max({dot(at, ahead_) - reach_along(reach, ahead_), std::sqrt(gap2) * cos_corner_, least_depth_});
-  // The distance of the whole region beyond a side of the view frustum; behind a right angle, from the side's middle line.
+  // The distance of the whole region beyond a side of the view frustum; behind a right angle, from the side's middle
+  // line.
   double outside = 0;
   for (const Side& s : sides_) {
     const double beyond = -dot(at, s.inward) - reach_along(reach, s.inward), behind = -dot(at, s.edge) - reach_along(reach, s.edge);

@@ -1,7 +1,8 @@
 // The deviation of a surface on a camera's screen.
 //
-// Screen-space error as in Lindstrom et al. 1996 and 3D Tiles: an error in world units divided by the least depth of its region, in pixels. Outside
-// the picture it decreases with the angle (as in Ponchio's Nexus), so that a camera that turns finds a coarse mesh instead of nothing.
+// Screen-space error as in Lindstrom et al. 1996 and 3D Tiles: an error in world units divided by the least depth of
+// its region, in pixels. Outside the picture it decreases with the angle (as in Ponchio's Nexus), so that a camera that
+// turns finds a coarse mesh instead of nothing.
 #pragma once
 
 #include <array>
@@ -23,8 +24,8 @@ class ScreenError {
   struct Region {
     Vec3 middle{}, reach{};
   };
-  // The pixels of a deviation of one world unit within the region, at most; fewer the further the region is outside the picture. Finite, above 0, and
-  // no less than for any region inside this one.
+  // The pixels of a deviation of one world unit within the region, at most; fewer the further the region is outside the
+  // picture. Finite, above 0, and no less than for any region inside this one.
   [[nodiscard]] double pixels_per_unit(const Region& region) const;
 
   // Whether the region is so near that the pixels a unit of its parts differ by more than a third.
@@ -46,7 +47,8 @@ class ScreenError {
   double cos_corner_ = 0;         // of the angle between the line of sight and the picture's corners
 };
 
-// The region of the diamonds of a cube of `cells` supercubes a side, of which this key's is the lowest; clipped to the samples.
+// The region of the diamonds of a cube of `cells` supercubes a side, of which this key's is the lowest; clipped to the
+// samples.
 [[nodiscard]] ScreenError::Region region_of(const Domain& domain, SupercubeKey key, std::int32_t cells);
 
 }  // namespace intervale

@@ -1,7 +1,7 @@
 // What exists of the diamonds at the border of the box.
 //
-// Along one axis, the position of a centre of one scale is of one of seven kinds (BorderShapes::Position). Three kinds, one an axis, determine which
-// of a diamond's tetrahedra exist: one small table a scale.
+// Along one axis, the position of a centre of one scale is of one of seven kinds (BorderShapes::Position). Three kinds,
+// one an axis, determine which of a diamond's tetrahedra exist: one small table a scale.
 #pragma once
 
 #include <algorithm>
@@ -22,8 +22,8 @@ struct BorderShape {
 
 class BorderShapes {
  public:
-  // The kind of a coordinate: the first one; those whose neighbours on both sides lie in the box, by their two lowest bits; the one whose next
-  // neighbour lies past the last sample; and the one past the last sample.
+  // The kind of a coordinate: the first one; those whose neighbours on both sides lie in the box, by their two lowest
+  // bits; the one whose next neighbour lies past the last sample; and the one past the last sample.
   enum Position : std::uint8_t { kFirst = 0, kBetween = 1, kStraddling = 5, kPast = 6 };
   static constexpr int kPositions = 7;
 

@@ -29,8 +29,8 @@ std::vector<float> sorted(std::span<const float> errors) {
   return result;
 }
 
-// Steps such that each one's errors, in descending order, are at most a share of the number of those above it; none if that takes more than `most`.
-// `errors` descends.
+// Steps such that each one's errors, in descending order, are at most a share of the number of those above it; none if
+// that takes more than `most`. `errors` descends.
 std::vector<float> steps_for(const std::vector<float>& errors, double share, std::size_t most) {
   std::vector<float> steps;
   std::size_t i = 0;

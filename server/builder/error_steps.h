@@ -8,9 +8,10 @@
 
 namespace intervale {
 
-// At most `most` values (2 or more), ascending; the last one is the largest error. Each error is rounded up to the first value that is not smaller.
-// All distinct errors if there are no more than `most`; else chosen so that rounding adds the smallest possible fraction to the number of errors
-// above any threshold. O(n log n); uses all cores that oneTBB may.
+// At most `most` values (2 or more), ascending; the last one is the largest error. Each error is rounded up to the
+// first value that is not smaller. All distinct errors if there are no more than `most`; else chosen so that rounding
+// adds the smallest possible fraction to the number of errors above any threshold. O(n log n); uses all cores that
+// oneTBB may.
 [[nodiscard]] std::vector<float> choose_error_steps(std::span<const float> errors, std::size_t most);
 
 // Finds the step of an error: the index of the value that it is rounded up to.

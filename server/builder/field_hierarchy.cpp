@@ -110,8 +110,8 @@ unsigned patch_tets(const TetCases& cases, const Domain& domain, const Diamond& 
   return cases.count(shape.order, shape_sides(shape, sides));
 }
 
-// The tetrahedra of the full mesh in a split diamond: the patches of the halves of children that are never split. split: a bit for each child that
-// is.
+// The tetrahedra of the full mesh in a split diamond: the patches of the halves of children that are never split.
+// split: a bit for each child that is.
 std::uint64_t leaves(const TetCases& cases, const Domain& domain, const Diamond& d, const BorderShape& shape, std::uint32_t sides, unsigned split) {
   const std::uint32_t belt = sides >> 4 & ((1u << 2 * d.row->belt) - 1), ring = belt | belt << 2 * d.row->belt, centre = sides >> (2 * kCentre);
   std::uint64_t n = 0;
@@ -223,8 +223,9 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
   }
 }
 
-// Converts errors to object errors, supercube by supercube. An object error is half of the deviation, but no less than twice the mean deviation of
-// surface points, so that 99 % of them are within it also where all of a surface moves alike, as with labels.
+// Converts errors to object errors, supercube by supercube. An object error is half of the deviation, but no less than
+// twice the mean deviation of surface points, so that 99 % of them are within it also where all of a surface moves
+// alike, as with labels.
 std::vector<ErrorToDistance> FieldHierarchy::error_to_distance(const IntervalVolume::Parts& parts) const {
   SurfaceDeviation deviation = surface_deviation(volume_, range_, domain_, set_);
   saturate(deviation.largest);
@@ -327,8 +328,8 @@ FieldHierarchy::BrickPart FieldHierarchy::encode_brick(const Field<T>& field, st
   return part;
 }
 
-// Vertices of the full mesh are cuts of unit edges, for every longer edge with different sides is the spine of a relevant diamond, and samples
-// inside the range that are centres of relevant diamonds or the root's corners.
+// Vertices of the full mesh are cuts of unit edges, for every longer edge with different sides is the spine of a
+// relevant diamond, and samples inside the range that are centres of relevant diamonds or the root's corners.
 FullMesh FieldHierarchy::full_mesh(const std::vector<BrickPart>& parts) const {
   FullMesh full;
   full.vertices = unit_cuts_;

@@ -1,8 +1,10 @@
-// Delta: the hierarchy of diamonds over the whole field, with the diamonds that are relevant to a range, and their errors.
+// Delta: the hierarchy of diamonds over the whole field, with the diamonds that are relevant to a range, and their
+// errors.
 //
-// Weiss and De Floriani 2008, sections 4 and 6. Sigma (interval_volume.h) is made from it. It is also the baseline for comparisons with Sigma, for it
-// can be refined too, computing every side and cut from samples. Where the paper stores a minimum and maximum for each diamond and tests them in each
-// query, this stores the result for one range, one bit a diamond.
+// Weiss and De Floriani 2008, sections 4 and 6. Sigma (interval_volume.h) is made from it. It is also the baseline for
+// comparisons with Sigma, for it can be refined too, computing every side and cut from samples. Where the paper stores
+// a minimum and maximum for each diamond and tests them in each query, this stores the result for one range, one bit a
+// diamond.
 #pragma once
 
 #include <functional>
@@ -31,8 +33,8 @@ struct Field;
 
 class FieldHierarchy {
  public:
-  // Samples are finite; the volume must outlive the hierarchy. Uses all cores that oneTBB may. Memory beside the volume: half a byte a sample to
-  // find the relevant diamonds, then 4 bytes for each of them.
+  // Samples are finite; the volume must outlive the hierarchy. Uses all cores that oneTBB may. Memory beside the
+  // volume: half a byte a sample to find the relevant diamonds, then 4 bytes for each of them.
   FieldHierarchy(const Volume& volume, const BuildOptions& options);
 
   [[nodiscard]] const Domain& domain() const { return domain_; }
@@ -41,7 +43,8 @@ class FieldHierarchy {
   [[nodiscard]] Side side(Vertex v) const;                               // of any vertex
   [[nodiscard]] RootPatch root_patch() const;
 
-  // The context of a diamond of a front before its split, and the cuts on its subdivision edges in the order of Front::split.
+  // The context of a diamond of a front before its split, and the cuts on its subdivision edges in the order of
+  // Front::split.
   [[nodiscard]] DiamondContext context(const Diamond& d) const;
   [[nodiscard]] std::vector<std::uint8_t> cuts(const Diamond& d) const;
 

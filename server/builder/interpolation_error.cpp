@@ -38,7 +38,8 @@ TetPlan plan_of(const DiamondType& row, int tet) {
       faces[i].n[k] = std::int8_t(n[k]);
     }
     faces[i].d = std::int8_t(-dot(n, a));
-    // The face opposite belt i + 1 contains belt i and belongs to the tetrahedron before. The last tetrahedron leaves its other face to the first.
+    // The face opposite belt i + 1 contains belt i and belongs to the tetrahedron before. The last tetrahedron leaves
+    // its other face to the first.
     faces[i].open = (i == 3 && tet > 0) || (i == 2 && tet == row.tets - 1);
   }
   int next = 0;

@@ -135,8 +135,8 @@ class Tetrahedron {
     }
   }
 
-  // The larger of `known` and the largest |F - linear interpolation| over all samples inside. O(blocks that its bounding box meets + rows and samples
-  // of the blocks whose extremes allow more than that).
+  // The larger of `known` and the largest |F - linear interpolation| over all samples inside. O(blocks that its
+  // bounding box meets + rows and samples of the blocks whose extremes allow more than that).
   [[nodiscard]] double error(const Extremes<T>& extremes, double known) const {
     constexpr std::int64_t side = Extremes<T>::kSide;
     if (high_[0] - low_[0] < 2 * side && high_[1] - low_[1] < 2 * side && high_[2] - low_[2] < 2 * side)
@@ -224,10 +224,11 @@ class Tetrahedron {
 
 // One tetrahedron of a diamond type, for h = 1, with the centre as the origin.
 struct TetPlan {
-  // The gradient of the interpolant times h, [axis][i], from the values at spine end 0 and at both belt vertices, less that at the spine's middle.
+  // The gradient of the interpolant times h, [axis][i], from the values at spine end 0 and at both belt vertices, less
+  // that at the spine's middle.
   std::array<std::array<double, 3>, 3> gradient{};
-  // Half spaces n . q + d h >= open, those with n_x > 0 first, then those with n_x < 0. All of n and d are -1, 0 or 1. Samples on a face between two
-  // tetrahedra are assigned to one of them.
+  // Half spaces n . q + d h >= open, those with n_x > 0 first, then those with n_x < 0. All of n and d are -1, 0 or 1.
+  // Samples on a face between two tetrahedra are assigned to one of them.
   struct Face {
     std::array<std::int8_t, 3> n{};
     std::int8_t d = 0, open = 0;
@@ -236,7 +237,8 @@ struct TetPlan {
   int lower = 0, upper = 0;  // faces that bound x from below, and from above
   std::array<std::int8_t, 3> low{}, high{};
 
-  // Calls visit(y, z, first x, last x) for the rows of samples inside. shares: whether samples on a face belong to one of its two tetrahedra only.
+  // Calls visit(y, z, first x, last x) for the rows of samples inside. shares: whether samples on a face belong to one
+  // of its two tetrahedra only.
   template <class Visit>
   void for_each_row(int h, bool shares, Visit&& visit) const {
     // Faces that do not bound x bound y, or only z.
@@ -268,7 +270,8 @@ struct TetPlan {
 // By type and tetrahedron.
 [[nodiscard]] const std::array<std::array<TetPlan, kMaxTets>, 64>& tet_plans();
 
-// Errors of the diamonds of one scale: error(delta) of the paper, section 4, the largest difference over the samples of all their tetrahedra.
+// Errors of the diamonds of one scale: error(delta) of the paper, section 4, the largest difference over the samples of
+// all their tetrahedra.
 template <class T>
 class DiamondErrors {
  public:
@@ -315,7 +318,8 @@ class DiamondErrors {
  private:
   static constexpr int kSmall = 3;   // the coarsest scale whose tetrahedra are visited row by row, without blocks
   static constexpr int kListed = 2;  // the coarsest scale whose rows are listed in advance: finding short rows takes longer than visiting them
-  // Up to scale kSmall, the 24 bits of a float hold every interpolant between samples of two bytes: halves of differences, divided by h.
+  // Up to scale kSmall, the 24 bits of a float hold every interpolant between samples of two bytes: halves of
+  // differences, divided by h.
   using Real = std::conditional_t<sizeof(T) <= 2, float, double>;
 
   struct Middle {
@@ -355,7 +359,8 @@ class DiamondErrors {
     return worst;
   }
 
-  // One tetrahedron with all its vertices in the box. interior: all others of the diamond are too, so each face belongs to one of them.
+  // One tetrahedron with all its vertices in the box. interior: all others of the diamond are too, so each face belongs
+  // to one of them.
   [[nodiscard]] Real unmoved(const Diamond& d, int tet, bool interior) const {
     const T* const origin = field_.samples.data() + field_.index(d.centre);
     const TetPlan& plan = plans_[d.type][tet];

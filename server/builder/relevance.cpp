@@ -29,7 +29,8 @@ class BitGrid {
   [[nodiscard]] std::uint64_t* row(std::int32_t y, std::int32_t z) { return &bits_[words_ * (std::size_t(z) * size_[1] + y)]; }
   [[nodiscard]] const std::uint64_t* row(std::int32_t y, std::int32_t z) const { return &bits_[words_ * (std::size_t(z) * size_[1] + y)]; }
 
-  // Word w of a row shifted so that each bit is that of the neighbour at x + step, step in {-1, 0, 1}; 0 past the ends of the row.
+  // Word w of a row shifted so that each bit is that of the neighbour at x + step, step in {-1, 0, 1}; 0 past the ends
+  // of the row.
   [[nodiscard]] std::uint64_t shifted(const std::uint64_t* row, std::size_t w, int step) const {
     if (step == 0) return row[w];
     if (step < 0) return row[w] << 1 | (w > 0 ? row[w - 1] >> 63 : 0);
@@ -133,7 +134,8 @@ Sides coarser(const Sides& fine, const std::array<std::int32_t, 3>& size) {
   return coarse;
 }
 
-// Cuts on the edges of the finest mesh: those along the axes, and the diagonals of faces and cells from the even to the odd end.
+// Cuts on the edges of the finest mesh: those along the axes, and the diagonals of faces and cells from the even to the
+// odd end.
 std::uint64_t count_unit_cuts(const Sides& sides, Vertex last) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::int32_t>(0, last.z + 1), std::uint64_t(0),
@@ -168,8 +170,9 @@ class Judge {
   Judge(const BorderShapes& shapes, const Sides& sides, Refine refine, const BitGrid* finer)
       : shapes_(shapes), sides_(sides), refine_(refine), finer_(finer), relevant_(with_next(places(shapes))) {}
 
-  // Children first. Where b of y and z are odd, diamonds at even x are of class 3 - b, those at odd x of class 2 - b. Their children have fewer odd
-  // coordinates in y and z, or are their neighbours at even x, or are of the finer scale. So rows with equal b can be judged in parallel.
+  // Children first. Where b of y and z are odd, diamonds at even x are of class 3 - b, those at odd x of class 2 - b.
+  // Their children have fewer odd coordinates in y and z, or are their neighbours at even x, or are of the finer scale.
+  // So rows with equal b can be judged in parallel.
   BitGrid judge() && {
     for (int b = 0; b < 3; ++b) {
       for_each_row(relevant_.size(1), relevant_.size(2), [&](std::int32_t y, std::int32_t z) {
@@ -182,8 +185,8 @@ class Judge {
   }
 
  private:
-  // Diamonds between the ends of a row are of two kinds of position, which alternate. Inside the box both have the same vertices and are judged
-  // together. Each end is judged by itself.
+  // Diamonds between the ends of a row are of two kinds of position, which alternate. Inside the box both have the same
+  // vertices and are judged together. Each end is judged by itself.
   void judge_row(std::int32_t y, std::int32_t z, int odd_x) {
     const int position_y = shapes_.position(1, y), position_z = shapes_.position(2, z);
     const auto shape_at = [&](int position_x) -> const BorderShape& { return shapes_.of(position_x, position_y, position_z); };

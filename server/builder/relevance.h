@@ -1,8 +1,8 @@
 // Which diamonds are relevant to a range: those that count (see Refine), and those with a relevant child.
 //
-// Sides take two bits a sample. At each scale, the sides at multiples of h and the results are rows of bits along x, and 64 diamonds of a row are
-// judged at once: which vertices a diamond has depends only on which of its coordinates are odd, so all diamonds at even x of a row have the same
-// vertices, and so do those at odd x.
+// Sides take two bits a sample. At each scale, the sides at multiples of h and the results are rows of bits along x,
+// and 64 diamonds of a row are judged at once: which vertices a diamond has depends only on which of its coordinates
+// are odd, so all diamonds at even x of a row have the same vertices, and so do those at odd x.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,8 @@ struct Relevance {
   std::uint64_t unit_cuts = 0;  // cuts on all edges of the mesh that is refined everywhere
 };
 
-// Uses all cores that oneTBB may, and less than half a byte a sample, with rows rounded up to multiples of 64 samples. shapes: by scale.
+// Uses all cores that oneTBB may, and less than half a byte a sample, with rows rounded up to multiples of 64 samples.
+// shapes: by scale.
 [[nodiscard]] Relevance find_relevant(const Volume& volume, const Range& range, Refine refine, const std::vector<BorderShapes>& shapes);
 
 }  // namespace intervale

@@ -59,8 +59,8 @@ struct Cube {
   std::array<std::int32_t, 3> low;  // its lowest corner
   Vertex start;                     // of the spine
   std::array<bool, 3> flip;         // axes along which the spine descends
-  // The largest coordinates from `low`: points in a far side of the box belong to the tetrahedra before it, not to those behind, which clamping
-  // makes flat.
+  // The largest coordinates from `low`: points in a far side of the box belong to the tetrahedra before it, not to
+  // those behind, which clamping makes flat.
   Vec3 most;
 };
 
@@ -77,7 +77,8 @@ void raise(float& to, float value) {
   }
 }
 
-// The mean of fractions from 0 to 1, the same whatever their order: their sum in fixed point and, in the low bits, their count.
+// The mean of fractions from 0 to 1, the same whatever their order: their sum in fixed point and, in the low bits,
+// their count.
 class Mean {
  public:
   // Fewer than 2^kCountBits times; from any thread.
@@ -143,7 +144,8 @@ class Descent {
  private:
   using Strides = std::array<std::ptrdiff_t, 3>;  // between neighbouring samples along each axis
 
-  // The crossings on the edges of the finest tetrahedra: in the cell from each sample on, one edge for each set of one, two or three axes.
+  // The crossings on the edges of the finest tetrahedra: in the cell from each sample on, one edge for each set of one,
+  // two or three axes.
   [[nodiscard]] CrossingsByTet crossings_in(const Cube& cube) const {
     CrossingsByTet found;
     const Vertex last = field_.last;
@@ -180,7 +182,8 @@ class Descent {
     return false;
   }
 
-  // Those of one edge: in the cell from v on, along these axes, from the end where those coordinates are even to the end where they are odd.
+  // Those of one edge: in the cell from v on, along these axes, from the end where those coordinates are even to the
+  // end where they are odd.
   void add_crossings(const Cube& cube, const T* sample, const std::array<std::int32_t, 3>& v, unsigned axes, const Strides& stride,
                      CrossingsByTet& found) const {
     Vec3 even{}, odd{};  // the ends, from v

@@ -56,7 +56,8 @@ class Inflater {
       if (*got == 0 && within_member_) return fail(where() + "the gzip data ends too early; is the file cut short?");
       ended_ = *got == 0;
     }
-    // Some tools pad gzip files, with zeros as a rule: whatever follows a whole member and is not another one is not data.
+    // Some tools pad gzip files, with zeros as a rule: whatever follows a whole member and is not another one is not
+    // data.
     if (!within_member_ && !ended_ && stream_.next_in[0] != kMagic) ended_ = true;
     return {};
   }

@@ -1,6 +1,7 @@
-// teem parses the grammar of fields, their aliases and types, but is not safe with hostile input. It overflows buffers on long lines (its
-// messages) and long words (its text reader), takes the header's file name for a printf format, and leaves gzip's checksum unread. So the header is
-// cut out and screened here, teem parses what is left, from memory and without touching any file, and the data is read in nrrd_reader.cpp.
+// teem parses the grammar of fields, their aliases and types, but is not safe with hostile input. It overflows buffers
+// on long lines (its messages) and long words (its text reader), takes the header's file name for a printf format, and
+// leaves gzip's checksum unread. So the header is cut out and screened here, teem parses what is left, from memory and
+// without touching any file, and the data is read in nrrd_reader.cpp.
 #include "server/volume/nrrd_header.h"
 
 #include <teem/biff.h>

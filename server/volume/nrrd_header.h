@@ -1,4 +1,5 @@
-// The header of an NRRD file, attached (.nrrd) or detached (.nhdr): teem.sourceforge.net/nrrd/format.html, versions 1 to 6.
+// The header of an NRRD file, attached (.nrrd) or detached (.nhdr): teem.sourceforge.net/nrrd/format.html, versions 1
+// to 6.
 #pragma once
 
 #include <cstdint>
@@ -25,9 +26,10 @@ struct NrrdHeader {
   [[nodiscard]] std::uint64_t data_bytes() const { return grid.sample_count() * size_of(type); }
 };
 
-// Reads and checks a header. Fails on anything but three spatial axes of 8 to 32-bit integers or floats, on encodings other than raw, gzip and text,
-// on data in several files, and on a header above 1 MiB. Allocates by the header's own length only: its claims have not been compared with the data
-// yet. Any thread; calls are serialised, since teem keeps its errors in global variables.
+// Reads and checks a header. Fails on anything but three spatial axes of 8 to 32-bit integers or floats, on encodings
+// other than raw, gzip and text, on data in several files, and on a header above 1 MiB. Allocates by the header's own
+// length only: its claims have not been compared with the data yet. Any thread; calls are serialised, since teem keeps
+// its errors in global variables.
 Result<NrrdHeader> read_nrrd_header(const InputFile& file);
 
 }  // namespace intervale

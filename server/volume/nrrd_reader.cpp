@@ -69,7 +69,8 @@ Result<void> read_gzip_data(const InputFile& file, std::uint64_t offset, const N
   if (needed / kGreatestDeflateRatio > packed) return fail(too_short(file, needed, std::to_string(packed) + " bytes of gzip cannot hold as many"));
   std::uint64_t skip = static_cast<std::uint64_t>(std::max<std::int64_t>(header.byte_skip, 0));
   if (header.byte_skip < 0) {
-    // Counted from the end, which only decoding finds. It decodes twice rather than keep the bytes before the samples in memory.
+    // Counted from the end, which only decoding finds. It decodes twice rather than keep the bytes before the samples
+    // in memory.
     const auto length = gzip_length(file, offset);
     if (!length) return tl::unexpected<Error>(length.error());
     const auto after = static_cast<std::uint64_t>(-(header.byte_skip + 1));

@@ -8,10 +8,11 @@
 
 namespace intervale {
 
-// Reads an NRRD file with its data attached, or detached in one file in the header's own folder or below it. See nrrd_header.h for what
-// fails. Spacing comes from `spacings` or the lengths of `space directions` (1 where there is none), origin from `space origin` or
-// `axis mins` (0 where there is none). Nothing of the volume's size is allocated before the data is long enough to fill it: for raw by its
-// length, for gzip by deflate's greatest ratio (1032), for text by two characters a sample. Bytes after the samples are ignored.
+// Reads an NRRD file with its data attached, or detached in one file in the header's own folder or below it. See
+// nrrd_header.h for what fails. Spacing comes from `spacings` or the lengths of `space directions` (1 where there is
+// none), origin from `space origin` or `axis mins` (0 where there is none). Nothing of the volume's size is allocated
+// before the data is long enough to fill it: for raw by its length, for gzip by deflate's greatest ratio (1032), for
+// text by two characters a sample. Bytes after the samples are ignored.
 Result<Volume> read_nrrd(const std::filesystem::path& path);
 
 }  // namespace intervale

@@ -35,7 +35,8 @@ std::string shortest(double value) {
   return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
 }
 
-// `space directions` rather than `spacings`: a NRRD has an origin in space only together with them. NRRD0004 is the first with either.
+// `space directions` rather than `spacings`: a NRRD has an origin in space only together with them. NRRD0004 is the
+// first with either.
 std::string header(const Volume& volume) {
   const auto& [dims, spacing, origin] = volume.grid;
   std::string text = "NRRD0004\n# written by Intervale " INTERVALE_VERSION "\ntype: ";

@@ -8,7 +8,8 @@
 
 namespace intervale {
 
-// Writes header and samples into one file, raw and little endian: a temporary file that is renamed. read_nrrd returns the same grid, bit by bit.
+// Writes header and samples into one file, raw and little endian: a temporary file that is renamed. read_nrrd returns
+// the same grid, bit by bit.
 Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume);
 
 }  // namespace intervale

@@ -1,4 +1,5 @@
-// marschner-lobb: S. Marschner, R. Lobb, An Evaluation of Reconstruction Filters for Volume Rendering, Visualization 1994, section 5.
+// marschner-lobb: S. Marschner, R. Lobb, An Evaluation of Reconstruction Filters for Volume Rendering, Visualization
+// 1994, section 5.
 #include "server/volume/samples.h"
 
 #include <tbb/blocked_range.h>
@@ -27,7 +28,8 @@ double marschner_lobb(double x, double y, double z) {
   return 255 * (1 - std::sin(pi * z / 2) + kAlpha * (1 + ripple)) / (2 * (1 + kAlpha));
 }
 
-// |psi|^2 of n = 3, l = 2, m = 0, unnormalised: (r^2 exp(-r/3) (3 cos^2 - 1))^2 with r in Bohr radii, of which [-1, 1] spans 40.
+// |psi|^2 of n = 3, l = 2, m = 0, unnormalised: (r^2 exp(-r/3) (3 cos^2 - 1))^2 with r in Bohr radii, of which [-1, 1]
+// spans 40.
 double hydrogen(double x, double y, double z) {
   constexpr double kBohrRadii = 20;
   const double r = kBohrRadii * std::hypot(x, y, z), up = kBohrRadii * z;
@@ -68,7 +70,8 @@ class Buckyball {
     for (const auto& atom : atoms)
       for (std::size_t axis = 0; axis < 3; ++axis)
         for (const double x : at) factors_[axis].push_back(falloff(x - scale * atom[axis]));
-    // The field is greatest near an atom, where it is the atom's own 1 and what its three neighbours add, an edge of length 2 away.
+    // The field is greatest near an atom, where it is the atom's own 1 and what its three neighbours add, an edge of
+    // length 2 away.
     amplitude_ = 255 / (1 + 3 * falloff(2 * scale));
     atoms_ = atoms.size();
   }

@@ -18,8 +18,8 @@ inline constexpr int kMaxSampleSize = 1024;
 // hydrogen: the probability density of the 3d_z2 orbital, 0 to 255.
 std::span<const std::string_view> sample_names();
 
-// A cube of size^3 samples of type f32 over [-1, 1]^3; misuse for an unknown name or a size out of bounds. The result does not depend on
-// the number of threads. O(size^3), buckyball a few times slower than the others.
+// A cube of size^3 samples of type f32 over [-1, 1]^3; misuse for an unknown name or a size out of bounds. The result
+// does not depend on the number of threads. O(size^3), buckyball a few times slower than the others.
 Result<Volume> make_sample(std::string_view name, int size);
 
 }  // namespace intervale

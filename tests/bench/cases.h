@@ -23,7 +23,8 @@ struct Case {
 inline constexpr const char* kCaseSyntax =
     "PATH,LO,HI and then, as needed: dims=XxYxZ, type=u8, big-endian, spacing=XxYxZ (raw samples), refine=uniform, name=NAME";
 
-// Reads a case from the text above; misuse if it is none. A volume that the last call read is not read again. One thread.
+// Reads a case from the text above; misuse if it is none. A volume that the last call read is not read again. One
+// thread.
 [[nodiscard]] Result<Case> read_case(std::string_view text);
 
 // One of the product's own samples, with a range that suits it.

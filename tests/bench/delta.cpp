@@ -30,7 +30,8 @@ float round_up(double error) {
   return double(f) < error ? std::nextafter(f, std::numeric_limits<float>::max()) : f;
 }
 
-// Offsets of every type's vertices and children in an array of samples; times h, or for children of class 2 times h / 2.
+// Offsets of every type's vertices and children in an array of samples; times h, or for children of class 2 times h /
+// 2.
 struct Steps {
   std::array<std::ptrdiff_t, kMaxVertices> vertex{};
   std::array<std::ptrdiff_t, kMaxChildren> child{};
@@ -137,8 +138,9 @@ class TypedDelta final : public Delta {
 
   [[nodiscard]] T sample(Vertex v) const { return field_.samples[field_.index(domain_.clamp(v))]; }
 
-  // Sides ascend with values; and where they differ among the vertices in a diamond, they do so across an edge of a diamond there, which is then
-  // relevant by itself. So this asks neither too much nor too little: at error 0 it splits what Sigma holds.
+  // Sides ascend with values; and where they differ among the vertices in a diamond, they do so across an edge of a
+  // diamond there, which is then relevant by itself. So this asks neither too much nor too little: at error 0 it splits
+  // what Sigma holds.
   template <Refine mode>
   [[nodiscard]] static bool is_wanted(const Node& node, const Range& range, double threshold) {
     if (!(double(node.error) > threshold)) return false;
@@ -171,8 +173,9 @@ class TypedDelta final : public Delta {
     return refined;
   }
 
-  // Top down, generation by generation: all parents of a diamond are of the generation before its own. Errors and values are saturated, so whatever
-  // is wanted has all its parents split by the time its turn comes, and none has to be forced.
+  // Top down, generation by generation: all parents of a diamond are of the generation before its own. Errors and
+  // values are saturated, so whatever is wanted has all its parents split by the time its turn comes, and none has to
+  // be forced.
   template <class Wanted>
   void refine_diamonds(Refined& refined, const Range& range, const Wanted& wanted) const {
     struct Reached {
@@ -226,7 +229,8 @@ class TypedDelta final : public Delta {
     }
   };
 
-  // The same scale by scale and class by class, which are the generations, in supercubes: there the front looks around quickest.
+  // The same scale by scale and class by class, which are the generations, in supercubes: there the front looks around
+  // quickest.
   template <class Wanted>
   void refine_supercubes(Refined& refined, const Range& range, const Wanted& wanted) const {
     std::vector<Level> levels;

@@ -1,7 +1,9 @@
-// Delta as the paper has it: the hierarchy of diamonds over the whole field, from which the mesh of any range is extracted. The baseline of Table 2.
+// Delta as the paper has it: the hierarchy of diamonds over the whole field, from which the mesh of any range is
+// extracted. The baseline of Table 2.
 //
-// Weiss and De Floriani 2008, section 4: beside the samples it keeps the error of every diamond, and the least and the greatest value in it, which
-// say whether the diamond is relevant to a range. FieldHierarchy (server/build) answers that for one range only; this one answers it in each query.
+// Weiss and De Floriani 2008, section 4: beside the samples it keeps the error of every diamond, and the least and the
+// greatest value in it, which say whether the diamond is relevant to a range. FieldHierarchy (server/build) answers
+// that for one range only; this one answers it in each query.
 #pragma once
 
 #include <cstddef>
@@ -28,8 +30,8 @@ class Delta {
     supercubes,  // the fastest we know: supercube by supercube, as Sigma's queries go, though nothing of Delta is held so
   };
 
-  // The front in which every relevant diamond with a saturated error above `error` (field units) is split; at error 0 every relevant one. Virtual
-  // once a query: inside, everything knows the samples' type. One thread.
+  // The front in which every relevant diamond with a saturated error above `error` (field units) is split; at error 0
+  // every relevant one. Virtual once a query: inside, everything knows the samples' type. One thread.
   [[nodiscard]] virtual Refined refine(const Range& range, Refine mode, double error, Walk walk) const = 0;
 
   // Errors and values of all diamonds, the samples not counted.

@@ -26,8 +26,8 @@ struct LebTets {
   std::vector<std::array<std::uint32_t, 4>> tets;
 };
 
-// The leaves of the full mesh that the interval meets: the halves that split diamonds leave to children that are never split. Those wholly inside
-// too, which are as large as the mesh has them.
+// The leaves of the full mesh that the interval meets: the halves that split diamonds leave to children that are never
+// split. Those wholly inside too, which are as large as the mesh has them.
 LebTets leaves_of(const FieldHierarchy& hierarchy) {
   const Domain& domain = hierarchy.domain();
   const SupercubeSet& set = hierarchy.set();

@@ -1,7 +1,8 @@
-// How soon a picture is right: bytes received against the deviation measured on the screen, for the order in which we send and for three others.
+// How soon a picture is right: bytes received against the deviation measured on the screen, for the order in which we
+// send and for three others.
 //
-// Deviation is measured, not estimated: points are spread over the full mesh's surface, those in the picture are kept, and for each the distance to
-// the surface of the mesh so far is taken, in pixels where the point is.
+// Deviation is measured, not estimated: points are spread over the full mesh's surface, those in the picture are kept,
+// and for each the distance to the surface of the mesh so far is taken, in pixels where the point is.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
@@ -100,7 +101,8 @@ struct Picture {
   }
 };
 
-// The fewest bytes that we know for some updates, closed under parents: as few batches as can be, each along the Morton curve.
+// The fewest bytes that we know for some updates, closed under parents: as few batches as can be, each along the Morton
+// curve.
 std::size_t bytes_of(const IntervalVolume& volume, const SplitSet& updates) {
   const SupercubeSet& set = volume.set();
   SplitSet sent(volume.size());
@@ -174,7 +176,8 @@ Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod) {
   });
 }
 
-// Updates one by one, in batches that grow by an eighth. at_least: each prefix counts the fewest bytes it can be had for, not what it took.
+// Updates one by one, in batches that grow by an eighth. at_least: each prefix counts the fewest bytes it can be had
+// for, not what it took.
 Curve follow_list(const Sigma& sigma, const Picture& picture, const std::vector<UpdateIndex>& order, bool at_least) {
   const SupercubeSet& set = sigma->set();
   SplitSet sent(sigma->size());
@@ -192,7 +195,8 @@ Curve follow_list(const Sigma& sigma, const Picture& picture, const std::vector<
   return follow(*sigma, picture, next, at_least ? BytesSoFar([&] { return double(bytes_of(*sigma, sent)); }) : BytesSoFar());
 }
 
-// Bytes until 99 % of the points are off by no more than that, between two measurements by their logarithms; none if never.
+// Bytes until 99 % of the points are off by no more than that, between two measurements by their logarithms; none if
+// never.
 std::optional<double> bytes_to(const Curve& curve, double pixels) {
   for (std::size_t i = 0; i < curve.size(); ++i) {
     if (curve[i].deviation.most > pixels) continue;

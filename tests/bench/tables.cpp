@@ -1,7 +1,7 @@
 // The paper's Tables 1 and 2 with our figures beside the paper's, and our speeds, as Markdown.
 //
-// Weiss and De Floriani 2008, section 8. Table 1: how small. Table 2: selective refinement from Sigma against Delta, both on one core. Table 3, ours:
-// how fast it is built, extracted, and taken in by a client.
+// Weiss and De Floriani 2008, section 8. Table 1: how small. Table 2: selective refinement from Sigma against Delta,
+// both on one core. Table 3, ours: how fast it is built, extracted, and taken in by a client.
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 #include <oneapi/tbb/global_control.h>

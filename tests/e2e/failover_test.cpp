@@ -1,5 +1,5 @@
-// Replicas behind a real balancer, with the configuration that deploy/ has for it. A session's whole state is what its client brings, so the one
-// takes over from the other.
+// Replicas behind a real balancer, with the configuration that deploy/ has for it. A session's whole state is what its
+// client brings, so the one takes over from the other.
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -104,8 +104,8 @@ TEST_P(Failover, EveryClientGoesOnAtTheOtherReplica) {
   EXPECT_GE(figures.at("reconnects"), streams);
   EXPECT_LE(figures.at("resume_ms").at("max"), 2000.0) << figures.at("resume_ms");
   EXPECT_EQ(figures.at("repeated_updates"), 0);
-  // What clients had twice, and what was sent but had not come when the replica went, so that the other one sent it again. Before the clients came
-  // one that asked for a description, and one for the whole stream to compare with.
+  // What clients had twice, and what was sent but had not come when the replica went, so that the other one sent it
+  // again. Before the clients came one that asked for a description, and one for the whole stream to compare with.
   const double received = figures.at("bytes"), repeated = figures.at("repeated_bytes"), asked = whole.at("bytes_received");
   const double sent = sent_by_a + metric(b.port(), "intervale_bytes_sent_total") - asked;
   EXPECT_LE(repeated + std::max(0.0, sent - received), 0.02 * received) << sent << " sent, " << received << " received, " << repeated << " twice";

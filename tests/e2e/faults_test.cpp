@@ -1,4 +1,5 @@
-// What goes wrong around a server. README.md in tests/ has the table of faults and of the tests that prove what is promised.
+// What goes wrong around a server. README.md in tests/ has the table of faults and of the tests that prove what is
+// promised.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>

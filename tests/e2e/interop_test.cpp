@@ -15,7 +15,8 @@ constexpr const char* kWs = "/usr/share/nodejs/ws/index.js";
 
 bool is_there(const char* file) { return ::access(file, R_OK) == 0; }
 
-// Runs a peer of tests/e2e/peers with the server's port, the data set's name, and more. What goes wrong it says on stdout, a line each.
+// Runs a peer of tests/e2e/peers with the server's port, the data set's name, and more. What goes wrong it says on
+// stdout, a line each.
 void expect_to_understand(std::vector<std::string> peer, const std::string& more) {
   ServerProgram server;
   peer.back() = INTERVALE_E2E "/peers/" + peer.back();

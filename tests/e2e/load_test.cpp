@@ -92,7 +92,8 @@ TEST(Load, ABudgetIsKeptWhereverClientsLook) {
   EXPECT_EQ(figures.at("differing"), 0);
 }
 
-// The same for what it keeps at all: a client that is sent more fails, and so does one that forgets other updates than its server.
+// The same for what it keeps at all: a client that is sent more fails, and so does one that forgets other updates than
+// its server.
 TEST(Load, ClientsThatKeepLittleForgetWhatTheServerForgets) {
   ServerProgram server;
   const auto figures =

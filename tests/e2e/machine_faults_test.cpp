@@ -1,4 +1,5 @@
-// What goes wrong on the machine that a server runs on: descriptors, disks, clocks. README.md in tests/ has the table of faults.
+// What goes wrong on the machine that a server runs on: descriptors, disks, clocks. README.md in tests/ has the table
+// of faults.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>

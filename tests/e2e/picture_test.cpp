@@ -61,7 +61,8 @@ double share(const Image& image, Hue wanted) {
   return double(count) / (image.width * image.height);
 }
 
-// The buckyball's shape would have to be known: a thick shell of a ball instead, in [0, 32]^3, alpha at radius 14 and beta at 8.
+// The buckyball's shape would have to be known: a thick shell of a ball instead, in [0, 32]^3, alpha at radius 14 and
+// beta at 8.
 const std::filesystem::path& ball() {
   static const TempDir folder;
   static const std::filesystem::path path = [] {

@@ -1,4 +1,5 @@
-// Programs that run for long, and what happens to them meanwhile: servers killed, ended and told things, streams cut, folders and tokens that change.
+// Programs that run for long, and what happens to them meanwhile: servers killed, ended and told things, streams cut,
+// folders and tokens that change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -42,7 +43,8 @@ TEST(Programs, AStreamThatIsCutGoesOnWhereItWasAndNothingComesTwice) {
   const auto pieces = fetch_json({"-o", folder / "pieces.vtu"}, relay.url("buckyball"));
   EXPECT_EQ(pieces.at("reconnects"), 3);
   for (const char* key : {"updates", "vertices", "tets", "volume"}) EXPECT_EQ(pieces.at(key), whole.at(key)) << key;
-  // Descriptions come again, and batches are cut elsewhere, and by how fast all goes: of a stream as short as this that is some tenth.
+  // Descriptions come again, and batches are cut elsewhere, and by how fast all goes: of a stream as short as this that
+  // is some tenth.
   EXPECT_LE(pieces.at("bytes_received").get<double>(), 1.25 * whole.at("bytes_received").get<double>());
 }
 

@@ -1,5 +1,6 @@
-// Bytes as what says where a server is and who may come in. The first byte picks: a tokens file; a pattern and a name; the headers Authorization and
-// Sec-WebSocket-Protocol; an origin, a host and one origin that is allowed; a client's URL. What has several parts has them a line each.
+// Bytes as what says where a server is and who may come in. The first byte picks: a tokens file; a pattern and a name;
+// the headers Authorization and Sec-WebSocket-Protocol; an origin, a host and one origin that is allowed; a client's
+// URL. What has several parts has them a line each.
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// Bytes as an HTTP request. The first two bytes pick the server's state, who asks, and how; then, a line each: the target, Host, Accept-Encoding,
-// If-None-Match, and the name of a data set.
+// Bytes as an HTTP request. The first two bytes pick the server's state, who asks, and how; then, a line each: the
+// target, Host, Accept-Encoding, If-None-Match, and the name of a data set.
 #include <algorithm>
 #include <array>
 #include <cctype>

@@ -7,7 +7,8 @@
 
 namespace {
 
-// Files made by this very program must be read: else the stand-ins for checksum and compression no longer fit the format, and nothing is tested.
+// Files made by this very program must be read: else the stand-ins for checksum and compression no longer fit the
+// format, and nothing is tested.
 bool reads_its_own() {
   for (const auto& v : intervale::testing::small_volumes()) {
     const auto decoded = intervale::decode_ivm(intervale::encode_ivm(v), "seed");

@@ -1,5 +1,5 @@
-// Bytes as a batch of updates. The first byte picks the volume, the second how far its client has come and whether there is a budget; the rest is the
-// batch.
+// Bytes as a batch of updates. The first byte picks the volume, the second how far its client has come and whether
+// there is a budget; the rest is the batch.
 #include <cstdio>
 #include <cstdlib>
 

@@ -20,7 +20,8 @@ inline void require(bool holds, const char* law) {
   std::abort();
 }
 
-// Exactly `count` strings: what stands before each line break, the last with all that is left. Those that are not there are empty.
+// Exactly `count` strings: what stands before each line break, the last with all that is left. Those that are not there
+// are empty.
 inline std::vector<std::string> lines_of(const std::uint8_t* data, std::size_t size, std::size_t count) {
   std::string_view rest(reinterpret_cast<const char*>(data), size);
   std::vector<std::string> lines(count);

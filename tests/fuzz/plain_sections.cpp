@@ -1,6 +1,6 @@
-// Stands before libxxhash and libzstd in the programs that fuzz the file format: every checksum is 0 and every compressed section is its own
-// contents. No mutation passes a real checksum, and few a real zstd frame; with these the fuzzer reaches what the reader does with contents that
-// cannot be trusted.
+// Stands before libxxhash and libzstd in the programs that fuzz the file format: every checksum is 0 and every
+// compressed section is its own contents. No mutation passes a real checksum, and few a real zstd frame; with these the
+// fuzzer reaches what the reader does with contents that cannot be trusted.
 #include <xxhash.h>
 #include <zstd.h>
 

@@ -9,7 +9,8 @@
 
 namespace intervale::testing {
 
-// Three volumes: a cube that nothing clamps, a box that clamps on every axis, and a flat one whose range is a single value.
+// Three volumes: a cube that nothing clamps, a box that clamps on every axis, and a flat one whose range is a single
+// value.
 inline const std::vector<IntervalVolume>& small_volumes() {
   static const std::vector<IntervalVolume> all = [] {
     const std::vector<std::array<std::int32_t, 3>> dims{{5, 5, 5}, {4, 7, 6}, {2, 6, 3}};

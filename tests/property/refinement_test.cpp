@@ -26,7 +26,8 @@ struct Trial {
   std::string text;
 };
 
-// A volume of random shape and kind with a random range: finite, infinite, equal, equal to samples, or one that misses the field.
+// A volume of random shape and kind with a random range: finite, infinite, equal, equal to samples, or one that misses
+// the field.
 Trial random_trial(unsigned seed) {
   std::mt19937 random(seed);
   const auto side = [&] { return std::int32_t(2 + random() % 12); };

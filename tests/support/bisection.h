@@ -1,5 +1,5 @@
-// Longest-edge bisection, the naive way: tetrahedra one by one, split at the middle of their longest edge. What the table of diamonds must agree
-// with.
+// Longest-edge bisection, the naive way: tetrahedra one by one, split at the middle of their longest edge. What the
+// table of diamonds must agree with.
 #pragma once
 
 #include <algorithm>
@@ -56,7 +56,8 @@ inline std::vector<Tet> coarsest(int n) {
   return tets;
 }
 
-// All diamonds of the grid of (2^levels + 1)^3 vertices, by twice their centres: those with whole centres, and the leaves' with half ones.
+// All diamonds of the grid of (2^levels + 1)^3 vertices, by twice their centres: those with whole centres, and the
+// leaves' with half ones.
 inline std::map<Point, NaiveDiamond> bisect(int levels) {
   std::map<Point, NaiveDiamond> all;
   const int n = 1 << levels;

@@ -14,8 +14,9 @@
 
 namespace intervale::testing {
 
-// The first law that a mesh breaks, or an empty text: every point is used and there once, tetrahedra are positive (or flat where flat_may_be), every
-// face is in one or two tetrahedra, and one that is in one lies on alpha, on beta or on a side of the sampled box: anything else is a crack.
+// The first law that a mesh breaks, or an empty text: every point is used and there once, tetrahedra are positive (or
+// flat where flat_may_be), every face is in one or two tetrahedra, and one that is in one lies on alpha, on beta or on
+// a side of the sampled box: anything else is a crack.
 inline std::string broken_law(const Mesh& mesh, const Grid& grid, bool flat_may_be = false) {
   std::set<std::array<double, 4>> places;
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {

@@ -8,8 +8,9 @@
 
 namespace intervale {
 
-// Passes connections on to 127.0.0.1:port, one after the other. After each piece that came from the server, and before it is passed on, on_bytes is
-// called with the count of this connection's bytes so far, on the relay's thread; false cuts it.
+// Passes connections on to 127.0.0.1:port, one after the other. After each piece that came from the server, and before
+// it is passed on, on_bytes is called with the count of this connection's bytes so far, on the relay's thread; false
+// cuts it.
 class Relay {
  public:
   Relay(std::uint16_t port, std::function<bool(std::uint64_t)> on_bytes);

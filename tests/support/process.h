@@ -26,7 +26,8 @@ class Process {
   [[nodiscard]] int id() const { return pid_; }  // while it runs
   void signal(int number) const;
 
-  // Reads what the program says on stderr until `text` is among it; what was said so far, or nothing if the program ended or took longer than 60 s.
+  // Reads what the program says on stderr until `text` is among it; what was said so far, or nothing if the program
+  // ended or took longer than 60 s.
   std::optional<std::string> wait_for(const std::string& text);
 
   // Until the program ends; a program that takes longer than 120 s is killed.

@@ -36,7 +36,8 @@ inline std::vector<Vector> points_on(const Triangles& triangles, int count, std:
   return points;
 }
 
-// The square of the distance to one triangle: to its plane's nearest point if that is inside, else to the nearest of its edges.
+// The square of the distance to one triangle: to its plane's nearest point if that is inside, else to the nearest of
+// its edges.
 inline double square_distance(const Vector& p, const std::array<Vector, 3>& triangle) {
   const Vector n = cross(minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0]));
   const double nn = dot(n, n);
@@ -54,7 +55,8 @@ inline double square_distance(const Vector& p, const std::array<Vector, 3>& tria
   return height * height / nn;
 }
 
-// The distance to the nearest of some triangles. They lie in cells of a regular grid, which are gone through from near to far.
+// The distance to the nearest of some triangles. They lie in cells of a regular grid, which are gone through from near
+// to far.
 class SurfaceDistance {
  public:
   explicit SurfaceDistance(const Triangles& triangles) : triangles_(triangles) {

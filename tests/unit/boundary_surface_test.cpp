@@ -232,7 +232,8 @@ TEST_P(BoundarySurfaceOf, CutsAddUpToTheVolume) {
   }
 }
 
-// A side of a section's triangle is drawn exactly if it is one of the cut tetrahedron's, and not a diagonal of a quadrilateral.
+// A side of a section's triangle is drawn exactly if it is one of the cut tetrahedron's, and not a diagonal of a
+// quadrilateral.
 TEST_P(BoundarySurfaceOf, CutsDrawTheSidesOfTheirPolygons) {
   auto client = StreamClient::start(volume->description());
   ASSERT_TRUE(client);

@@ -87,7 +87,8 @@ TEST_P(Budgets, NoMeshOnTheWayIsLarger) {
   EXPECT_EQ(all.shown_count(), all.split_count());
 }
 
-// A client with little room looks around, while batches are under way that were made before the server knew what it gave up.
+// A client with little room looks around, while batches are under way that were made before the server knew what it
+// gave up.
 TEST_P(Budgets, WhatIsForgottenIsForgottenAtBothEnds) {
   const auto volume = std::make_shared<const IntervalVolume>(volume_);
   const Grid& g = volume->description().grid;

@@ -1,4 +1,5 @@
-// The floors of the house: a folder includes only itself and folders of lower floors. This table is the one statement of it.
+// The floors of the house: a folder includes only itself and folders of lower floors. This table is the one statement
+// of it.
 #include <gtest/gtest.h>
 
 #include <algorithm>

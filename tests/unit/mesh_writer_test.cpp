@@ -24,7 +24,8 @@ namespace {
 using Triangle = std::array<std::uint32_t, 3>;
 using Point = std::array<double, 3>;
 
-// A block of n^3 cubes, each of six positive tetrahedra around its diagonal; points shifted far from the origin and a little shaken.
+// A block of n^3 cubes, each of six positive tetrahedra around its diagonal; points shifted far from the origin and a
+// little shaken.
 Mesh block(std::uint32_t n, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> shake(-0.1, 0.1);
@@ -97,7 +98,8 @@ struct Vtk {
   std::map<std::string, std::size_t> counts;
 };
 
-// What stands between `before` and `after`, at every place where `before` occurs. (g++ 12 warns about std::regex under sanitizers.)
+// What stands between `before` and `after`, at every place where `before` occurs. (g++ 12 warns about std::regex under
+// sanitizers.)
 std::vector<std::string> between(const std::string& text, const std::string& before, char after) {
   std::vector<std::string> found;
   for (auto at = text.find(before); at != text.npos; at = text.find(before, at + 1)) {
@@ -136,7 +138,8 @@ std::string from_zlib(std::string_view compressed, std::size_t size) {
   return bytes;
 }
 
-// An inline array, read as vtkXMLDataParser reads it: a table of sizes in base64, then all blocks together as base64 of their own.
+// An inline array, read as vtkXMLDataParser reads it: a table of sizes in base64, then all blocks together as base64 of
+// their own.
 std::string read_inline_array(const std::string& text) {
   const auto number = [](const std::string& bytes, std::size_t i) {
     std::uint64_t value = 0;

@@ -215,7 +215,8 @@ TEST(Nrrd, AGzipBitFlippedIsNoticed) {
   }
 }
 
-// Nothing but a volume or one line may come of any header: run under the address sanitizer this is the test of teem's parser as well.
+// Nothing but a volume or one line may come of any header: run under the address sanitizer this is the test of teem's
+// parser as well.
 TEST(Nrrd, SurvivesDamagedHeaders) {
   const TempDir folder;
   const auto seed = std::random_device{}();

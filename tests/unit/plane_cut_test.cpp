@@ -56,7 +56,8 @@ double area(const std::vector<TetCut>& cuts) {
   return sum;
 }
 
-// Every cut is a proper polygon in the plane, convex and counterclockwise from the normal's side, within its tetrahedron's edges.
+// Every cut is a proper polygon in the plane, convex and counterclockwise from the normal's side, within its
+// tetrahedron's edges.
 void expect_proper(const std::vector<TetCut>& cuts, const Plane& plane) {
   for (const TetCut& cut : cuts) {
     ASSERT_TRUE(cut.count == 3 || cut.count == 4) << int(cut.count);

@@ -54,7 +54,8 @@ TEST(Prediction, ResidualsGiveBackTheCutsOfAField) {
   });
 }
 
-// Residuals may come from outside: whatever they are, and whatever a context holds, they are the residuals of the cuts that they give.
+// Residuals may come from outside: whatever they are, and whatever a context holds, they are the residuals of the cuts
+// that they give.
 TEST(Prediction, AnyResidualsGiveCutsThatGiveThemBack) {
   std::mt19937 random(7);
   for (int round = 0; round < 20000; ++round) {

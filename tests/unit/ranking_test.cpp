@@ -149,7 +149,8 @@ TEST_P(Ranks, WantedIsWhatTheNaiveModelWants) {
   EXPECT_GT(wanted, 100u);
 }
 
-// What it is all for: no surface point in the picture is left further off than asked for, by any update that is not wanted.
+// What it is all for: no surface point in the picture is left further off than asked for, by any update that is not
+// wanted.
 TEST_P(Ranks, WhatIsNotWantedDoesNotShow) {
   const Grid& g = volume_.description().grid;
   for (int trial = 0; trial < 20; ++trial) {

@@ -78,7 +78,8 @@ TEST(Samples, AreTheSameEveryTime) {
   for (const auto name : sample_names()) EXPECT_EQ(make_sample(name, 33)->bytes, make_sample(name, 33)->bytes) << name;
 }
 
-// Above the bonds' 150 the atoms lie apart, sixty of them; from 128 on the bonds join them into one cage around an empty middle.
+// Above the bonds' 150 the atoms lie apart, sixty of them; from 128 on the bonds join them into one cage around an
+// empty middle.
 TEST(Samples, BuckyballHasSixtyAtomsJoinedIntoOneCage) {
   const auto volume = make_sample("buckyball", 129);
   ASSERT_TRUE(volume);

@@ -61,7 +61,8 @@ TEST_P(Views, NothingInThePictureShowsLarger) {
       if (!naive.shows(p) || naive.depth(p) < 1e-3 * 0.5) continue;  // nothing is taken to be nearer than a thousandth of the least spacing
       ++seen;
       EXPECT_LE(naive.pixels_per_unit(p), pixels * (1 + 1e-9)) << "trial " << trial;
-      // Across the line of sight that is what the pinhole shows, however far; and along any other line the corners' slant more.
+      // Across the line of sight that is what the pinhole shows, however far; and along any other line the corners'
+      // slant more.
       const double length = naive.depth(p) * testing::uniform(random_, 0, 0.5);
       const Vector any = testing::random_direction(random_), across = testing::unit(testing::cross(naive.ahead(), any));
       EXPECT_LE(naive.pixels_between(p, testing::along(p, length, across)), pixels * length * (1 + 1e-6)) << "trial " << trial;

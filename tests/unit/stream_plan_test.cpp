@@ -148,7 +148,8 @@ TEST_P(Plan, SendsEveryWantedUpdateOnceWhateverViewsFollow) {
   EXPECT_FALSE(plan.next(kBatchBytes));
 }
 
-// Bands of falling error: half of the updates already leave no more than the error that the plain order leaves after a quarter.
+// Bands of falling error: half of the updates already leave no more than the error that the plain order leaves after a
+// quarter.
 TEST_P(Plan, GreatErrorsAreSentEarly) {
   const auto volume = volume_of_seed(GetParam());
   const auto order = in_order(*volume, select(*volume, {}), {});

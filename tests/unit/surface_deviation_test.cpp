@@ -61,7 +61,8 @@ std::vector<Crossing> crossings_of(const Volume& v, const Range& range) {
   std::vector<Crossing> all;
   const Domain domain(v.grid.dims);
   const Vertex last = domain.last();
-  // The edges, each once: of all tetrahedra that the bisection of the smallest box with everything else around ends with, seen from every sample.
+  // The edges, each once: of all tetrahedra that the bisection of the smallest box with everything else around ends
+  // with, seen from every sample.
   using testing::Point;
   std::set<std::array<Point, 2>> edges;
   for (const auto& [doubled, diamond] : testing::bisect(2)) {

@@ -92,7 +92,8 @@ TEST(TetCases, EveryTetrahedronIsPositiveWhateverTheCuts) {
   }
 }
 
-// Each triangle of the patch is in two of its tetrahedra, or lies in a face of the tetrahedron or on one of the surfaces.
+// Each triangle of the patch is in two of its tetrahedra, or lies in a face of the tetrahedron or on one of the
+// surfaces.
 TEST(TetCases, APatchIsClosed) {
   std::mt19937 random(7);
   for (int i = 0; i < 20000; ++i) {

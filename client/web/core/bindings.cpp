@@ -1,7 +1,8 @@
-// The client core as the browser's worker sees it: bytes of messages in, bytes of messages and buffers to draw from out. No I/O but for the meshes
-// that are to be saved, which are written to files in memory.
+// The client core as the browser's worker sees it: bytes of messages in, bytes of messages and buffers to draw from
+// out. No I/O but for the meshes that are to be saved, which are written to files in memory.
 //
-// Texts that are returned say what went wrong; empty ones, that nothing did. Buffers that are returned are the caller's.
+// Texts that are returned say what went wrong; empty ones, that nothing did. Buffers that are returned are the
+// caller's.
 #include <emscripten/bind.h>
 #include <emscripten/val.h>
 

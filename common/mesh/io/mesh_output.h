@@ -21,7 +21,8 @@ namespace intervale {
 
 static_assert(std::endian::native == std::endian::little, "every binary mesh format here is little endian and written as the machine holds it");
 
-// What the writer of a format writes to. The first error is kept and everything after it ignored, so that the writer need not look.
+// What the writer of a format writes to. The first error is kept and everything after it ignored, so that the writer
+// need not look.
 class MeshOutput {
  public:
   // path: for errors. Both outlive the MeshOutput.

@@ -1,4 +1,5 @@
-// glTF 2.0, binary container (Khronos Group, glTF 2.0 Specification, section 4): one buffer, float32 positions, then uint32 indices.
+// glTF 2.0, binary container (Khronos Group, glTF 2.0 Specification, section 4): one buffer, float32 positions, then
+// uint32 indices.
 #include <algorithm>
 #include <limits>
 #include <string>

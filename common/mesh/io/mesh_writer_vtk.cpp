@@ -1,6 +1,7 @@
-// VTK's XML files, format version 1.0 (The VTK User's Guide, 11th edition, "XML File Formats"). Every array lies within its DataArray
-// element: zlib's blocks behind a table of their sizes, both in base64. Appended arrays would need neither base64 nor memory for the
-// compressed array, but Debian 12's ParaView (5.11.0 with libexpat 2.5.0) cannot read them (VTK issue 19258).
+// VTK's XML files, format version 1.0 (The VTK User's Guide, 11th edition, "XML File Formats"). Every array lies within
+// its DataArray element: zlib's blocks behind a table of their sizes, both in base64. Appended arrays would need
+// neither base64 nor memory for the compressed array, but Debian 12's ParaView (5.11.0 with libexpat 2.5.0) cannot read
+// them (VTK issue 19258).
 #include <zlib.h>
 
 #include <algorithm>
@@ -30,13 +31,14 @@ void write_base64(MeshOutput& out, std::span<const std::byte> bytes) {
   out.text({text.data(), size});
 }
 
-// Writes item_at(0) to item_at(count - 1) as an element with these attributes. Holds the compressed array in memory: the table of its
-// blocks' sizes comes first, and the file is written from front to back.
+// Writes item_at(0) to item_at(count - 1) as an element with these attributes. Holds the compressed array in memory:
+// the table of its blocks' sizes comes first, and the file is written from front to back.
 template <class ItemAt>
 void write_array(MeshOutput& out, const std::string& attributes, std::uint64_t count, ItemAt item_at) {
   using Item = decltype(item_at(0));
   constexpr std::uint64_t kItems = kBlockBytes / sizeof(Item);
-  // The number of blocks; the bytes of a whole block; those of the last one, or 0 where it is whole too; then each block's compressed bytes.
+  // The number of blocks; the bytes of a whole block; those of the last one, or 0 where it is whole too; then each
+  // block's compressed bytes.
   std::vector<std::uint64_t> table{(count + kItems - 1) / kItems, kItems * sizeof(Item), count % kItems * sizeof(Item)};
   std::vector<Bytef> compressed;
   std::vector<Item> block;

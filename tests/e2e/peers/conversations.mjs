@@ -1,5 +1,5 @@
-// Conversations of a client that shares no code with ours: any WebSocket of the standard's, npm's ws or a browser's; FlatBuffers written and read by
-// hand. Each throws where it goes otherwise than PROTOCOL.md says.
+// Conversations of a client that shares no code with ours: any WebSocket of the standard's, npm's ws or a browser's;
+// FlatBuffers written and read by hand. Each throws where it goes otherwise than PROTOCOL.md says.
 export const WINDOW = 256 << 10;
 const ENVELOPE = 160;
 const client = { Open: 1, View: 2, Credit: 3 }, server = { Opened: 1, Batch: 2, Done: 3, Fault: 4 };

@@ -1,5 +1,5 @@
-// npm's ws in conversation with a server. talk.mjs PORT DATASET WS, where WS is ws's index.js: status 1 and a line for each that goes otherwise than
-// PROTOCOL.md says.
+// npm's ws in conversation with a server. talk.mjs PORT DATASET WS, where WS is ws's index.js: status 1 and a line for
+// each that goes otherwise than PROTOCOL.md says.
 import { conversations, hold, must } from './conversations.mjs';
 
 const [port, dataset, library] = process.argv.slice(2);
