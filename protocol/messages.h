@@ -50,8 +50,9 @@ struct Have {
   std::vector<SlotGroup> splits;  // at most kMaxHave; keys ascending; only keys and slots are sent
   friend bool operator==(const Have&, const Have&) = default;
 };
+// What the client wants from now on.
 struct View {
-  std::uint64_t epoch = 0;  // greater than that of the previous View
+  std::uint64_t epoch = 0;  // names this view in the answers to it; greater than that of the previous View
   Lod lod;
   std::optional<std::uint64_t> room = {};  // most updates that the client holds; the server sends no more than that
   // Updates that the client forgets: at most kMaxHave; keys ascending; only keys and slots are sent. Both sides apply

@@ -12,9 +12,9 @@ namespace intervale {
 
 // A window of outstanding credit. It is granted again as batches arrive, until the byte budget is used up.
 //
-// The window bounds how many bytes of an old view can still arrive after the view changed. So it follows what the
-// connection carries: twice that, in the least round trip seen plus kSlack. Half of it would keep the connection busy
-// if each byte were granted again at once, but then the window would never find out that the connection carries more.
+// The window bounds how many bytes of an old view can still arrive after the view changed. So it follows the
+// connection: it is twice the bandwidth-delay product, with the session's shortest round trip plus kSlack as the delay.
+// Without the factor 2 it would keep the connection busy too, but could never measure a higher bandwidth.
 class CreditWindow {
  public:
   using Clock = std::chrono::steady_clock;

@@ -50,7 +50,7 @@ class RangeEncoder {
     for (int i = count; i-- > 0;) narrow((value >> i & 1) != 0 ? range_ >> 1 : 0, (value >> i & 1) != 0 ? range_ - (range_ >> 1) : range_ >> 1);
     return value;
   }
-  // Comes back with the bytes, a multiple of four. Call it once, last.
+  // Returns the bytes, a multiple of four. Call it once, last.
   [[nodiscard]] std::vector<std::uint8_t> finish();
 
  private:

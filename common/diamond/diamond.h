@@ -2,10 +2,10 @@
 //
 // Kenneth Weiss and Leila De Floriani, "Multiresolution Interval Volume Meshes", 2008, sections 4 and 5.
 //
-// Vertices are integers in [0, 2^N]^3. Every vertex but the 8 corners is the centre of exactly one diamond: all
-// tetrahedra that share one longest edge (the spine), whose midpoint the centre is. Scale, class and type follow from
-// the bits of the centre, and everything around it (vertices, tetrahedra, parents, children) is the type's row of one
-// table of offsets, times h = 2^scale. The 56 rows are computed by the compiler from the rule in diamond.cpp.
+// Vertices are integers in [0, 2^N]^3. A diamond is all tetrahedra that share one longest edge, the spine; its centre
+// is the midpoint of the spine. Every vertex but the 8 corners is the centre of exactly one diamond. Scale, class and
+// type follow from the bits of the centre. The vertices, parents and children are offsets from the centre: the type's
+// row of one table, times h = 2^scale. The compiler computes the 56 rows from the rule in diamond.cpp.
 #pragma once
 
 #include <array>

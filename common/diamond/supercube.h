@@ -3,7 +3,7 @@
 // Kenneth Weiss and Leila De Floriani, "Supercubes: A High-Level Primitive for Diamond Hierarchies", 2009. The 56 types
 // of diamonds of one scale that share the centre's higher bits, centre >> (scale + 2), form one supercube. A set of
 // diamonds holds, for each supercube that is not empty, its name and one word of occupancy; counting bits gives each
-// diamond its number.
+// diamond its number. Up to 64 supercubes form a brick.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@
 
 namespace intervale {
 
-// A diamond's place in its supercube: 0..7 class 0, 8..31 class 1, 32..55 class 2, so that parents come before
-// children.
+// A slot is a diamond's number in its supercube: 0..7 class 0, 8..31 class 1, 32..55 class 2, so that parents come
+// before children.
 inline constexpr int kSlots = 56;
 extern const std::array<std::uint8_t, kSlots> kTypeOfSlot;
 extern const std::array<std::uint8_t, 64> kSlotOfType;

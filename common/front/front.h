@@ -1,5 +1,5 @@
-// The mesh that is refined and coarsened, and its front: the unsplit diamonds that the split ones leave. It needs no
-// field.
+// The current mesh, as a front of diamonds: the unsplit ones with at least one split parent, at first the root. Splits
+// refine it and merges coarsen it (Weiss and De Floriani 2008, section 7). It needs no field.
 //
 // FrontState holds the data, FrontCursor looks at single diamonds, FrontMesher makes the mesh; Front changes the state
 // and keeps its invariants.
@@ -96,7 +96,7 @@ class Front {
   // them. O(front).
   [[nodiscard]] bool coarsen_to(const Front& coarse);
 
-  // Checks every invariant; comes back with the first violation. For tests; O(front).
+  // Checks every invariant; returns the first violation. For tests; O(front).
   [[nodiscard]] std::optional<std::string> validate() const;
 
   // The updates of one supercube: fills updates[slot] for the group's slots, at least. Called from many threads if

@@ -1,5 +1,5 @@
-// The mesh of a front, supercube by supercube: the halves that split diamonds leave to children that are not split,
-// each cut into its patch.
+// The mesh of a front, supercube by supercube: the duets (paper, section 7) of split diamonds with children that are
+// not split. Each tetrahedron of a duet is half of one of the parent's, and contributes its patch.
 //
 // The tetrahedra that a supercube's splits leave stay the same until splits in it, or children of them, are shown or
 // hidden. So a mesh that changes is updated by those supercubes alone. Points keep their ids, too, until

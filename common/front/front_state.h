@@ -1,4 +1,4 @@
-// What a front consists of: the split diamonds by supercube, their cuts, and how many there are.
+// The data of a front: the split diamonds by supercube, their cuts, and counts.
 //
 // Weiss and De Floriani 2008, sections 6 and 7. In the paper each diamond of the front holds its vertices and edges,
 // and a split hands each child its duet. Here what a split brought (the side of the centre, the cuts on the subdivision
@@ -39,8 +39,8 @@ using PointId = std::uint32_t;
 
 // Numbers of the neighbours of one supercube that were found before; it fills up while readers look. Thread rule: any
 // number of threads may read and store at the same time while no block is added or removed. An entry is one word that
-// is loaded and stored atomically (relaxed), all threads store the same value, and who does not see it yet searches
-// again; nothing else is published by it.
+// is loaded and stored atomically (relaxed), all threads store the same value, and a thread that does not see it
+// yet searches again; nothing else is published by it.
 class NeighbourCache {
  public:
   static constexpr std::uint32_t kUnknown = 0;

@@ -1,10 +1,10 @@
 // Sigma: a compact multiresolution interval volume. Updates only, no field; immutable, shared by all that read it.
 //
-// Weiss and De Floriani 2008, section 6. For each relevant diamond it holds what splitting it takes: the side of its
-// centre and the cuts on its subdivision edges, and the saturated error that says when. The paper spends 12 bytes on
-// each and one on each cut; here supercubes (supercube.h) replace the coordinates and the pointer. Sides and cuts are
-// stored as residuals from what the diamond itself predicts (prediction.h): no larger in memory, and ready for file and
-// wire.
+// Weiss and De Floriani 2008, section 6. For each relevant diamond it holds an update: the side of the centre, the cuts
+// on the subdivision edges, and the saturated error, which tells whether a level of detail needs the update. The paper
+// stores 12 bytes for each update and one for each cut; here supercubes (supercube.h) replace the coordinates and the
+// pointer. Sides and cuts are stored as residuals of the prediction from the diamond itself (prediction.h): they take
+// the same memory, and files and messages need no other form.
 #pragma once
 
 #include <algorithm>
@@ -27,9 +27,9 @@ namespace intervale {
 
 // Converts errors to distances: how far the surfaces can still move, in world units, for each unit of field error. One
 // byte a supercube, a logarithmic code rounded up; 0: nothing moves. Most distances are also bounded by the width of
-// the diamond; their codes are sixths of an octave, and the last one has no other bound. Where a speck has no patch and
-// the next one is far, the bound is kMaxFarDeviation instead of the diamond's width; those codes are halves of an
-// octave, and the last one has no other bound.
+// the diamond; their codes are sixths of an octave, and the last one has no other bound. For surface points far from
+// every patch of the coarse mesh (small separate pieces), the bound is kMaxFarDeviation instead of the diamond's width;
+// those codes are halves of an octave, and the last one has no other bound.
 class ErrorToDistance {
  public:
   ErrorToDistance() = default;
@@ -101,9 +101,9 @@ class IntervalVolume {
   [[nodiscard]] static std::uint8_t half_of_step(unsigned step) { return std::uint8_t(step / 2); }
   // No lower than the argument of half_of_step(), and higher by one at most.
   [[nodiscard]] unsigned step_of_half(std::uint8_t half) const { return std::min(2u * half + 1, unsigned(error_steps_.size()) - 1); }
-  // Half of how far the surfaces can still move, in world units, where an update's diamond is refined to the end:
-  // hardly anything moves further than this, and nothing twice as far, as far as is known. It depends on the update's
-  // supercube, that one's scale, and the update's error step, with which it grows. Not saturated.
+  // How far the surfaces can still move, in world units, while an update's diamond is refined completely. An estimate:
+  // 99 % of the surface should move no further, and nothing more than twice as far (FORMAT.md, "From errors to
+  // distances"). It depends on the update's supercube and scale, and grows with the error step. Not saturated.
   [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned step) const {
     const ErrorToDistance to_distance = error_to_distance_[supercube];
     const float distance = error_steps_[step] * factor_[to_distance.code()];

@@ -11,7 +11,7 @@
 
 namespace intervale {
 
-enum class Refine : std::uint8_t { boundary = 0, uniform = 1 };  // which diamonds count; see relevance.h
+enum class Refine : std::uint8_t { boundary = 0, uniform = 1 };  // which diamonds are relevant; see relevance.h
 
 // The closed range of values kept, alpha <= beta; either may be infinite.
 struct Range {

@@ -9,7 +9,7 @@
 
 namespace intervale {
 
-// R(v): below alpha, in [alpha, beta], above beta.
+// R(v) of the paper, section 2, there -1, 0 and 1: below alpha, in [alpha, beta], above beta.
 enum class Side : std::uint8_t { below = 0, inside = 1, above = 2 };
 
 [[nodiscard]] constexpr Side side_of(double value, const Range& range) {
@@ -21,8 +21,8 @@ enum class Side : std::uint8_t { below = 0, inside = 1, above = 2 };
 [[nodiscard]] constexpr bool beta_cuts(Side a, Side b) { return (a == Side::above) != (b == Side::above); }
 [[nodiscard]] constexpr int cut_count(Side a, Side b) { return a > b ? int(a) - int(b) : int(b) - int(a); }
 
-// The cuts on one edge, alpha before beta, as steps of 1/256 of the edge from its first end: the cut lies at (q + 0.5)
-// / 256.
+// The cuts on one edge, alpha before beta. A cut q lies at (q + 0.5) / 256 of the edge from its first end. On a
+// subdivision edge, whose first end is the centre, this fraction is the paper's coefficient gamma (section 7).
 struct Cuts {
   std::uint8_t count = 0;
   std::uint8_t q[2] = {0, 0};

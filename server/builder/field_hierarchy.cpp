@@ -198,7 +198,8 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
   });
 }
 
-// Raises each error to the largest of its relevant children.
+// Raises each error to at least those of the diamond's relevant children. So the diamonds with an error above any
+// threshold include all their ancestors, and form a conforming mesh (paper, section 3: Gerstner and Pajarola).
 void FieldHierarchy::saturate(std::vector<float>& errors) const {
   for (int scale = 0; scale < domain_.levels(); ++scale) {
     const auto [begin, end] = set_.of_scale(scale);

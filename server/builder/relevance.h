@@ -1,4 +1,8 @@
-// Which diamonds are relevant to a range: those that count (see Refine), and those with a relevant child.
+// Which diamonds are relevant to a range (Weiss and De Floriani 2008, section 6).
+//
+// With Refine::uniform, as in the paper: those with a vertex or centre inside the range, or with some below and some
+// above it, and their ancestors. With Refine::boundary (the criterion of the paper's section 8): those whose vertices
+// and centre do not all lie on one side, and their ancestors.
 //
 // Sides take two bits a sample. At each scale, the sides at multiples of h and the results are rows of bits along x,
 // and 64 diamonds of a row are judged at once: which vertices a diamond has depends only on which of its coordinates

@@ -5,9 +5,9 @@
 // In a coarser tetrahedron's interpolant such a point has another value. That difference divided by the length of the
 // interpolant's gradient is, to first order, the point's distance from the coarse patch; nothing between the corners is
 // further away. Where neither the tetrahedron nor its diamond has a patch, the distance is the diamond's width; or, for
-// a speck far from any other surface, that of the next coarser diamond that has a patch: its corners are in every finer
-// mesh, on both sides of the surface. Points descend the bisection with their barycentric coordinates, of which each
-// step changes two.
+// a small piece far from any other surface, the width of the finest coarser diamond that has a patch: its corners are
+// in every finer mesh, on both sides of the surface. Points descend the bisection with their barycentric coordinates,
+// of which each step changes two.
 //
 // That bounds the distance from the full mesh to the coarse one. In the other direction, tips of thin pieces slide
 // along an edge and stay near the plane all the while. Such an edge is the spine of the diamond that splits it, so that
@@ -25,7 +25,7 @@ namespace intervale {
 
 struct SurfaceDeviation {
   // By update: the largest deviation of any surface point in its diamond, not saturated. For diamonds of coarse scales,
-  // and those with tetrahedra that the border moves: their width. More than the width where a speck has no patch.
+  // and those with tetrahedra that the border moves: their width. More than the width where a small piece has no patch.
   std::vector<float> largest;
   // By supercube: the mean over the surface points in its tetrahedra; 0 if it was not measured.
   std::vector<float> mean;

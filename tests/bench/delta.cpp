@@ -66,7 +66,7 @@ class TypedDelta final : public Delta {
  private:
   // Of one diamond. Together, so that a query finds all it tests in one place.
   struct Node {
-    float error = -1;  // saturated: no smaller than any child's; -1: there is no diamond, or it is idle
+    float error = -1;  // saturated: no smaller than any child's; -1: there is no diamond, or its split is a no-op
     T min{}, max{};    // over the diamond's vertices and centre, and over those of all that descend from it
   };
   using Index = std::uint32_t;  // of a node: the centre's sample; centres beyond the box come after all samples

@@ -1,4 +1,4 @@
-// Laws of the front: the mesh depends only on which diamonds are split, and merging undoes splitting.
+// Properties of the front: the mesh depends only on which diamonds are split, and merging undoes splitting.
 #include "common/front/front.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Laws of the mesh at any level of detail, of any range, on boxes of any shape.
+// Properties of the mesh at any level of detail, of any range, on boxes of any shape.
 #include <gtest/gtest.h>
 
 #include <limits>

@@ -1,4 +1,4 @@
-// Laws of what a camera gets: on its screen the mesh is as far from the full one as was asked for, and no further.
+// Properties of a camera's mesh: on its screen it deviates from the full mesh by no more than was asked for.
 #include "common/view/screen_error.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What every mesh must be, checked the slow and plain way.
+// Invariants of every mesh, checked in the simplest way, however slow.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace intervale::testing {
 
-// The first law that a mesh breaks, or an empty text: every point is used and there once, tetrahedra are positive (or
+// The first invariant that a mesh breaks, or an empty text: every point is used and unique, tetrahedra are positive (or
 // flat where flat_may_be), every face is in one or two tetrahedra, and one that is in one lies on alpha, on beta or on
 // a side of the sampled box: anything else is a crack.
 inline std::string broken_law(const Mesh& mesh, const Grid& grid, bool flat_may_be = false) {

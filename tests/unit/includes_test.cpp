@@ -1,5 +1,4 @@
-// The floors of the house: a folder includes only itself and folders of lower floors. This table is the one statement
-// of it.
+// The layers of the code: a folder includes only itself and folders of lower layers. kFloors is the only list of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
