@@ -13,6 +13,7 @@
 #include <bit>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include "common/diamond/diamond.h"
@@ -76,7 +77,7 @@ inline constexpr int kOriginScale = 32;  // scale_of((0, 0, 0)): that corner of 
 
 // Looks up the neighbours of one supercube at a time, each at most once until it moves. Finder says how supercubes are
 // found:
-//   Found                      what is known of one
+//   Found                      what is known of one; a pointer is never null
 //   void move_to(scale, position)
 //   Found find(where, place)   of the neighbour `where` of the supercube last moved to; place: its scale and position.
 //                              Not called for places with negative coordinates
@@ -102,7 +103,11 @@ class SupercubeNeighbours {
     scale_ = scale;
     position_ = position;
     links_ = &link_table()[parity_of(position)];
-    known_ = {};
+    if constexpr (kIsPointer) {
+      found_.fill(nullptr);
+    } else {
+      known_ = {};
+    }
     finder_.move_to(scale, position);
   }
   [[nodiscard]] int scale() const { return scale_; }
@@ -114,7 +119,7 @@ class SupercubeNeighbours {
 
   // Valid until it moves.
   [[nodiscard]] const Found& at(int where) {
-    if (!(known_[std::size_t(where) / 64] >> (where % 64) & 1)) look_up(where);
+    if (!is_known(where)) look_up(where);
     return found_[std::size_t(where)];
   }
   struct Diamond {
@@ -128,16 +133,27 @@ class SupercubeNeighbours {
   // Replaces what was found of the supercube itself, which has since come into being.
   void set_here(const Found& found) {
     finder_.set_here(found);
-    known_[0] |= std::uint64_t(1) << kHere;
-    found_[kHere] = found;
+    keep(kHere, found);
   }
 
  private:
   void look_up(int where) {
-    known_[std::size_t(where) / 64] |= std::uint64_t(1) << (where % 64);
     const SupercubePlace place = neighbour_at(where, scale_, position_);
     corner_slot_[std::size_t(where)] = std::uint8_t(place.slot);
-    found_[std::size_t(where)] = place.exists() ? finder_.find(where, place) : finder_.none();
+    keep(where, place.exists() ? finder_.find(where, place) : finder_.none());
+  }
+  // A pointer is null until it is looked up: one load fewer on the front's hottest path. Any other Found has a bit.
+  static constexpr bool kIsPointer = std::is_pointer_v<Found>;
+  [[nodiscard]] bool is_known(int where) const {
+    if constexpr (kIsPointer) {
+      return found_[std::size_t(where)] != nullptr;
+    } else {
+      return (known_[std::size_t(where) / 64] >> (where % 64) & 1) != 0;
+    }
+  }
+  void keep(int where, const Found& found) {
+    if constexpr (!kIsPointer) known_[std::size_t(where) / 64] |= std::uint64_t(1) << (where % 64);
+    found_[std::size_t(where)] = found;
   }
 
   Finder finder_;
@@ -145,7 +161,7 @@ class SupercubeNeighbours {
   int scale_ = 0;
   Vertex position_;
   const std::array<Links, kSlots>* links_ = nullptr;
-  std::array<std::uint64_t, 2> known_{};  // a bit for each neighbour looked up
+  std::array<std::uint64_t, 2> known_{};  // a bit for each neighbour looked up; unused for pointers
   std::array<Found, kNeighbours> found_{};
   std::array<std::uint8_t, kNeighbours> corner_slot_{};  // of a corner's vertex; 0 elsewhere
 };

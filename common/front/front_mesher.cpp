@@ -6,6 +6,13 @@
 #include "common/util/bits.h"
 
 namespace intervale {
+namespace {
+
+struct OwnIds {  // numbers points by their ids
+  PointId operator[](PointId id) const { return id; }
+};
+
+}  // namespace
 
 FrontMesher::Corners FrontMesher::corners_of(const TetShape& s) {
   Corners corners;
@@ -87,7 +94,18 @@ void FrontMesher::append_removed_runs(std::size_t number, std::vector<Run>& runs
   }
 }
 
-void FrontMesher::append(const Output& out, std::size_t number) const {
+// The patch of one tetrahedron. Inline: it is the innermost loop of making a mesh.
+inline void FrontMesher::append_patch(std::vector<Tet>& tets, const TetShape& shape, const Corners& corners, std::uint32_t sides,
+                                      const PointsAround& points) const {
+  const auto patch = cases_.tets(shape.order, shape_sides(shape, sides));
+  const int second = shape.flip ? 3 : 2, third = shape.flip ? 2 : 3;
+  for (const auto& tet : patch) {
+    tets.push_back({points[corners[tet[0]]], points[corners[tet[1]]], points[corners[tet[second]]], points[corners[tet[third]]]});
+  }
+}
+
+template <class Numbers>
+void FrontMesher::append(const Output<Numbers>& out, std::size_t number) const {
   if (state_.is_root_block(block(number))) {
     append_root(out);
     return;
@@ -105,7 +123,8 @@ void FrontMesher::append(const Output& out, std::size_t number) const {
   }
 }
 
-void FrontMesher::append_root(const Output& out) const {
+template <class Numbers>
+void FrontMesher::append_root(const Output<Numbers>& out) const {
   const Diamond root(state_.domain.root());
   FrontCursor cursor(state_);
   cursor.move_to(root);
@@ -114,18 +133,18 @@ void FrontMesher::append_root(const Output& out) const {
   gather_points(cursor, out.numbers, points);
   for (const int t : set_bits(cursor.parts().tets)) {
     const TetShape shape = tet_shape(state_.domain, root, cursor.parts(), t);
-    append_patch(out, shape, corners_of(shape), cursor.context().sides, points);
+    append_patch(out.tets, shape, corners_of(shape), cursor.context().sides, points);
     if (out.halves != nullptr) {
       out.halves->push_back({state_.domain.positions(root, root.row->tet(t)), cursor.context().is_mixed(), out.tets.size()});
     }
   }
 }
 
-void FrontMesher::gather_points(const FrontCursor& cursor, std::span<const std::uint32_t> numbers, PointsAround& points) {
-  const auto number_of = [numbers](PointId id) { return numbers.empty() ? id : numbers[id]; };
+template <class Numbers>
+void FrontMesher::gather_points(const FrontCursor& cursor, const Numbers& numbers, PointsAround& points) {
   const DiamondContext& context = cursor.context();
   for (int v = 0; v < context.row->vertices; ++v) {
-    if (context.has(v) && context.side(v) == Side::inside) points[v] = number_of(cursor.split_of(v).centre());
+    if (context.has(v) && context.side(v) == Side::inside) points[v] = numbers[cursor.split_of(v).centre()];
   }
   if (!context.is_mixed()) return;
   const Links& links = cursor.links();
@@ -135,13 +154,14 @@ void FrontMesher::gather_points(const FrontCursor& cursor, std::span<const std::
     const unsigned surfaces = owner.cuts_to(edge.other);
     if (surfaces == 0) continue;
     PointId id = owner.cut(2 * edge.other);
-    if (surfaces & 1) points[kCutsFrom + 2 * e] = number_of(id++);
-    if (surfaces & 2) points[kCutsFrom + 2 * e + 1] = number_of(id);
+    if (surfaces & 1) points[kCutsFrom + 2 * e] = numbers[id++];
+    if (surfaces & 2) points[kCutsFrom + 2 * e + 1] = numbers[id];
   }
 }
 
 // Of the split diamond that the cursor found last, the halves that it left to some of its children, a bit each.
-void FrontMesher::append_children(const Output& out, FrontCursor& cursor, unsigned children) const {
+template <class Numbers>
+void FrontMesher::append_children(const Output<Numbers>& out, FrontCursor& cursor, unsigned children) const {
   const FrontState::Split& split = cursor.here().of[cursor.slot()];
   const bool is_empty = split.cut_bits() == 0 && split.side() != Side::inside;  // all on one side, and not inside
   if (is_empty && out.halves == nullptr) return;
@@ -150,10 +170,9 @@ void FrontMesher::append_children(const Output& out, FrontCursor& cursor, unsign
   const std::uint32_t sides = cursor.context().sides | std::uint32_t(split.side()) << (2 * kCentre);
   PointsAround points;
   gather_points(cursor, out.numbers, points);
-  const auto number_of = [&out](PointId id) { return out.numbers.empty() ? id : out.numbers[id]; };
   PointId id = split.first;
-  for (const int bit : set_bits(split.cut_bits())) points[kCutsFrom + 2 * kSubdivision + bit] = number_of(id++);
-  if (split.side() == Side::inside) points[kCentre] = number_of(id);
+  for (const int bit : set_bits(split.cut_bits())) points[kCutsFrom + 2 * kSubdivision + bit] = out.numbers[id++];
+  if (split.side() == Side::inside) points[kCentre] = out.numbers[id];
   const auto& corners = half_corners_[cursor.slot()];
   const Ring ring(sides, d.row->belt);
   for (const int k : set_bits(children)) {
@@ -164,10 +183,10 @@ void FrontMesher::append_children(const Output& out, FrontCursor& cursor, unsign
       if (!has_patch && out.halves == nullptr) continue;
       if (parts.straddles && !half_exists(state_.domain, d, half.tet, half.end)) continue;
       if (has_patch && !parts.straddles) {
-        append_patch(out, d.row->half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points);
+        append_patch(out.tets, d.row->half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points);
       } else if (has_patch) {
         const TetShape shape = half_shape(state_.domain, d, parts, half.tet, half.end);
-        append_patch(out, shape, corners_of(shape), sides, points);
+        append_patch(out.tets, shape, corners_of(shape), sides, points);
       }
       if (out.halves == nullptr) continue;
       auto local = d.row->tet(half.tet);
@@ -184,17 +203,16 @@ bool FrontMesher::can_change(Vertex centre) const {
   return cursor.gather(kSlotOfType[d.type]) && !cursor.is_noop() && cursor.context().is_mixed();
 }
 
-// The patch of one tetrahedron.
-void FrontMesher::append_patch(const Output& out, const TetShape& shape, const Corners& corners, std::uint32_t sides,
-                               const PointsAround& points) const {
-  const auto tets = cases_.tets(shape.order, shape_sides(shape, sides));
-  const int second = shape.flip ? 3 : 2, third = shape.flip ? 2 : 3;
-  const std::size_t from = out.tets.size();
-  out.tets.resize(from + tets.size());
-  Tet* to = out.tets.data() + from;
-  for (const auto& tet : tets) {
-    *to++ = {points[corners[tet[0]]], points[corners[tet[1]]], points[corners[tet[second]]], points[corners[tet[third]]]};
+void FrontMesher::append_tets(std::size_t number, std::vector<Tet>& tets, std::span<const std::uint32_t> numbers) const {
+  if (numbers.empty()) {
+    append(Output<OwnIds>{tets, nullptr, {}}, number);
+  } else {
+    append(Output<std::span<const std::uint32_t>>{tets, nullptr, numbers}, number);
   }
+}
+
+void FrontMesher::append_halves(std::size_t number, std::vector<Tet>& tets, std::vector<Half>& halves) const {
+  append(Output<OwnIds>{tets, &halves, {}}, number);
 }
 
 }  // namespace intervale

@@ -58,11 +58,9 @@ class FrontMesher {
   // The points that its shown splits removed: the cuts of the edges that they split.
   void append_removed_runs(std::size_t number, std::vector<Run>& runs) const;
   // Its tetrahedra. numbers: of each point the number that stands for it; if empty, the points' ids.
-  void append_tets(std::size_t number, std::vector<Tet>& tets, std::span<const std::uint32_t> numbers = {}) const {
-    append({tets, nullptr, numbers}, number);
-  }
+  void append_tets(std::size_t number, std::vector<Tet>& tets, std::span<const std::uint32_t> numbers = {}) const;
   // Its tetrahedra, and the halves that they are in, those without any too.
-  void append_halves(std::size_t number, std::vector<Tet>& tets, std::vector<Half>& halves) const { append({tets, &halves, {}}, number); }
+  void append_halves(std::size_t number, std::vector<Tet>& tets, std::vector<Half>& halves) const;
 
   // Whether diamonds of this supercube reach the far faces of the box.
   [[nodiscard]] bool is_at_border(std::size_t number) const;
@@ -75,20 +73,26 @@ class FrontMesher {
   using Corners = std::array<std::uint8_t, kPatchCorners>;
   // Of the halves of all types' tetrahedra
   using HalfCorners = std::array<std::array<std::array<Corners, 2>, kMaxTets>, kSlots>;
+  // Numbers: a point's number, as numbers[id]
+  template <class Numbers>
   struct Output {
     std::vector<Tet>& tets;
     std::vector<Half>* halves;  // may be null
-    std::span<const std::uint32_t> numbers;
+    Numbers numbers;
   };
   static Corners corners_of(const TetShape& s);
   static const HalfCorners& half_corners();
-  static void gather_points(const FrontCursor& cursor, std::span<const std::uint32_t> numbers, PointsAround& points);
+  template <class Numbers>
+  static void gather_points(const FrontCursor& cursor, const Numbers& numbers, PointsAround& points);
 
   [[nodiscard]] bool is_on_border(Vertex v) const;
-  void append(const Output& out, std::size_t number) const;
-  void append_root(const Output& out) const;
-  void append_children(const Output& out, FrontCursor& cursor, unsigned children) const;
-  void append_patch(const Output& out, const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points) const;
+  template <class Numbers>
+  void append(const Output<Numbers>& out, std::size_t number) const;
+  template <class Numbers>
+  void append_root(const Output<Numbers>& out) const;
+  template <class Numbers>
+  void append_children(const Output<Numbers>& out, FrontCursor& cursor, unsigned children) const;
+  void append_patch(std::vector<Tet>& tets, const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points) const;
   [[nodiscard]] bool can_change(Vertex centre) const;
 
   const FrontState& state_;
