@@ -82,7 +82,7 @@ class Viewer {
     stale_ = true;
     const auto event = session_.receive(inbox_, time_of(now));
     event_ = event ? *event : ClientSession::Event();
-    if (event_.is_new_mesh) skin_.emplace(session_.mesh()->front());
+    if (event_.is_new_mesh) surface_.emplace(session_.mesh()->front());
     return text_of(event);
   }
   val take_messages() {
@@ -130,27 +130,27 @@ class Viewer {
     progress.set("updates", updates());
     progress.set("updatesShown", client ? double(client->updates_in_mesh()) : 0.0);
     progress.set("tets", client ? double(client->tet_count()) : 0.0);
-    progress.set("triangles", skin_ ? double(skin_->triangles()) : 0.0);
+    progress.set("triangles", surface_ ? double(surface_->triangles()) : 0.0);
     progress.set("updatesToGo", double(stats.updates_to_go));
     progress.set("remainingError", stats.remaining_error);
     progress.set("remainingPixels", session_.remaining_pixels());
     progress.set("done", done());
     progress.set("full", stats.is_full);
-    progress.set("volume", skin_ ? skin_->volume() : 0.0);
-    progress.set("volumeBound", skin_ ? skin_->volume_bound() : 0.0);
+    progress.set("volume", surface_ ? surface_->volume() : 0.0);
+    progress.set("volumeBound", surface_ ? surface_->volume_bound() : 0.0);
     progress.set("reconnects", double(stats.connections > 0 ? stats.connections - 1 : 0));
     progress.set("repeated", client && stats.updates > client->updates() ? double(stats.updates - client->updates()) : 0.0);
     return progress;
   }
 
-  // A Skin of messages.ts without its version: what changed since the last one, or all of it.
-  val skin(bool edges, bool all) {
+  // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything.
+  val update_surface(bool edges, bool all) {
     stale_ = false;
-    const BoundarySurface::Change change = all ? skin_->all() : skin_->update();
-    val skin = val::object(), pieces = val::array(), removed = val::array();
+    const BoundarySurface::Change change = all ? surface_->all() : surface_->update();
+    val result = val::object(), pieces = val::array(), removed = val::array();
     std::size_t n = 0;
     for (const std::uint32_t id : change.pieces) {
-      const SurfacePiece p = skin_->piece(id, edges);
+      const SurfacePiece p = surface_->piece(id, edges);
       val piece = val::object();
       piece.set("id", p.id);
       piece.set("vertices", buffer_of(p.vertices));
@@ -164,24 +164,24 @@ class Viewer {
     }
     n = 0;
     for (const std::uint32_t id : change.removed) removed.set(n++, id);
-    skin.set("reset", change.reset);
-    skin.set("pieces", pieces);
-    skin.set("removed", removed);
-    return skin;
+    result.set("reset", change.reset);
+    result.set("pieces", pieces);
+    result.set("removed", removed);
+    return result;
   }
 
-  // What is cut and shown one by one fits the last skin: is_stale() must be false.
-  [[nodiscard]] bool is_stale() const { return stale_ || !skin_; }
+  // What is cut and shown one by one fits the last surface: is_stale() must be false.
+  [[nodiscard]] bool is_stale() const { return stale_ || !surface_; }
   // Of a Cap, and of Tets, in messages.ts.
   val cap(const val& plane) const {
-    const auto vertices = cross_section(*skin_, {three(plane["normal"]), plane["offset"].as<double>()});
+    const auto vertices = cross_section(*surface_, {three(plane["normal"]), plane["offset"].as<double>()});
     val cap = val::object();
     cap.set("vertices", buffer_of(vertices));
     cap.set("triangles", double(vertices.size() / 3));
     return cap;
   }
   val tets(const val& box) const {
-    const TetsInBox found = tets_in_box(*skin_, box_of(box), kMostTets);
+    const TetsInBox found = tets_in_box(*surface_, box_of(box), kMostTets);
     val tets = val::object();
     tets.set("vertices", buffer_of(found.vertices));
     tets.set("indices", buffer_of(found.indices));
@@ -208,10 +208,10 @@ class Viewer {
   }
 
   ViewingSession session_;
-  std::optional<BoundarySurface> skin_;
+  std::optional<BoundarySurface> surface_;
   std::vector<std::uint8_t> inbox_;
   ClientSession::Event event_;  // of the last message
-  bool stale_ = true;           // the mesh may have changed since the last skin
+  bool stale_ = true;           // the mesh may have changed since the last surface
 };
 
 }  // namespace
@@ -233,7 +233,7 @@ EMSCRIPTEN_BINDINGS(intervale) {
       .function("faultCode", &Viewer::fault_code)
       .function("dataset", &Viewer::dataset)
       .function("progress", &Viewer::progress)
-      .function("skin", &Viewer::skin)
+      .function("updateSurface", &Viewer::update_surface)
       .function("cap", &Viewer::cap)
       .function("tets", &Viewer::tets)
       .function("save", &Viewer::save)

@@ -1,6 +1,6 @@
 // The client core as the module '@core/core.js': what core/bindings.cpp binds. INTERVALE_CORE_DIR says where it is when
 // the page is built; tsconfig.json gives it these types.
-import type { Box, Cap, Dataset, Plane, Progress, Skin, Tets, View } from './messages';
+import type { Box, Cap, Dataset, Plane, Progress, SurfaceChange, Tets, View } from './messages';
 
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
@@ -17,8 +17,8 @@ export interface Viewer {
   done(): boolean;
   dataset(): Dataset;
   progress(): Omit<Progress, 'skin' | 'memory' | 'busy'>;
-  skin(edges: boolean, all: boolean): Omit<Skin, 'version'>; // all: every piece, not only those that changed
-  isStale(): boolean; // the mesh may have changed since the last skin(): cap() and tets() must not be called
+  updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version'>; // all: every piece, changed or not
+  isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap() and tets() must not be called
   cap(plane: Plane): Pick<Cap, 'vertices' | 'triangles'>;
   tets(box: Box): Omit<Tets, 'box'>;
   save(path: string): ArrayBuffer | string; // the file, in the format of the path's extension; or an error

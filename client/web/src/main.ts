@@ -72,7 +72,7 @@ class Page {
     const { viewer } = this;
     viewer.onShown = (version) => {
       this.worker.send({ type: 'shown', version });
-      status.set({ skinVersion: version });
+      status.set({ surfaceVersion: version });
     };
     viewer.onResize = () => this.updateWorker();
     viewer.onContext = (isLost) => status.set({ notice: isLost ? kContextLost : null });
@@ -156,7 +156,7 @@ class Page {
   }
 
   private open(dataset: ListedDataset): void {
-    status.set({ dataset, skinVersion: 0 });
+    status.set({ dataset, surfaceVersion: 0 });
     this.viewer.open(dataset);
     this.clip.opened();
     this.region.opened();
@@ -195,7 +195,7 @@ function start(): void {
   let viewer: Viewer;
   // First the worker: it loads the core while this thread prepares to draw.
   const worker = new WorkerClient(status, {
-    skin: (skin) => viewer.takeSkin(skin),
+    surface: (change) => viewer.takeSurface(change),
     cap: (cap) => viewer.takeCap(cap),
     tets: (tets) => viewer.takeTets(tets),
     saved: downloadMesh,

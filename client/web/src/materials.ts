@@ -96,7 +96,7 @@ const kAdditive: Parameters = {
 export function surfaceMaterials(): SurfaceMaterials {
   const opacities: Record<SurfaceName, IUniform> = { alpha: { value: 1 }, beta: { value: 1 }, box: { value: 1 } };
   const each = (fragment: string, uniforms: (name: SurfaceName) => Uniforms, parameters: Parameters) =>
-    kSurfaces.map((name) => material(shaders.kSkinVertex, fragment, uniforms(name), parameters));
+    kSurfaces.map((name) => material(shaders.kSurfaceVertex, fragment, uniforms(name), parameters));
   const colorOf = (name: SurfaceName) => ({ color: shared[name] });
   const colorAndOpacityOf = (name: SurfaceName) => ({ color: shared[name], opacity: opacities[name] });
   const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }; // lets edges lie in front
@@ -131,7 +131,7 @@ export const tetsDepthMaterial = () => material(shaders.kTetsVertex, shaders.kTe
 
 // capFacing: see kThicknessFragment.
 export const thicknessMaterial = (capFacing: -1 | 0 | 1) =>
-  material(shaders.kSkinVertex, shaders.kThicknessFragment, { capFacing: { value: capFacing } }, kAdditive);
+  material(shaders.kSurfaceVertex, shaders.kThicknessFragment, { capFacing: { value: capFacing } }, kAdditive);
 
 // For a full-screen pass that is blended over the picture.
 export const compositeMaterial = (fragment: string, uniforms: Uniforms) =>
@@ -141,5 +141,5 @@ export const compositeMaterial = (fragment: string, uniforms: Uniforms) =>
 export const lineMaterial = (depthTest: boolean, opacity: number) =>
   material(shaders.kLineVertex, shaders.kLineFragment, { lineColor: { value: new Vector4(1, 1, 1, opacity) } }, { ...kAlphaBlending, depthTest });
 
-export const distanceMaterial = () => material(shaders.kSkinVertex, shaders.kDistanceFragment, {});
+export const distanceMaterial = () => material(shaders.kSurfaceVertex, shaders.kDistanceFragment, {});
 export const uploadMaterial = () => material(shaders.kUploadVertex, shaders.kUploadFragment, {});

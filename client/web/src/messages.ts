@@ -48,7 +48,7 @@ export type Request =
   | { type: 'clip'; plane: Plane | null }
   | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
   | { type: 'edges'; wanted: boolean } // whether pieces have edges
-  | { type: 'shown'; version: number } // the page shows this version of the skin, so the next may be made
+  | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
   | { type: 'save'; format: 'vtu' | 'stl' | 'glb' }
   | { type: 'digest' } // answered by a report of the same type
   | { type: 'close' };
@@ -67,7 +67,7 @@ export type Report =
   | { type: 'connection'; state: ConnectionState }
   | { type: 'opened'; dataset: Dataset; resumed: boolean } // resumed: the mesh is kept and the stream continues
   | { type: 'progress'; progress: Progress }
-  | { type: 'skin'; skin: Skin }
+  | { type: 'surface'; change: SurfaceChange }
   | { type: 'cap'; cap: Cap }
   | { type: 'tets'; tets: Tets }
   | { type: 'saved'; format: string; name: string; bytes: ArrayBuffer }
@@ -85,12 +85,12 @@ export interface Progress {
   updates: number; // received
   updatesShown: number; // in the mesh: fewer than received where the budget of tetrahedra leaves some out
   tets: number; // of the mesh
-  triangles: number; // of the skin
+  triangles: number; // of the boundary surface
   updatesToGo: number; // upper bound for this view; 0 when done
   remainingError: number; // field units
   remainingPixels: number; // screen-space error, pixels
-  skin: number; // version of the last one sent to the page
-  done: boolean; // all that this view wants was received, and is in that skin
+  skin: number; // version of the last boundary surface sent to the page
+  done: boolean; // all that this view wants was received, and is in that surface
   full: boolean; // the memory budget leaves some updates out
   volume: number; // of the mesh, cubic world units
   volumeBound: number; // the most by which refining the tetrahedra on the surfaces can change the volume
@@ -100,12 +100,12 @@ export interface Progress {
   repeated: number; // updates received more than once; 0 unless the server has a defect
 }
 
-// A part of the skin: the triangles of the mesh's boundary in one part of the data's box. 16 bytes per vertex: x, y, z
-// as float32; the normal in world space as int8 of length 127 (averaged over the triangles of the vertex's own surface,
-// or that of the box's face); the level of detail as uint8: the scale of the triangles around it, 0 the finest.
+// The triangles of the mesh's boundary surface in one part of the data's box. 16 bytes per vertex: x, y, z as float32;
+// the normal in world space as int8 of length 127 (averaged over the triangles of the vertex's own surface, or that of
+// the box's face); the level of detail as uint8: the scale of the triangles around it, 0 the finest.
 // Triangles: three uint32 indices, counterclockwise seen from outside; first those on the alpha surface, then those on
 // beta, then those on the faces of the data's box.
-export interface Piece {
+export interface SurfacePiece {
   id: number;
   vertices: ArrayBuffer;
   indices: ArrayBuffer;
@@ -116,12 +116,12 @@ export interface Piece {
   max: Vec3;
 }
 
-// The change to the next version of the skin: `pieces` replace those of the same ids, and `removed` are deleted. To be
-// shown as a whole, or there would be cracks. A piece without triangles is in `removed`.
-export interface Skin {
+// The change to the next version of the boundary surface: `pieces` replace those of the same ids, and `removed` are
+// deleted. To be shown as a whole, or there would be cracks. A piece without triangles is in `removed`.
+export interface SurfaceChange {
   version: number; // from 1
   reset: boolean; // delete all earlier pieces first
-  pieces: Piece[];
+  pieces: SurfacePiece[];
   removed: number[]; // ids
 }
 
@@ -132,7 +132,7 @@ export interface Cap {
   plane: Plane | null;
   vertices: ArrayBuffer;
   triangles: number;
-  version: number; // of the skin made from the same mesh
+  version: number; // of the boundary surface made from the same mesh
 }
 
 // The tetrahedra whose centres lie in a box. Four vertices each, 28 bytes per vertex: x, y, z and the tetrahedron's

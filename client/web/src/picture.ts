@@ -7,7 +7,7 @@ import { setLooks, shared, surfaceMaterials } from './materials';
 import type { Box, Cap, Vec3 } from './messages';
 import { Outlines } from './outlines';
 import { Pick } from './pick';
-import { SkinView } from './skin';
+import { BoundarySurfaceView } from './boundary_surface';
 import type { ViewState } from './state';
 import { TetsView } from './tets';
 import { Thickness } from './thickness';
@@ -19,7 +19,7 @@ const kMaxPixelRatio = 2; // device pixels per CSS pixel
 
 export class Picture {
   readonly renderer: WebGLRenderer;
-  readonly skin: SkinView;
+  readonly surface: BoundarySurfaceView;
   readonly outlines = new Outlines();
   readonly thickness: Thickness;
   readonly uploader: Uploader;
@@ -29,7 +29,7 @@ export class Picture {
   private transparency = new Transparency();
   private pick = new Pick();
   private camera = new PerspectiveCamera();
-  private skinScene = new Scene();
+  private surfaceScene = new Scene();
   private edgeScene = new Scene();
   private insideScene = new Scene(); // the cap and the tetrahedra
   private background = new Color();
@@ -41,14 +41,14 @@ export class Picture {
     this.renderer.outputColorSpace = LinearSRGBColorSpace; // no conversion: the shaders write sRGB
     this.compileShaders();
     this.uploader = new Uploader(this.renderer);
-    this.skin = new SkinView(this.uploader, this.materials);
+    this.surface = new BoundarySurfaceView(this.uploader, this.materials);
     this.cap = new CapView(this.uploader);
     this.tets = new TetsView(this.uploader);
     this.thickness = new Thickness(this.renderer);
-    this.skinScene.add(this.skin.faces);
-    this.edgeScene.add(this.skin.edges);
+    this.surfaceScene.add(this.surface.faces);
+    this.edgeScene.add(this.surface.edges);
     this.insideScene.add(this.cap.mesh, this.tets.group);
-    for (const scene of [this.skinScene, this.edgeScene, this.insideScene]) scene.matrixWorldAutoUpdate = false;
+    for (const scene of [this.surfaceScene, this.edgeScene, this.insideScene]) scene.matrixWorldAutoUpdate = false;
   }
 
   // Adopts the canvas's size in the layout. Returns whether it changed; the canvas is empty then.
@@ -86,7 +86,7 @@ export class Picture {
     shared.clip.value.set(...normal, offset);
   }
 
-  // Shows the tetrahedra that have been uploaded, and hides the skin in their box; null: hides nothing.
+  // Shows the tetrahedra that have been uploaded, and hides the surface in their box; null: hides nothing.
   showTets(frame: Frame, box: Box | null): void {
     this.tets.swap();
     shared.hiddenMin.value.set(...(box ? toDrawing(frame, box.min) : ([1, 1, 1] as Vec3))); // min above max: empty
@@ -106,7 +106,7 @@ export class Picture {
       if (view.wireframe) renderer.render(this.edgeScene, camera);
       if (materials.transparent.some((material) => material.visible)) {
         const drawDepth = () => this.drawOpaque(materials.depth, this.cap.depth, this.tets.depth);
-        this.transparency.draw(renderer, camera, drawDepth, () => this.drawSkin(materials.transparent));
+        this.transparency.draw(renderer, camera, drawDepth, () => this.drawSurface(materials.transparent));
       }
     }
     if (withOutlines) renderer.render(this.outlines.scene, camera);
@@ -129,13 +129,13 @@ export class Picture {
     this.renderer.compile(scene, this.camera);
   }
 
-  private drawSkin(materials: Material | Material[]): void {
-    this.skin.use(materials);
-    this.renderer.render(this.skinScene, this.camera);
+  private drawSurface(materials: Material | Material[]): void {
+    this.surface.use(materials);
+    this.renderer.render(this.surfaceScene, this.camera);
   }
 
-  private drawOpaque(skin: Material | Material[], cap: Material, tets: Material): void {
-    this.drawSkin(skin);
+  private drawOpaque(surface: Material | Material[], cap: Material, tets: Material): void {
+    this.drawSurface(surface);
     this.cap.mesh.material = cap;
     this.tets.use(tets);
     this.renderer.render(this.insideScene, this.camera);
@@ -145,7 +145,7 @@ export class Picture {
     const { x, y, z, w } = shared.clip.value;
     const outside = dot([x, y, z], toDrawing(frame, pose.eye)) > w;
     this.cap.thickness.uniforms['capFacing']!.value = outside ? 1 : -1;
-    this.drawSkin(this.thickness.material); // all surfaces, also invisible ones
+    this.drawSurface(this.thickness.material); // all surfaces, also invisible ones
     this.tets.group.visible = false;
     this.cap.mesh.material = this.cap.thickness;
     this.renderer.render(this.insideScene, this.camera);

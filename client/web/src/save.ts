@@ -44,9 +44,9 @@ export function watchSaving(status: Store<Status>, send: (request: Request) => v
     });
   }
   let last: string | null = null;
-  status.watch(['saving', 'skinVersion'], ({ saving, skinVersion }) => {
+  status.watch(['saving', 'surfaceVersion'], ({ saving, surfaceVersion }) => {
     if (last !== null && saving === null) show(status.value.error === null ? `.${last} saved.` : '');
     last = saving;
-    for (const format of kFormats) element<HTMLButtonElement>(`save-${format}`).disabled = saving !== null || skinVersion === 0;
+    for (const format of kFormats) element<HTMLButtonElement>(`save-${format}`).disabled = saving !== null || surfaceVersion === 0;
   });
 }

@@ -19,7 +19,7 @@ void transform(vec3 p) {
 }
 `;
 
-export const kSkinVertex = `${kPrecision}
+export const kSurfaceVertex = `${kPrecision}
 in uvec4 position; // the bits of three floats; then the normal and the level of detail
 out vec3 vNormal;
 flat out float vLevel;
@@ -75,25 +75,25 @@ void discard_clipped() {
 }
 `;
 
-const kSkinColor = `
+const kSurfaceColor = `
 in vec3 vNormal;
 flat in float vLevel;
 uniform vec3 color;
 ${kClipping}${kLevelColoring}${kLighting}
-vec3 skin_color() { return lit(colored(color, vLevel), normalize(vNormal + 1e-6), vPosition); }
+vec3 surface_color() { return lit(colored(color, vLevel), normalize(vNormal + 1e-6), vPosition); }
 `;
 
-export const kOpaqueFragment = `${kPrecision}${kSkinColor}
+export const kOpaqueFragment = `${kPrecision}${kSurfaceColor}
 out vec4 fragColor;
 void main() {
   discard_clipped();
-  fragColor = vec4(skin_color(), 1.0);
+  fragColor = vec4(surface_color(), 1.0);
 }`;
 
 // Weighted blended order-independent transparency: McGuire and Bavoil, 2013. Colours are summed with a weight that
 // decreases with depth; transmittances are multiplied. Both targets share one blend function (WebGL 2 has no other):
 // rgb is added, alpha is multiplied by 1 - source alpha.
-export const kTransparentFragment = `${kPrecision}${kSkinColor}
+export const kTransparentFragment = `${kPrecision}${kSurfaceColor}
 uniform float opacity;
 uniform vec2 depthRange; // nearest and farthest depth of the data
 layout(location = 0) out vec4 accumulation;
@@ -102,7 +102,7 @@ void main() {
   discard_clipped();
   float depth = -(viewMatrix * vec4(vPosition, 1.0)).z;
   float w = exp2(6.0 - 16.0 * clamp((depth - depthRange.x) / (depthRange.y - depthRange.x), 0.0, 1.0)) * opacity;
-  accumulation = vec4(skin_color() * w, opacity);
+  accumulation = vec4(surface_color() * w, opacity);
   weight = vec4(w, 0.0, 0.0, 1.0);
 }`;
 

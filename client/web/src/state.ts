@@ -16,7 +16,7 @@ export interface Look {
 }
 
 export type SurfaceName = 'alpha' | 'beta' | 'box';
-export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // the order of the groups in a Piece
+export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // the order of the groups in a SurfacePiece
 
 export interface ViewState {
   dataset: string | null; // null: the server's first

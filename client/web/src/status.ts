@@ -16,7 +16,7 @@ export interface Status {
   needsToken: boolean;
   token: string | null; // kept in memory only
   notice: string | null; // for the user: information that is not an error
-  skinVersion: number; // shown; 0: none
+  surfaceVersion: number; // shown; 0: none
   tets: { count: number; outOf: number } | null; // see Tets
   saving: string | null; // the format that the worker is writing
 }
@@ -31,7 +31,7 @@ export const kInitialStatus: Status = {
   needsToken: false,
   token: null,
   notice: null,
-  skinVersion: 0,
+  surfaceVersion: 0,
   tets: null,
   saving: null,
 };

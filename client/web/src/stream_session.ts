@@ -1,19 +1,19 @@
 // A data set that is streamed to the page: feeds the client core with messages, and sends the page the mesh's changes.
 //
-// All messages that have arrived are applied before a new version of the skin is made, and that only after the page has
-// shown the last one. Making versions takes at most about half of the time, so as not to slow down a fast stream.
+// All messages that have arrived are applied before a new version of the surface is made, and that only after the page
+// has shown the last one. Making versions takes at most about half of the time, so as not to slow down a fast stream.
 import type createCore from '@core/core.js';
 
 import { Connection, kGoingAway } from './connection';
 import type { Box, Plane, Report, View } from './messages';
 
-const kSkinIntervalMs = 40; // least time between two versions
+const kSurfaceIntervalMs = 40; // least time between two versions
 const kProgressIntervalMs = 100;
 
 export type Core = Awaited<ReturnType<typeof createCore>>;
 export type SendReport = (report: Report, transfer?: Transferable[]) => void;
 
-// What the page wants to be shown with the skin.
+// What the page wants to be shown with the boundary surface.
 export interface Extras {
   edges: boolean;
   plane: Plane | null;
@@ -26,13 +26,13 @@ export class StreamSession {
   private isEnded = false;
   private isOpen = false; // there is a mesh; stays true while the connection is lost
 
-  private version = 0; // of the last skin sent
+  private version = 0; // of the last surface sent
   private shown = 0; // ... and of the one that the page shows
-  private isChanged = false; // the mesh, since the last skin
-  private needsAll = true; // the next skin has every piece
-  private skinTimer = 0;
-  private skinEnd = 0; // when the last one was finished, performance.now()
-  private skinMs = 0; // what it took
+  private isChanged = false; // the mesh, since the last surface
+  private needsAll = true; // the next surface has every piece
+  private surfaceTimer = 0;
+  private surfaceEnd = 0; // when the last one was finished, performance.now()
+  private surfaceMs = 0; // what it took
 
   private progressTime = 0; // when it was last reported
   private progressTimer = 0;
@@ -67,12 +67,12 @@ export class StreamSession {
     this.send();
     this.isChanged = true; // another budget shows other tetrahedra
     this.reportProgress(true);
-    this.scheduleSkin();
+    this.scheduleSurface();
   }
 
   pageShows(version: number): void {
     this.shown = version;
-    this.scheduleSkin();
+    this.scheduleSurface();
   }
 
   setEdges(wanted: boolean): void {
@@ -80,7 +80,7 @@ export class StreamSession {
     this.needsAll = true;
     this.isChanged = true;
     this.reportProgress(true);
-    this.scheduleSkin();
+    this.scheduleSurface();
   }
 
   setPlane(plane: Plane | null): void {
@@ -96,7 +96,7 @@ export class StreamSession {
   close(): void {
     this.isEnded = true;
     this.connection.end();
-    clearTimeout(this.skinTimer);
+    clearTimeout(this.surfaceTimer);
     clearTimeout(this.progressTimer);
     this.viewer.delete();
   }
@@ -144,10 +144,10 @@ export class StreamSession {
     }
     if (this.viewer.wasOpened()) this.opened();
     this.isChanged = true;
-    // The first skin at once: a timer would fire only after all messages that are queued.
-    if (this.version === 0 && updates > 0) return this.sendSkin();
+    // The first surface at once: a timer would fire only after all messages that are queued.
+    if (this.version === 0 && updates > 0) return this.sendSurface();
     this.reportProgress(this.viewer.done());
-    this.scheduleSkin();
+    this.scheduleSurface();
   }
 
   private opened(): void {
@@ -171,45 +171,45 @@ export class StreamSession {
     this.progressTimer = 0;
     this.progressTime = performance.now();
     const progress = this.viewer.progress();
-    const done = progress.done && !this.isChanged; // not before the complete skin was sent
+    const done = progress.done && !this.isChanged; // not before the complete surface was sent
     const memory = this.core.HEAPU8.byteLength;
     this.report({ type: 'progress', progress: { ...progress, done, skin: this.version, memory, busy: { ...this.busy } } });
   }
 
-  private scheduleSkin(): void {
-    if (this.skinTimer !== 0 || !this.isOpen || !this.isChanged || this.shown !== this.version) return;
-    const pause = this.version === 0 || this.viewer.done() ? 0 : Math.max(kSkinIntervalMs, this.skinMs);
-    const wait = Math.max(0, this.skinEnd + pause - performance.now());
-    this.skinTimer = setTimeout(() => this.sendSkin(), wait) as unknown as number;
+  private scheduleSurface(): void {
+    if (this.surfaceTimer !== 0 || !this.isOpen || !this.isChanged || this.shown !== this.version) return;
+    const pause = this.version === 0 || this.viewer.done() ? 0 : Math.max(kSurfaceIntervalMs, this.surfaceMs);
+    const wait = Math.max(0, this.surfaceEnd + pause - performance.now());
+    this.surfaceTimer = setTimeout(() => this.sendSurface(), wait) as unknown as number;
   }
 
-  private sendSkin(): void {
-    this.skinTimer = 0;
+  private sendSurface(): void {
+    this.surfaceTimer = 0;
     if (this.isEnded || !this.isChanged || this.shown !== this.version) return;
     const start = performance.now();
     this.isChanged = false;
-    const skin = this.viewer.skin(this.extras.edges, this.needsAll);
+    const change = this.viewer.updateSurface(this.extras.edges, this.needsAll);
     this.needsAll = false;
-    if (skin.pieces.length > 0 || skin.removed.length > 0 || skin.reset) {
+    if (change.pieces.length > 0 || change.removed.length > 0 || change.reset) {
       ++this.version;
-      const buffers = skin.pieces.flatMap(({ vertices, indices, edges }) => [vertices, indices, ...(edges ? [edges] : [])]);
-      this.report({ type: 'skin', skin: { ...skin, version: this.version } }, buffers);
+      const buffers = change.pieces.flatMap(({ vertices, indices, edges }) => [vertices, indices, ...(edges ? [edges] : [])]);
+      this.report({ type: 'surface', change: { ...change, version: this.version } }, buffers);
     }
     if (this.extras.plane) this.sendCap();
     if (this.extras.box) this.sendTets();
-    this.skinEnd = performance.now();
-    this.skinMs = this.skinEnd - start;
+    this.surfaceEnd = performance.now();
+    this.surfaceMs = this.surfaceEnd - start;
     this.reportProgress(this.viewer.done());
   }
 
-  // At once if the mesh is the last skin's, else with the next skin. An empty one if there is no mesh yet.
+  // At once if the mesh is the last surface's, else with the next surface. An empty one if there is no mesh yet.
   private sendCap(): void {
     const { plane } = this.extras;
     const { version } = this;
     if (plane === null || version === 0) {
       return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), triangles: 0, version } });
     }
-    if (this.viewer.isStale()) return this.scheduleSkin();
+    if (this.viewer.isStale()) return this.scheduleSurface();
     const cap = this.viewer.cap(plane);
     this.report({ type: 'cap', cap: { ...cap, plane, version } }, [cap.vertices]);
   }
@@ -220,7 +220,7 @@ export class StreamSession {
     if (box === null || this.version === 0) {
       return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), indices: new ArrayBuffer(0), count: 0, outOf: 0 } });
     }
-    if (this.viewer.isStale()) return this.scheduleSkin();
+    if (this.viewer.isStale()) return this.scheduleSurface();
     const tets = this.viewer.tets(box);
     this.report({ type: 'tets', tets: { ...tets, box } }, [tets.vertices, tets.indices]);
   }

@@ -1,5 +1,5 @@
-// The shrunken tetrahedra. Like the skin (skin.ts), a set of them is uploaded in chunks over several frames and shown
-// once it is complete.
+// The shrunken tetrahedra. Like the boundary surface (boundary_surface.ts), a set of them is uploaded in chunks over
+// several frames and shown once it is complete.
 import { BufferAttribute, BufferGeometry, Group, InterleavedBuffer, InterleavedBufferAttribute, type Material, type Mesh } from 'three';
 import { tetsDepthMaterial, tetsMaterial } from './materials';
 import type { Tets } from './messages';

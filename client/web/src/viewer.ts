@@ -1,9 +1,9 @@
 // Schedules the picture: uploads what the worker sends between frames, draws when something has changed, and reports
-// which version of the skin is shown.
+// which version of the boundary surface is shown.
 import { fitted, type Pose } from './camera';
 import { type Frame, frameOf } from './frame';
 import { GpuFence } from './gpu_fence';
-import type { Cap, Skin, Tets } from './messages';
+import type { Cap, SurfaceChange, Tets } from './messages';
 import { Picture } from './picture';
 import type { ViewState } from './state';
 import type { ListedDataset } from './status';
@@ -15,8 +15,8 @@ export interface Stats {
   lastFrameMs: number; // of this thread, for the last frame
   longestBlock: number; // ms: longest block of this thread by uploads, since it was last set to 0
   skinVersion: number; // shown; 0: none
-  skinTriangles: number;
-  skinBytes: number; // of buffers on the graphics card
+  surfaceTriangles: number;
+  surfaceBytes: number; // of buffers on the graphics card
   capTriangles: number; // shown
   tets: number; // shrunken tetrahedra shown
   firstMeshMs: number; // from navigation to the first picture with triangles; 0: none yet
@@ -29,14 +29,14 @@ export class Viewer {
     lastFrameMs: 0,
     longestBlock: 0,
     skinVersion: 0,
-    skinTriangles: 0,
-    skinBytes: 0,
+    surfaceTriangles: 0,
+    surfaceBytes: 0,
     capTriangles: 0,
     tets: 0,
     firstMeshMs: 0,
   };
   frame: Frame | null = null; // of the open data set
-  onShown: (version: number) => void = () => {}; // of the skin
+  onShown: (version: number) => void = () => {}; // of the surface
   onDrawn: () => void = () => {};
   onResize: () => void = () => {};
   onContext: (isLost: boolean) => void = () => {}; // the WebGL context was lost or restored
@@ -74,7 +74,7 @@ export class Viewer {
   }
 
   open(dataset: ListedDataset): void {
-    this.picture.skin.clear();
+    this.picture.surface.clear();
     this.pendingCap = null;
     this.frame = frameOf(dataset);
     this.picture.setFrame(this.frame);
@@ -94,12 +94,12 @@ export class Viewer {
     return this.view.value.pose ?? (this.frame ? fitted(this.frame.box, aspect) : null);
   }
 
-  takeSkin(skin: Skin): void {
-    this.timed(() => this.picture.skin.take(skin));
+  takeSurface(change: SurfaceChange): void {
+    this.timed(() => this.picture.surface.take(change));
     this.schedule();
   }
 
-  // Shown together with the skin that it belongs to, or at once if that is shown already.
+  // Shown together with the surface that it belongs to, or at once if that is shown already.
   takeCap(cap: Cap): void {
     this.pendingCap = cap;
     this.schedule();
@@ -144,13 +144,13 @@ export class Viewer {
     if (this.isLost) return;
     // While the graphics card draws, any other WebGL call could block this thread until it is done; so none is made.
     if (this.fence.isPending) return this.schedule();
-    const { skin } = this.picture;
+    const { surface } = this.picture;
     const { frame } = this;
     const shown = frame && this.isUploading() ? this.timed(() => this.upload(frame)) : 0;
     if (this.isDirty) this.draw();
     if (shown > 0) {
-      Object.assign(this.stats, { skinVersion: shown, skinTriangles: skin.triangles, skinBytes: skin.bytes });
-      if (this.stats.firstMeshMs === 0 && skin.triangles > 0) {
+      Object.assign(this.stats, { skinVersion: shown, surfaceTriangles: surface.triangles, surfaceBytes: surface.bytes });
+      if (this.stats.firstMeshMs === 0 && surface.triangles > 0) {
         this.stats.firstMeshMs = performance.mark('intervale: first mesh').startTime;
       }
       this.onShown(shown);
@@ -159,23 +159,23 @@ export class Viewer {
   }
 
   private isUploading(): boolean {
-    return this.picture.skin.isBusy || this.picture.tets.isBusy || this.pendingCap !== null;
+    return this.picture.surface.isBusy || this.picture.tets.isBusy || this.pendingCap !== null;
   }
 
-  // Uploads for one frame's budget. Returns the version of the skin that this completed; 0: none.
+  // Uploads for one frame's budget. Returns the version of the surface that this completed; 0: none.
   private upload(frame: Frame): number {
-    const { skin, tets, uploader } = this.picture;
+    const { surface, tets, uploader } = this.picture;
     uploader.beginFrame();
     let shown = 0;
-    if (skin.upload(frame)) {
-      if (this.pendingCap && !uploader.hasBudget) return 0; // skin and cap together, in the next frame
-      skin.swap();
-      shown = skin.version;
+    if (surface.upload(frame)) {
+      if (this.pendingCap && !uploader.hasBudget) return 0; // surface and cap together, in the next frame
+      surface.swap();
+      shown = surface.version;
       this.isDirty = true;
     }
     const cap = this.pendingCap;
-    if (cap && (!skin.isBusy || cap.version <= skin.version)) this.showCap(frame, cap);
-    const complete = skin.isBusy ? null : tets.upload();
+    if (cap && (!surface.isBusy || cap.version <= surface.version)) this.showCap(frame, cap);
+    const complete = surface.isBusy ? null : tets.upload();
     if (complete) {
       this.picture.showTets(frame, complete.box);
       this.stats.tets = complete.box ? complete.count : 0;

@@ -1,7 +1,7 @@
 // The page's side of the worker: sends what the view needs at a limited rate, and keeps the status current.
 import { streamUrl } from './datasets';
 import { sameJson } from './format';
-import type { Box, Cap, Plane, Report, Request, Skin, Tets, View } from './messages';
+import type { Box, Cap, Plane, Report, Request, SurfaceChange, Tets, View } from './messages';
 import type { Status } from './status';
 import type { Store } from './store';
 
@@ -14,7 +14,7 @@ export const updatesIn = (megabytes: number | null): number | null =>
 
 // What the page does with the worker's reports.
 export interface Receiver {
-  skin(skin: Skin): void;
+  surface(change: SurfaceChange): void;
   cap(cap: Cap): void;
   tets(tets: Tets): void;
   saved(format: string, name: string, bytes: ArrayBuffer): void;
@@ -132,8 +132,8 @@ export class WorkerClient {
       case 'progress':
         this.status.set({ progress: report.progress });
         break;
-      case 'skin':
-        this.receiver.skin(report.skin);
+      case 'surface':
+        this.receiver.surface(report.change);
         break;
       case 'cap':
         this.isAwaitingCap = false;

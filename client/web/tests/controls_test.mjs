@@ -141,7 +141,7 @@ onPage('handles and fields move the region and its faces', async (page) => {
   assert.equal((await region()).min[0], -20);
 });
 
-onPage('shrunken tetrahedra replace the skin in the region', async (page) => {
+onPage('shrunken tetrahedra replace the boundary surface in the region', async (page) => {
   await changesPicture(page, () => page.keyboard.press('s'), 0.002);
   await page.waitForFunction(() => window.intervale.stats.tets > 100);
   assert.match(await page.textContent('#tets-note'), /tetrahedra in the region/);

@@ -5,7 +5,7 @@
 const kSide = 48; // of the cube, in sample spacings
 const kRange = [-0.45, 0.75];
 const kGrids = [6, 12, 24]; // cells per side
-const kPieceSide = 16; // of a piece of the skin, in sample spacings
+const kPieceSide = 16; // of a piece of the boundary surface, in sample spacings
 
 const field = (x, y, z) => {
   const [a, b, c] = [x, y, z].map((v) => (v / kSide) * 2 * Math.PI * 1.25);
@@ -81,7 +81,7 @@ class Mesh {
     return [[b, c, d], [a, d, c], [a, b, d], [a, c, b]];
   }
   // The pieces of the boundary: the faces that only one tetrahedron has.
-  skin() {
+  boundary() {
     const unpaired = new Map();
     for (const tet of this.tets) for (const face of Mesh.faces(tet)) {
       const key = [...face].sort((a, b) => a - b).join(' ');
@@ -224,17 +224,17 @@ function postTets() {
   const none = { vertices: new ArrayBuffer(0), indices: new ArrayBuffer(0), count: 0, outOf: 0 };
   post({ type: 'tets', tets: { box, ...(box && mesh ? mesh.inBox({ min: toSamples(box.min), max: toSamples(box.max) }) : none) } });
 }
-function postSkin(reset) {
+function postSurface(reset) {
   version++;
-  const pieces = mesh.skin();
-  post({ type: 'skin', skin: { version, reset, pieces, removed: [] } });
+  const pieces = mesh.boundary();
+  post({ type: 'surface', change: { version, reset, pieces, removed: [] } });
   if (plane) postCap();
   if (box) postTets();
 }
 function refine() {
   if (step + 1 >= kGrids.length) return postProgress(true);
   mesh = new Mesh(kGrids[++step]);
-  postSkin(step === 0);
+  postSurface(step === 0);
   postProgress(false);
 }
 
@@ -269,7 +269,7 @@ self.onmessage = ({ data }) => {
     postTets();
   } else if (data.type === 'edges') {
     wantsEdges = data.wanted;
-    if (mesh) postSkin(false);
+    if (mesh) postSurface(false);
   } else if (data.type === 'save') {
     post({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
   }

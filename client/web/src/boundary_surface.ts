@@ -1,10 +1,10 @@
-// The skin: the boundary of the mesh, as pieces on the graphics card. The pieces of a new version are uploaded a few
-// per frame; once all are there they replace the old ones in one step, so that no frame shows cracks. Nothing here
-// visits single vertices.
+// The boundary surface of the mesh, as pieces on the graphics card. The pieces of a new version are uploaded a few per
+// frame; once all are there they replace the old ones in one step, so that no frame shows cracks. Nothing here visits
+// single vertices.
 import { BufferAttribute, BufferGeometry, Group, LineSegments, type Material, Mesh, Sphere, Vector3 } from 'three';
 import { type Frame, toDrawing } from './frame';
 import type { SurfaceMaterials } from './materials';
-import type { Piece, Skin, Vec3 } from './messages';
+import type { SurfacePiece, SurfaceChange, Vec3 } from './messages';
 import type { Uploader } from './upload';
 import { add, center, diagonal } from './vec';
 
@@ -15,14 +15,14 @@ interface PieceObjects {
   triangles: number;
 }
 
-export class SkinView {
+export class BoundarySurfaceView {
   readonly faces = new Group();
   readonly edges = new Group();
   version = 0; // of what is shown; 0: nothing yet
   triangles = 0; // shown
   bytes = 0; // of the buffers of what is shown
   private pieces = new Map<number, PieceObjects>(); // shown, by id
-  private pending: Skin[] = []; // oldest first
+  private pending: SurfaceChange[] = []; // oldest first
   private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
 
   constructor(private uploader: Uploader, private materials: SurfaceMaterials) {
@@ -33,29 +33,29 @@ export class SkinView {
     return this.pending.length > 0;
   }
 
-  take(skin: Skin): void {
-    this.pending.push(skin);
+  take(change: SurfaceChange): void {
+    this.pending.push(change);
   }
 
   // Uploads within the uploader's budget. Returns whether the first pending version is complete: swap() is next.
   upload(frame: Frame): boolean {
-    const skin = this.pending[0];
-    if (!skin) return false;
-    while (this.uploaded.length < skin.pieces.length && this.uploader.hasBudget) {
-      const piece = skin.pieces[this.uploaded.length]!;
+    const change = this.pending[0];
+    if (!change) return false;
+    while (this.uploaded.length < change.pieces.length && this.uploader.hasBudget) {
+      const piece = change.pieces[this.uploaded.length]!;
       const objects = this.objectsOf(piece, frame);
       this.uploader.send(objects.mesh.geometry, objects.bytes);
       if (objects.lines) this.uploader.send(objects.lines.geometry, 0); // counted with the mesh
       this.uploaded.push({ id: piece.id, objects });
     }
-    return this.uploaded.length === skin.pieces.length;
+    return this.uploaded.length === change.pieces.length;
   }
 
   // Shows the first pending version.
   swap(): void {
-    const skin = this.pending.shift()!;
-    if (skin.reset) for (const id of [...this.pieces.keys()]) this.remove(id);
-    for (const id of skin.removed) this.remove(id);
+    const change = this.pending.shift()!;
+    if (change.reset) for (const id of [...this.pieces.keys()]) this.remove(id);
+    for (const id of change.removed) this.remove(id);
     for (const { id, objects } of this.uploaded) {
       this.remove(id);
       this.pieces.set(id, objects);
@@ -65,7 +65,7 @@ export class SkinView {
       this.bytes += objects.bytes;
     }
     this.uploaded = [];
-    this.version = skin.version;
+    this.version = change.version;
   }
 
   clear(): void {
@@ -92,7 +92,7 @@ export class SkinView {
     dispose(objects);
   }
 
-  private objectsOf(piece: Piece, frame: Frame): PieceObjects {
+  private objectsOf(piece: SurfacePiece, frame: Frame): PieceObjects {
     const vertices = new BufferAttribute(new Uint32Array(piece.vertices), 4);
     const sphere = boundingSphere(piece, frame);
     const geometry = (indices: ArrayBuffer, counts: [number, number, number], indicesEach: number) => {
@@ -120,7 +120,7 @@ export class SkinView {
 }
 
 // In drawing space.
-function boundingSphere(piece: Piece, frame: Frame): Sphere {
+function boundingSphere(piece: SurfacePiece, frame: Frame): Sphere {
   const { origin, spacing } = frame;
   const world = (p: Vec3): Vec3 => add(origin, [p[0] * spacing[0], p[1] * spacing[1], p[2] * spacing[2]]);
   const box = { min: world(piece.min), max: world(piece.max) };
