@@ -94,7 +94,7 @@ class Viewer {
 
   // Of the last receive().
   [[nodiscard]] bool was_opened() const { return event_.kind == ClientSession::Event::Kind::opened; }
-  [[nodiscard]] bool is_fresh() const { return event_.is_new_mesh; }
+  [[nodiscard]] bool is_new_mesh() const { return event_.is_new_mesh; }
   // Of the last failure; 1000 if the server did not say it.
   [[nodiscard]] int fault_code() const {
     const auto& fault = session_.session().fault();
@@ -220,13 +220,13 @@ EMSCRIPTEN_BINDINGS(intervale) {
   emscripten::class_<Viewer>("Viewer")
       .constructor<const std::string&>()
       .function("look", &Viewer::look)
-      .function("openedLine", &Viewer::connected)
-      .function("lostLine", &Viewer::disconnected)
+      .function("connected", &Viewer::connected)
+      .function("disconnected", &Viewer::disconnected)
       .function("inbox", &Viewer::inbox)
       .function("receive", &Viewer::receive)
       .function("takeMessages", &Viewer::take_messages)
       .function("wasOpened", &Viewer::was_opened)
-      .function("isFresh", &Viewer::is_fresh)
+      .function("isNewMesh", &Viewer::is_new_mesh)
       .function("updates", &Viewer::updates)
       .function("done", &Viewer::done)
       .function("isStale", &Viewer::is_stale)

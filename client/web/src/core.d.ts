@@ -5,13 +5,13 @@ import type { Box, Cap, Dataset, Plane, Progress, SurfaceChange, Tets, View } fr
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
   look(view: View): string;
-  openedLine(now: number): void; // the WebSocket was opened
-  lostLine(): void; // ... or closed
+  connected(now: number): void; // the WebSocket was opened
+  disconnected(): void; // ... or closed
   inbox(bytes: number): Uint8Array; // to be filled with one message; valid until the next call of any function
   receive(now: number): string; // handles the message in the inbox
   takeMessages(): ArrayBuffer[]; // to be sent, in order
   wasOpened(): boolean; // the last receive() opened the session
-  isFresh(): boolean; // ... and started a new mesh
+  isNewMesh(): boolean; // ... and started a new mesh
   faultCode(): number; // the close code of an error that the server reported; else 1000
   updates(): number;
   done(): boolean;

@@ -18,7 +18,7 @@ import {
   ZeroFactor,
 } from 'three';
 import * as shaders from './shaders';
-import { kSurfaces, type Look, type SurfaceName } from './state';
+import { kSurfaces, type SurfaceName, type SurfaceStyle } from './state';
 
 // All materials refer to these objects: a value set here holds for each of them. Positions are in drawing space.
 export const shared = {
@@ -109,9 +109,9 @@ export function surfaceMaterials(): SurfaceMaterials {
 }
 
 // Applies colours and opacities, and decides which material of each surface is visible.
-export function setLooks(materials: SurfaceMaterials, looks: Record<SurfaceName, Look>): void {
+export function setStyles(materials: SurfaceMaterials, styles: Record<SurfaceName, SurfaceStyle>): void {
   kSurfaces.forEach((name, i) => {
-    const { color, opacity } = looks[name];
+    const { color, opacity } = styles[name];
     const { r, g, b } = new Color().setStyle(color, ''); // without conversion: the shaders make it linear
     shared[name].value.set(r, g, b);
     const opaque = opacity > 0.995;

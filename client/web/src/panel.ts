@@ -53,10 +53,10 @@ function watchSurfaces(view: Store<ViewState>, status: Store<Status>): void {
     const [color, opacity] = [input(`${name}-color`), input(`${name}-opacity`)];
     color.addEventListener('input', () => view.set({ [name]: { ...view.value[name], color: color.value } }));
     opacity.addEventListener('input', () => view.set({ [name]: { ...view.value[name], opacity: opacity.valueAsNumber } }));
-    view.watch([name], ({ [name]: look }) => {
-      color.value = look.color;
-      opacity.value = String(look.opacity);
-      setText(element(`${name}-out`), `${Math.round(look.opacity * 100)} %`);
+    view.watch([name], ({ [name]: style }) => {
+      color.value = style.color;
+      opacity.value = String(style.opacity);
+      setText(element(`${name}-out`), `${Math.round(style.opacity * 100)} %`);
     });
   }
   status.watch(['dataset'], ({ dataset }) => {

@@ -3,7 +3,7 @@ import { BufferGeometry, Color, LinearSRGBColorSpace, type Material, Mesh, Persp
 import { type Pose, rayThrough } from './camera';
 import { CapView } from './cap';
 import { type Frame, planeToDrawing, shiftOf, toDrawing } from './frame';
-import { setLooks, shared, surfaceMaterials } from './materials';
+import { setStyles, shared, surfaceMaterials } from './materials';
 import type { Box, Cap, Vec3 } from './messages';
 import { Outlines } from './outlines';
 import { Pick } from './pick';
@@ -71,8 +71,8 @@ export class Picture {
     this.background.setStyle(color, '');
   }
 
-  setLooks(view: ViewState, coarsestLevel: number): void {
-    setLooks(this.materials, view);
+  setStyles(view: ViewState, coarsestLevel: number): void {
+    setStyles(this.materials, view);
     shared.colorByLevel.value = view.levels ? 1 : 0;
     shared.coarsestLevel.value = coarsestLevel;
     shared.shrink.value = view.shrink;

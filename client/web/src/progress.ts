@@ -8,7 +8,7 @@ import type { Store } from './store';
 const kIntervalMs = 100; // between two updates of the page
 
 // The state in a few words.
-export function headline(status: Readonly<Status>): string {
+function summary(status: Readonly<Status>): string {
   const { connection, progress, dataset } = status;
   if (status.error !== null) return 'Stopped';
   if (status.needsToken) return 'Waiting for a token';
@@ -24,7 +24,7 @@ export function watchProgress(status: Store<Status>): void {
   const show = () => {
     timer = 0;
     const { value } = status;
-    setText(element('progress-text'), headline(value));
+    setText(element('progress-text'), summary(value));
     showBar(value);
     showStatusLine(value);
     showStatistics(value);

@@ -10,7 +10,7 @@ import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
 import { cross, length, sub, unit } from './vec';
 
-export interface Look {
+export interface SurfaceStyle {
   color: string; // #rrggbb
   opacity: number; // 0 to 1
 }
@@ -31,9 +31,9 @@ export interface ViewState {
   thickness: boolean;
   wireframe: boolean;
   levels: boolean; // colour by level of detail
-  alpha: Look;
-  beta: Look;
-  box: Look;
+  alpha: SurfaceStyle;
+  beta: SurfaceStyle;
+  box: SurfaceStyle;
 }
 
 export const kDefaults: Readonly<ViewState> = {
@@ -78,9 +78,9 @@ export function toHash(state: ViewState): string {
   if (flags.length > 0) put('show', flags.join(','));
   if (state.shrink !== kDefaults.shrink) put('shrink', write([state.shrink]));
   for (const name of kSurfaces) {
-    const look = state[name];
+    const style = state[name];
     const standard = kDefaults[name];
-    if (look.color !== standard.color || look.opacity !== standard.opacity) put(name, `${look.color.slice(1)},${write([look.opacity])}`);
+    if (style.color !== standard.color || style.opacity !== standard.opacity) put(name, `${style.color.slice(1)},${write([style.opacity])}`);
   }
   return parts.length > 0 ? '#' + parts.join('&') : '';
 }
@@ -135,9 +135,9 @@ export function fromHash(hash: string): ViewState {
   state.tets = state.tets && state.region !== null;
   state.shrink = readClamped(get('shrink'), 0.4, 1) ?? kDefaults.shrink;
   for (const name of kSurfaces) {
-    const look = /^([0-9a-f]{6}),([0-9.e-]+)$/i.exec(get(name) ?? '');
-    const opacity = readClamped(look?.[2] ?? null, 0, 1);
-    if (look && opacity !== null) state[name] = { color: '#' + look[1]!.toLowerCase(), opacity };
+    const style = /^([0-9a-f]{6}),([0-9.e-]+)$/i.exec(get(name) ?? '');
+    const opacity = readClamped(style?.[2] ?? null, 0, 1);
+    if (style && opacity !== null) state[name] = { color: '#' + style[1]!.toLowerCase(), opacity };
   }
   return state;
 }

@@ -49,11 +49,11 @@ export class StreamSession {
     this.viewer = new core.Viewer(dataset);
     this.connection = new Connection(url, token, {
       connected: () => {
-        this.viewer.openedLine(performance.now());
+        this.viewer.connected(performance.now());
         this.send();
       },
       received: (message) => this.receive(message),
-      disconnected: () => this.viewer.lostLine(),
+      disconnected: () => this.viewer.disconnected(),
       changed: (state) => report({ type: 'connection', state }),
       failed: (text) => this.fail(text),
     });
@@ -151,12 +151,12 @@ export class StreamSession {
   }
 
   private opened(): void {
-    const isFresh = this.viewer.isFresh();
-    if (isFresh) this.needsAll = true;
+    const isNewMesh = this.viewer.isNewMesh();
+    if (isNewMesh) this.needsAll = true;
     this.connection.accepted();
     this.isOpen = true;
     this.report({ type: 'connection', state: { state: 'open' } });
-    this.report({ type: 'opened', dataset: this.viewer.dataset(), resumed: !isFresh });
+    this.report({ type: 'opened', dataset: this.viewer.dataset(), resumed: !isNewMesh });
   }
 
   // Now, or when the interval since the last report is over: the last state is always reported.

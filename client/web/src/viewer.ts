@@ -68,7 +68,7 @@ export class Viewer {
     });
     this.picture.thickness.onMaximum = () => this.invalidate();
     view.watch([], () => {
-      this.applyLooks();
+      this.applyStyles();
       this.invalidate();
     });
   }
@@ -83,7 +83,7 @@ export class Viewer {
     this.picture.showTets(this.frame, null);
     this.coarsestLevel = Math.max(1, Math.ceil(Math.log2(Math.max(...dataset.dims) - 1)) - 1);
     this.picture.resize();
-    this.applyLooks();
+    this.applyStyles();
     this.invalidate();
   }
 
@@ -205,8 +205,8 @@ export class Viewer {
     this.stats.capTriangles = cap.plane ? cap.triangles : 0;
   }
 
-  private applyLooks(): void {
-    this.picture.setLooks(this.view.value, this.coarsestLevel);
+  private applyStyles(): void {
+    this.picture.setStyles(this.view.value, this.coarsestLevel);
   }
 
   private timed<T>(work: () => T): T {
