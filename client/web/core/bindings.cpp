@@ -104,23 +104,6 @@ class Viewer {
   [[nodiscard]] double updates() const { return session_.mesh() ? double(session_.mesh()->updates()) : 0.0; }
   [[nodiscard]] bool done() const { return session_.is_done(); }
 
-  // A Dataset of messages.ts; undefined before the first description.
-  [[nodiscard]] val dataset() const {
-    if (session_.mesh() == nullptr) return val::undefined();
-    const Description& d = session_.mesh()->description();
-    val dataset = val::object();
-    dataset.set("name", d.name);
-    dataset.set("dims", array_of(d.grid.dims));
-    dataset.set("spacing", array_of(d.grid.spacing));
-    dataset.set("origin", array_of(d.grid.origin));
-    dataset.set("range", array_of(std::array{d.range.alpha, d.range.beta}));
-    dataset.set("maxError", d.max_error);
-    dataset.set("updates", double(d.updates));
-    dataset.set("fullTets", double(d.full.tets));
-    dataset.set("fullVertices", double(d.full.vertices));
-    return dataset;
-  }
-
   // What a Progress of messages.ts has of the core.
   [[nodiscard]] val progress() const {
     const ClientSession::Stats& stats = session_.session().stats();
@@ -184,7 +167,6 @@ class Viewer {
     const TetsInBox found = tets_in_box(*surface_, box_of(box), kMostTets);
     val tets = val::object();
     tets.set("vertices", buffer_of(found.vertices));
-    tets.set("indices", buffer_of(found.indices));
     tets.set("count", double(found.count));
     tets.set("outOf", double(found.out_of));
     return tets;
@@ -231,7 +213,6 @@ EMSCRIPTEN_BINDINGS(intervale) {
       .function("done", &Viewer::done)
       .function("isStale", &Viewer::is_stale)
       .function("faultCode", &Viewer::fault_code)
-      .function("dataset", &Viewer::dataset)
       .function("progress", &Viewer::progress)
       .function("updateSurface", &Viewer::update_surface)
       .function("cap", &Viewer::cap)

@@ -1,6 +1,6 @@
 // The client core as the module '@core/core.js': what core/bindings.cpp binds. INTERVALE_CORE_DIR says where it is when
 // the page is built; tsconfig.json gives it these types.
-import type { Box, Cap, Dataset, Plane, Progress, SurfaceChange, Tets, View } from './messages';
+import type { Box, Cap, Plane, Progress, SurfaceChange, Tets, View } from './messages';
 
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
@@ -15,7 +15,6 @@ export interface Viewer {
   faultCode(): number; // the close code of an error that the server reported; else 1000
   updates(): number;
   done(): boolean;
-  dataset(): Dataset;
   progress(): Omit<Progress, 'skin' | 'memory' | 'busy'>;
   updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version'>; // all: every piece, changed or not
   isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap() and tets() must not be called

@@ -1,8 +1,19 @@
 // The list of the server's data sets: GET api/datasets, relative to the page.
 import type { Vec3 } from './messages';
-import type { ListedDataset } from './status';
 
-export type Listing = { datasets: ListedDataset[] } | { needsToken: true } | { error: string };
+export interface Dataset {
+  name: string;
+  dims: Vec3; // samples
+  spacing: Vec3;
+  origin: Vec3;
+  range: [number, number]; // closed, field units; may be infinite
+  maxError: number; // of the coarsest mesh, field units
+  updates: number; // of the full mesh
+  fullTets: number;
+  fullBytes: number; // of the full mesh as indexed arrays
+}
+
+export type Listing = { datasets: Dataset[] } | { needsToken: true } | { error: string };
 
 // token: null if the user has given none.
 export async function listDatasets(token: string | null): Promise<Listing> {
@@ -33,7 +44,7 @@ const number = (x: unknown): number => (x === 'inf' ? Infinity : x === '-inf' ? 
 const vec = (x: unknown): Vec3 => (Array.isArray(x) && x.length === 3 ? [number(x[0]), number(x[1]), number(x[2])] : [0, 0, 0]);
 
 // null: not a data set.
-function parsed(entry: unknown): ListedDataset | null {
+function parsed(entry: unknown): Dataset | null {
   const d = entry as Record<string, unknown>;
   if (typeof d?.['name'] !== 'string') return null;
   const full = (d['full'] ?? {}) as Record<string, unknown>;
@@ -47,8 +58,6 @@ function parsed(entry: unknown): ListedDataset | null {
     maxError: number(d['max_error']),
     updates: number(d['updates']),
     fullTets: number(full['tets']),
-    fullVertices: number(full['vertices']),
     fullBytes: number(full['indexed_bytes']),
-    refine: String(d['refine'] ?? ''),
   };
 }

@@ -1,6 +1,7 @@
 // The coordinate frame of the graphics card ("drawing space"): world coordinates relative to the centre of the data, so
 // that float32 is precise enough wherever the data lies.
-import type { Box, Dataset, Plane, Vec3 } from './messages';
+import type { Dataset } from './datasets';
+import type { Box, Plane, Vec3 } from './messages';
 import { center, dot, sub } from './vec';
 
 export interface Frame {

@@ -3,7 +3,7 @@ import { Automation } from './automation';
 import { showAxes } from './axes';
 import { watchBanner } from './banner';
 import { ClipControls } from './clip';
-import { listDatasets } from './datasets';
+import { type Dataset, listDatasets } from './datasets';
 import { element, input, onClick } from './dom';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
@@ -14,7 +14,7 @@ import { watchProgress } from './progress';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
 import { fromHash, toHash, type ViewState } from './state';
-import { kInitialStatus, type ListedDataset, type Status } from './status';
+import { kInitialStatus, type Status } from './status';
 import { Store } from './store';
 import { watchTheme } from './theme';
 import { Viewer } from './viewer';
@@ -155,7 +155,7 @@ class Page {
     if (wanted && status.value.dataset) this.worker.update(wanted);
   }
 
-  private open(dataset: ListedDataset): void {
+  private open(dataset: Dataset): void {
     status.set({ dataset, surfaceVersion: 0 });
     this.viewer.open(dataset);
     this.clip.opened();

@@ -25,18 +25,6 @@ export interface Plane {
   offset: number;
 }
 
-export interface Dataset {
-  name: string;
-  dims: Vec3; // samples
-  spacing: Vec3;
-  origin: Vec3;
-  range: [number, number]; // closed, field units; may be infinite
-  maxError: number; // of the coarsest mesh, field units
-  updates: number; // of the full mesh
-  fullTets: number;
-  fullVertices: number;
-}
-
 // From the page to the worker.
 export type Request =
   // Connects and streams; an open session is closed first. url: of the WebSocket, "ws://host:port/v1/stream".
@@ -50,8 +38,7 @@ export type Request =
   | { type: 'edges'; wanted: boolean } // whether pieces have edges
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
   | { type: 'save'; format: 'vtu' | 'stl' | 'glb' }
-  | { type: 'digest' } // answered by a report of the same type
-  | { type: 'close' };
+  | { type: 'digest' }; // answered by a report of the same type
 
 export interface View {
   camera: Camera;
@@ -63,9 +50,8 @@ export interface View {
 
 // From the worker to the page.
 export type Report =
-  | { type: 'ready' } // the core is loaded; earlier requests were queued
   | { type: 'connection'; state: ConnectionState }
-  | { type: 'opened'; dataset: Dataset; resumed: boolean } // resumed: the mesh is kept and the stream continues
+  | { type: 'opened'; resumed: boolean } // resumed: the mesh is kept and the stream continues
   | { type: 'progress'; progress: Progress }
   | { type: 'surface'; change: SurfaceChange }
   | { type: 'cap'; cap: Cap }
@@ -137,11 +123,10 @@ export interface Cap {
 
 // The tetrahedra whose centres lie in a box. Four vertices each, 28 bytes per vertex: x, y, z and the tetrahedron's
 // centre as float32, so that shaders can shrink it; surface as uint8 (0 inside, 1 alpha, 2 beta); level of detail as
-// uint8; two bytes of padding. Twelve uint32 indices each, of four triangles that face outwards.
+// uint8; two bytes of padding.
 export interface Tets {
   box: Box | null;
   vertices: ArrayBuffer;
-  indices: ArrayBuffer;
   count: number;
   outOf: number; // tetrahedra in the box: more than count where they are too many to show
 }

@@ -1,9 +1,9 @@
 // The panel of controls: shows the view's state, and changes it.
+import type { Dataset } from './datasets';
 import { element, input, onClick, setText } from './dom';
 import { bytes, count, short } from './format';
-import type { Dataset } from './messages';
 import { kSurfaces, type ViewState } from './state';
-import type { ListedDataset, Status } from './status';
+import type { Status } from './status';
 import type { Store } from './store';
 
 // The positions of the sliders; null: no limit.
@@ -87,7 +87,7 @@ function watchSliders(view: Store<ViewState>): void {
   });
 }
 
-function showDatasets(datasets: ListedDataset[] | null, open: ListedDataset | null, choose: (name: string) => void): void {
+function showDatasets(datasets: Dataset[] | null, open: Dataset | null, choose: (name: string) => void): void {
   if (datasets === null) return;
   const list = element('datasets');
   if (datasets.length === 0) {
@@ -113,7 +113,7 @@ function showDatasets(datasets: ListedDataset[] | null, open: ListedDataset | nu
   );
 }
 
-function summary(d: ListedDataset): HTMLElement {
+function summary(d: Dataset): HTMLElement {
   const parts = [d.dims.join(' × '), rangeText(d.range), ...(d.fullTets > 0 ? [`${count(d.fullTets)} tetrahedra`, bytes(d.fullBytes)] : [])];
   const line = document.createElement('small');
   line.append(...parts.map((text) => Object.assign(document.createElement('span'), { textContent: text })));

@@ -1,14 +1,10 @@
 // The status of the page: what it knows of the server and the mesh. Not part of the address.
-import type { ConnectionState, Dataset, Progress } from './messages';
-
-export interface ListedDataset extends Dataset {
-  fullBytes: number; // of the full mesh as indexed arrays
-  refine: string; // "boundary" or "uniform"
-}
+import type { Dataset } from './datasets';
+import type { ConnectionState, Progress } from './messages';
 
 export interface Status {
-  datasets: ListedDataset[] | null; // null: not received yet
-  dataset: ListedDataset | null; // the open one
+  datasets: Dataset[] | null; // null: not received yet
+  dataset: Dataset | null; // the open one
   connection: ConnectionState;
   opened: { times: number; resumed: boolean }; // how often a session was opened; whether the last one was resumed
   progress: Progress | null;

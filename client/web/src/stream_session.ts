@@ -156,7 +156,7 @@ export class StreamSession {
     this.connection.accepted();
     this.isOpen = true;
     this.report({ type: 'connection', state: { state: 'open' } });
-    this.report({ type: 'opened', dataset: this.viewer.dataset(), resumed: !isNewMesh });
+    this.report({ type: 'opened', resumed: !isNewMesh });
   }
 
   // Now, or when the interval since the last report is over: the last state is always reported.
@@ -218,10 +218,10 @@ export class StreamSession {
   private sendTets(): void {
     const { box } = this.extras;
     if (box === null || this.version === 0) {
-      return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), indices: new ArrayBuffer(0), count: 0, outOf: 0 } });
+      return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), count: 0, outOf: 0 } });
     }
     if (this.viewer.isStale()) return this.scheduleSurface();
     const tets = this.viewer.tets(box);
-    this.report({ type: 'tets', tets: { ...tets, box } }, [tets.vertices, tets.indices]);
+    this.report({ type: 'tets', tets: { ...tets, box } }, [tets.vertices]);
   }
 }

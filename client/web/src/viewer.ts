@@ -1,12 +1,12 @@
 // Schedules the picture: uploads what the worker sends between frames, draws when something has changed, and reports
 // which version of the boundary surface is shown.
 import { fitted, type Pose } from './camera';
+import type { Dataset } from './datasets';
 import { type Frame, frameOf } from './frame';
 import { GpuFence } from './gpu_fence';
 import type { Cap, SurfaceChange, Tets } from './messages';
 import { Picture } from './picture';
 import type { ViewState } from './state';
-import type { ListedDataset } from './status';
 import type { Store } from './store';
 import { add, sub } from './vec';
 
@@ -73,7 +73,7 @@ export class Viewer {
     });
   }
 
-  open(dataset: ListedDataset): void {
+  open(dataset: Dataset): void {
     this.picture.surface.clear();
     this.pendingCap = null;
     this.frame = frameOf(dataset);

@@ -47,10 +47,6 @@ async function handle(request: Request): Promise<void> {
     case 'digest':
       session?.digest();
       break;
-    case 'close':
-      session?.close();
-      session = null;
-      break;
   }
 }
 
@@ -59,7 +55,4 @@ let last: Promise<void> = Promise.resolve();
 scope.onmessage = ({ data }: MessageEvent<Request>) => {
   last = last.then(() => handle(data)).catch((error: unknown) => report({ type: 'error', text: `The client core failed: ${String(error)}` }));
 };
-core.then(
-  () => report({ type: 'ready' }),
-  (error: unknown) => report({ type: 'error', text: `The client core cannot be loaded: ${String(error)}` }),
-);
+core.catch((error: unknown) => report({ type: 'error', text: `The client core cannot be loaded: ${String(error)}` }));

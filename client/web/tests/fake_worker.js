@@ -180,7 +180,6 @@ class Mesh {
     const tets = this.tets.filter((tet) => this.center(tet).every((x, d) => x >= box.min[d] && x <= box.max[d]));
     const vertices = new ArrayBuffer(28 * 4 * tets.length);
     const view = new DataView(vertices);
-    const indices = new Uint32Array(12 * tets.length);
     tets.forEach((tet, t) => {
       tet.forEach((v, i) => {
         const at = 28 * (4 * t + i);
@@ -189,9 +188,8 @@ class Mesh {
         view.setUint8(at + 24, this.vertices[v].surface);
         view.setUint8(at + 25, this.level);
       });
-      indices.set(Mesh.faces([0, 1, 2, 3]).flat().map((i) => 4 * t + i), 12 * t);
     });
-    return { vertices, indices: indices.buffer, count: tets.length, outOf: tets.length };
+    return { vertices, count: tets.length, outOf: tets.length };
   }
 }
 
@@ -221,7 +219,7 @@ function postCap() {
   post({ type: 'cap', cap: { plane, version, ...(inSamples && mesh ? mesh.cap(inSamples) : { vertices: new ArrayBuffer(0), triangles: 0 }) } });
 }
 function postTets() {
-  const none = { vertices: new ArrayBuffer(0), indices: new ArrayBuffer(0), count: 0, outOf: 0 };
+  const none = { vertices: new ArrayBuffer(0), count: 0, outOf: 0 };
   post({ type: 'tets', tets: { box, ...(box && mesh ? mesh.inBox({ min: toSamples(box.min), max: toSamples(box.max) }) : none) } });
 }
 function postSurface(reset) {
@@ -243,14 +241,14 @@ function open(dataset) {
   [mesh, step, name] = [null, -1, dataset];
   if (name === 'broken') return post({ type: 'error', text: 'broken: the server has no such data set; see the list.' });
   post({ type: 'connection', state: { state: 'open' } });
-  post({ type: 'opened', dataset: null, resumed: false });
+  post({ type: 'opened', resumed: false });
   refine();
   if (name !== 'lost') return;
   post({ type: 'connection', state: { state: 'waiting', seconds: 8, attempt: 2, reason: 'the connection was interrupted' } });
   timer = setTimeout(() => {
     post({ type: 'connection', state: { state: 'connecting' } });
     post({ type: 'connection', state: { state: 'open' } });
-    post({ type: 'opened', dataset: null, resumed: true });
+    post({ type: 'opened', resumed: true });
     name = 'gyroid';
     refine();
   }, 3000);
@@ -274,4 +272,3 @@ self.onmessage = ({ data }) => {
     post({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
   }
 };
-post({ type: 'ready' });
