@@ -89,7 +89,7 @@ export class Connection {
     const lost = code === kGoingAway ? 'the server is shutting down' : 'the connection was interrupted';
     const cause = wasConnected ? lost : 'the server cannot be reached';
     this.handler.changed({ state: 'waiting', seconds: wait / 1000, attempt: this.attempt, reason: cause });
-    this.timer = setTimeout(() => this.connect(), wait) as unknown as number;
+    this.timer = self.setTimeout(() => this.connect(), wait);
   }
 }
 

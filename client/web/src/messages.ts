@@ -3,6 +3,7 @@
 //
 // Positions are in samples (0 at the first, dims - 1 at the last) unless said otherwise, so that float32 is precise
 // enough; world = origin + spacing * position. Cameras, planes and boxes are in world coordinates.
+import type { Pose } from './camera';
 
 export type Vec3 = [number, number, number];
 
@@ -11,19 +12,13 @@ export interface Box {
   max: Vec3;
 }
 
-export interface Camera {
-  eye: Vec3;
-  lookAt: Vec3;
-  up: Vec3;
-  fov: number; // vertical, degrees
-  viewport: [number, number]; // device pixels
-}
-
 // What lies on the normal's side, dot(normal, p) > offset, is cut away. normal: of length 1.
 export interface Plane {
   normal: Vec3;
   offset: number;
 }
+
+export type MeshFormat = 'vtu' | 'stl' | 'glb';
 
 // From the page to the worker.
 export type Request =
@@ -37,11 +32,11 @@ export type Request =
   | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
   | { type: 'edges'; wanted: boolean } // whether pieces have edges
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
-  | { type: 'save'; format: 'vtu' | 'stl' | 'glb' }
+  | { type: 'save'; format: MeshFormat }
   | { type: 'digest' }; // answered by a report of the same type
 
 export interface View {
-  camera: Camera;
+  camera: Pose & { viewport: [number, number] }; // viewport: device pixels
   pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null;
   maxTets: number | null; // in the mesh; null: no limit
@@ -56,7 +51,7 @@ export type Report =
   | { type: 'surface'; change: SurfaceChange }
   | { type: 'cap'; cap: Cap }
   | { type: 'tets'; tets: Tets }
-  | { type: 'saved'; format: string; name: string; bytes: ArrayBuffer }
+  | { type: 'saved'; format: MeshFormat; name: string; bytes: ArrayBuffer }
   | { type: 'digest'; digest: string; updates: number; tets: number }
   | { type: 'error'; text: string }; // for the user; the session is closed
 

@@ -2,18 +2,17 @@
 //
 // All messages that have arrived are applied before a new version of the surface is made, and that only after the page
 // has shown the last one. Making versions takes at most about half of the time, so as not to slow down a fast stream.
-import type createCore from '@core/core.js';
+import type { Core, Viewer } from '@core/core.js';
 
 import { Connection, kGoingAway } from './connection';
-import type { Box, Plane, Report, View } from './messages';
+import type { Box, MeshFormat, Plane, Report, Request, View } from './messages';
 
 const kSurfaceIntervalMs = 40; // least time between two versions
 const kProgressIntervalMs = 100;
 
-export type Core = Awaited<ReturnType<typeof createCore>>;
-export type SendReport = (report: Report, transfer?: Transferable[]) => void;
+type SendReport = (report: Report, transfer?: Transferable[]) => void;
 
-// What the page wants to be shown with the boundary surface.
+// What the page wants to be shown with the boundary surface. The worker changes it, and then calls the session.
 export interface Extras {
   edges: boolean;
   plane: Plane | null;
@@ -21,7 +20,8 @@ export interface Extras {
 }
 
 export class StreamSession {
-  private viewer: InstanceType<Core['Viewer']>;
+  private readonly dataset: string;
+  private viewer: Viewer;
   private connection: Connection;
   private isEnded = false;
   private isOpen = false; // there is a mesh; stays true while the connection is lost
@@ -40,12 +40,11 @@ export class StreamSession {
 
   constructor(
     private readonly core: Core,
-    private readonly dataset: string,
-    url: string,
-    token: string | undefined,
-    private extras: Extras,
+    { dataset, url, token }: Extract<Request, { type: 'open' }>,
+    private readonly extras: Readonly<Extras>,
     private readonly report: SendReport,
   ) {
+    this.dataset = dataset;
     this.viewer = new core.Viewer(dataset);
     this.connection = new Connection(url, token, {
       connected: () => {
@@ -75,22 +74,35 @@ export class StreamSession {
     this.scheduleSurface();
   }
 
-  setEdges(wanted: boolean): void {
-    this.extras.edges = wanted;
+  // Sends the surface again: edges are wanted, or not wanted any more.
+  remake(): void {
     this.needsAll = true;
     this.isChanged = true;
     this.reportProgress(true);
     this.scheduleSurface();
   }
 
-  setPlane(plane: Plane | null): void {
-    this.extras.plane = plane;
-    this.sendCap();
+  // At once if the mesh is the last surface's, else with the next surface. An empty one if there is no mesh yet.
+  sendCap(): void {
+    const { plane } = this.extras;
+    const { version } = this;
+    if (plane === null || version === 0) {
+      return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), triangles: 0, version } });
+    }
+    if (this.viewer.isStale()) return this.scheduleSurface();
+    const cap = this.viewer.cap(plane);
+    this.report({ type: 'cap', cap: { ...cap, plane, version } }, [cap.vertices]);
   }
 
-  setBox(box: Box | null): void {
-    this.extras.box = box;
-    this.sendTets();
+  // As sendCap().
+  sendTets(): void {
+    const { box } = this.extras;
+    if (box === null || this.version === 0) {
+      return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), count: 0, outOf: 0 } });
+    }
+    if (this.viewer.isStale()) return this.scheduleSurface();
+    const tets = this.viewer.tets(box);
+    this.report({ type: 'tets', tets: { ...tets, box } }, [tets.vertices]);
   }
 
   close(): void {
@@ -101,7 +113,7 @@ export class StreamSession {
     this.viewer.delete();
   }
 
-  save(format: 'vtu' | 'stl' | 'glb'): void {
+  save(format: MeshFormat): void {
     if (!this.isOpen) return this.report({ type: 'error', text: 'There is no mesh to save yet.' });
     const bytes = this.viewer.save(`mesh.${format}`);
     if (typeof bytes === 'string') return this.report({ type: 'error', text: `The mesh cannot be saved: ${bytes}` });
@@ -134,7 +146,8 @@ export class StreamSession {
     const end = performance.now();
     if (error) {
       // A server that goes away closes the connection next, and that leads to a reconnection.
-      return this.viewer.faultCode() === kGoingAway ? undefined : this.fail(error);
+      if (this.viewer.faultCode() !== kGoingAway) this.fail(error);
+      return;
     }
     this.send();
     const updates = this.viewer.updates();
@@ -164,7 +177,7 @@ export class StreamSession {
     if (!this.isOpen) return;
     const wait = this.progressTime + kProgressIntervalMs - performance.now();
     if (!now && wait > 0) {
-      if (this.progressTimer === 0) this.progressTimer = setTimeout(() => this.reportProgress(true), wait) as unknown as number;
+      if (this.progressTimer === 0) this.progressTimer = self.setTimeout(() => this.reportProgress(true), wait);
       return;
     }
     clearTimeout(this.progressTimer);
@@ -180,7 +193,7 @@ export class StreamSession {
     if (this.surfaceTimer !== 0 || !this.isOpen || !this.isChanged || this.shown !== this.version) return;
     const pause = this.version === 0 || this.viewer.done() ? 0 : Math.max(kSurfaceIntervalMs, this.surfaceMs);
     const wait = Math.max(0, this.surfaceEnd + pause - performance.now());
-    this.surfaceTimer = setTimeout(() => this.sendSurface(), wait) as unknown as number;
+    this.surfaceTimer = self.setTimeout(() => this.sendSurface(), wait);
   }
 
   private sendSurface(): void {
@@ -200,28 +213,5 @@ export class StreamSession {
     this.surfaceEnd = performance.now();
     this.surfaceMs = this.surfaceEnd - start;
     this.reportProgress(this.viewer.done());
-  }
-
-  // At once if the mesh is the last surface's, else with the next surface. An empty one if there is no mesh yet.
-  private sendCap(): void {
-    const { plane } = this.extras;
-    const { version } = this;
-    if (plane === null || version === 0) {
-      return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), triangles: 0, version } });
-    }
-    if (this.viewer.isStale()) return this.scheduleSurface();
-    const cap = this.viewer.cap(plane);
-    this.report({ type: 'cap', cap: { ...cap, plane, version } }, [cap.vertices]);
-  }
-
-  // As sendCap().
-  private sendTets(): void {
-    const { box } = this.extras;
-    if (box === null || this.version === 0) {
-      return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), count: 0, outOf: 0 } });
-    }
-    if (this.viewer.isStale()) return this.scheduleSurface();
-    const tets = this.viewer.tets(box);
-    this.report({ type: 'tets', tets: { ...tets, box } }, [tets.vertices]);
   }
 }

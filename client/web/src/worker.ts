@@ -18,7 +18,7 @@ async function handle(request: Request): Promise<void> {
   switch (request.type) {
     case 'open':
       session?.close();
-      session = new StreamSession(loaded, request.dataset, request.url, request.token, { ...extras }, report);
+      session = new StreamSession(loaded, request, extras, report);
       if (view) session.look(view);
       break;
     case 'view':
@@ -27,16 +27,16 @@ async function handle(request: Request): Promise<void> {
       break;
     case 'clip':
       extras.plane = request.plane;
-      session?.setPlane(request.plane);
+      session?.sendCap();
       break;
     case 'tets':
       extras.box = request.box;
-      session?.setBox(request.box);
+      session?.sendTets();
       break;
     case 'edges':
       if (extras.edges === request.wanted) break;
       extras.edges = request.wanted;
-      session?.setEdges(request.wanted);
+      session?.remake();
       break;
     case 'shown':
       session?.pageShows(request.version);
@@ -53,6 +53,7 @@ async function handle(request: Request): Promise<void> {
 // One after another, also while the core is being loaded.
 let last: Promise<void> = Promise.resolve();
 scope.onmessage = ({ data }: MessageEvent<Request>) => {
-  last = last.then(() => handle(data)).catch((error: unknown) => report({ type: 'error', text: `The client core failed: ${String(error)}` }));
+  const failed = (error: unknown) => report({ type: 'error', text: `The client core failed: ${String(error)}` });
+  last = last.then(() => handle(data)).catch(failed);
 };
 core.catch((error: unknown) => report({ type: 'error', text: `The client core cannot be loaded: ${String(error)}` }));
