@@ -1,21 +1,7 @@
 // The materials, and the uniforms that they share.
 import {
-  AddEquation,
-  Color,
-  CustomBlending,
-  DoubleSide,
-  GLSL3,
-  type IUniform,
-  NoBlending,
-  OneFactor,
-  OneMinusSrcAlphaFactor,
-  RawShaderMaterial,
-  type ShaderMaterialParameters,
-  SrcAlphaFactor,
-  Vector2,
-  Vector3,
-  Vector4,
-  ZeroFactor,
+  Color, CustomBlending, DoubleSide, GLSL3, type IUniform, NoBlending, OneFactor, OneMinusSrcAlphaFactor,
+  RawShaderMaterial, type ShaderMaterialParameters, SrcAlphaFactor, Vector2, Vector3, Vector4, ZeroFactor,
 } from 'three';
 import * as shaders from './shaders';
 import { kSurfaces, type SurfaceName, type SurfaceStyle } from './state';
@@ -64,7 +50,6 @@ export interface SurfaceMaterials {
 // See kTransparentFragment.
 const kAccumulation: Parameters = {
   blending: CustomBlending,
-  blendEquation: AddEquation,
   blendSrc: OneFactor,
   blendDst: OneFactor,
   blendSrcAlpha: ZeroFactor,
@@ -75,7 +60,6 @@ const kAccumulation: Parameters = {
 
 const kAlphaBlending: Parameters = {
   blending: CustomBlending,
-  blendEquation: AddEquation,
   blendSrc: SrcAlphaFactor,
   blendDst: OneMinusSrcAlphaFactor,
   blendSrcAlpha: OneFactor,
@@ -86,7 +70,6 @@ const kAlphaBlending: Parameters = {
 // Without depth test: hidden layers are added, too.
 const kAdditive: Parameters = {
   blending: CustomBlending,
-  blendEquation: AddEquation,
   blendSrc: OneFactor,
   blendDst: OneFactor,
   depthTest: false,

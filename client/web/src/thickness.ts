@@ -1,6 +1,9 @@
 // The thickness of the solid along each ray, independent of the order of its triangles: each adds its distance from the
 // eye where the ray leaves the solid and subtracts it where the ray enters. After Figure 6 of the paper.
-import { type Camera, FloatType, HalfFloatType, NearestFilter, RedFormat, Vector2, type WebGLRenderer, WebGLRenderTarget } from 'three';
+import {
+  type Camera, FloatType, HalfFloatType, NearestFilter, RedFormat, Texture, Vector2, type WebGLRenderer,
+  WebGLRenderTarget,
+} from 'three';
 import { roundUp } from './format';
 import { canvasSizedTarget, fullScreenScene } from './full_screen';
 import { compositeMaterial, thicknessMaterial } from './materials';
@@ -16,10 +19,9 @@ export class Thickness {
   onMaximum: () => void = () => {}; // the maximum has changed, or may change: draw again
   private isPrecise: boolean;
   private target: WebGLRenderTarget | null = null;
-  private compositeMaterial = compositeMaterial(kThicknessCompositeFragment, { thickness: { value: null }, maximum: { value: 1 } });
-  private composite = fullScreenScene(this.compositeMaterial);
-  private maximumMaterial = compositeMaterial(kBlockMaximumFragment, { thickness: { value: null }, size: { value: new Vector2() } });
-  private maximumPass = fullScreenScene(this.maximumMaterial);
+  private uniforms = { thickness: { value: new Texture() }, maximum: { value: 1 }, size: { value: new Vector2() } };
+  private composite = fullScreenScene(compositeMaterial(kThicknessCompositeFragment, this.uniforms));
+  private maximumPass = fullScreenScene(compositeMaterial(kBlockMaximumFragment, this.uniforms));
   private maximumTarget = new WebGLRenderTarget(kBlocks, kBlocks, { type: FloatType, depthBuffer: false });
   private blocks = new Float32Array(4 * kBlocks * kBlocks);
   private isReading = false;
@@ -44,15 +46,15 @@ export class Thickness {
       magFilter: NearestFilter,
       depthBuffer: false,
     }));
-    this.compositeMaterial.uniforms['thickness']!.value = this.maximumMaterial.uniforms['thickness']!.value = this.target.texture;
-    this.maximumMaterial.uniforms['size']!.value.set(this.target.width, this.target.height);
+    this.uniforms.thickness.value = this.target.texture;
+    this.uniforms.size.value.set(this.target.width, this.target.height);
     renderer.setRenderTarget(this.target);
     renderer.setClearColor(0x000000, 0);
     renderer.clear();
     drawLayers();
     void this.updateMaximum(renderer, camera);
     renderer.setRenderTarget(null);
-    this.compositeMaterial.uniforms['maximum']!.value = this.maximum;
+    this.uniforms.maximum.value = this.maximum;
     renderer.render(this.composite, camera);
   }
 

@@ -1,6 +1,6 @@
 // Transparent surfaces, in any order: weighted blended order-independent transparency (see shaders.ts). They are
 // accumulated in targets of their own, against the depth of the opaque surfaces, and then composited over the picture.
-import { type Camera, HalfFloatType, NearestFilter, type WebGLRenderer, type WebGLRenderTarget } from 'three';
+import { type Camera, HalfFloatType, NearestFilter, Texture, type WebGLRenderer, type WebGLRenderTarget } from 'three';
 import { canvasSizedTarget, fullScreenScene } from './full_screen';
 import { compositeMaterial } from './materials';
 import { kTransparencyCompositeFragment } from './shaders';
@@ -10,8 +10,8 @@ const kMultisampledPixels = 3e6;
 
 export class Transparency {
   private target: WebGLRenderTarget | null = null;
-  private material = compositeMaterial(kTransparencyCompositeFragment, { accumulations: { value: null }, weights: { value: null } });
-  private composite = fullScreenScene(this.material);
+  private uniforms = { accumulations: { value: new Texture() }, weights: { value: new Texture() } };
+  private composite = fullScreenScene(compositeMaterial(kTransparencyCompositeFragment, this.uniforms));
 
   // drawDepth: draws the opaque surfaces, depth only; drawTransparent: the transparent ones.
   draw(renderer: WebGLRenderer, camera: Camera, drawDepth: () => void, drawTransparent: () => void): void {
@@ -22,8 +22,7 @@ export class Transparency {
       magFilter: NearestFilter,
       samples: pixels > kMultisampledPixels ? 0 : 4,
     }));
-    this.material.uniforms['accumulations']!.value = this.target.textures[0];
-    this.material.uniforms['weights']!.value = this.target.textures[1];
+    [this.uniforms.accumulations.value, this.uniforms.weights.value] = this.target.textures as [Texture, Texture];
     renderer.setRenderTarget(this.target);
     renderer.setClearColor(0x000000, 1); // sums 0, transmittance 1
     renderer.clear();

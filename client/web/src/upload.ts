@@ -1,7 +1,8 @@
 // Uploads geometry to the graphics card before it is drawn, a limited amount per frame. three.js uploads what it draws,
 // so each geometry is drawn once with an empty draw range into a target of one pixel.
-import { BufferAttribute, BufferGeometry, Camera, Mesh, Scene, Sphere, type WebGLRenderer, WebGLRenderTarget } from 'three';
+import { BufferAttribute, BufferGeometry, Camera, Scene, Sphere, type WebGLRenderer, WebGLRenderTarget } from 'three';
 import { uploadMaterial } from './materials';
+import { staticMesh } from './static_mesh';
 
 // The budget of a frame. Bytes are limited, too: the browser copies them to its GPU process, and blocks this thread
 // while too many are on their way.
@@ -11,13 +12,12 @@ const kBudgetBytes = 2e6;
 export class Uploader {
   private scene = new Scene();
   private target = new WebGLRenderTarget(1, 1);
-  private mesh = new Mesh(new BufferGeometry(), uploadMaterial());
+  private mesh = staticMesh(new BufferGeometry(), uploadMaterial());
   private camera = new Camera();
   private deadline = 0; // performance.now()
   private bytesLeft = 0;
 
   constructor(private renderer: WebGLRenderer) {
-    this.mesh.frustumCulled = false;
     this.scene.add(this.mesh);
     const empty = new BufferGeometry(); // compiles the shader, so that the first piece need not wait for it
     empty.setAttribute('position', new BufferAttribute(new Uint32Array(4), 4));
