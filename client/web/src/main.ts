@@ -14,7 +14,7 @@ import { watchProgress } from './progress';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
 import { fromHash, toHash, type ViewState } from './state';
-import { kInitialStatus, type Status } from './status';
+import { Status } from './status';
 import { Store } from './store';
 import { watchTheme } from './theme';
 import { Viewer } from './viewer';
@@ -25,7 +25,7 @@ const kContextLost = 'The WebGL context was lost. The picture returns when the b
 const kHashDelayMs = 300; // after the last change of the view
 
 const view = new Store<ViewState>(fromHash(location.hash));
-const status = new Store<Status>(kInitialStatus);
+const status = new Store<Status>(new Status());
 
 class Page {
   private readonly canvas = element<HTMLCanvasElement>('canvas');

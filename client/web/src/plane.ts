@@ -1,7 +1,7 @@
 // Planes that cut a box: pure geometry. Normals have length 1; what lies on the normal's side of a plane is cut away.
 // World coordinates.
 import type { Box, Plane, Vec3 } from './messages';
-import { add, along, center, corners, diagonal, dot, kBoxEdges, scale, sub, unit } from './vec';
+import { add, along, center, clamp, corners, diagonal, dot, kBoxEdges, scale, sub, unit } from './vec';
 
 const kNormalLength = 0.18; // of the drawn normal, as a fraction of the box's diagonal
 
@@ -21,8 +21,7 @@ export const normalTip = (box: Box, plane: Plane): Vec3 => along(handlePosition(
 
 // Moved along its normal until it touches the box, if it does not.
 export function clamped(box: Box, plane: Plane): Plane {
-  const [least, greatest] = offsetRange(box, plane.normal);
-  return { normal: plane.normal, offset: Math.min(greatest, Math.max(least, plane.offset)) };
+  return { normal: plane.normal, offset: clamp(plane.offset, ...offsetRange(box, plane.normal)) };
 }
 
 // Rotated about its handle, so that its normal points to `tip`; then clamped.

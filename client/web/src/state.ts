@@ -8,7 +8,7 @@
 // (each rrggbb,opacity).
 import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
-import { cross, length, sub, unit } from './vec';
+import { clamp, cross, length, sub, unit } from './vec';
 
 export interface SurfaceStyle {
   color: string; // #rrggbb
@@ -18,41 +18,25 @@ export interface SurfaceStyle {
 export type SurfaceName = 'alpha' | 'beta' | 'box';
 export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // the order of the groups in a SurfacePiece
 
-export interface ViewState {
-  dataset: string | null; // null: the server's first
-  pose: Pose | null; // null: shows the whole data set
-  pixelError: number; // largest screen-space error, pixels; 0.1 to 64
-  maxTets: number | null; // null: no limit
-  memory: number | null; // MB for updates; null: no limit
-  clip: Plane | null;
-  region: Box | null;
-  tets: boolean; // shrunken tetrahedra in the region
-  shrink: number; // their size, 0.4 to 1
-  thickness: boolean;
-  wireframe: boolean;
-  levels: boolean; // colour by level of detail
-  alpha: SurfaceStyle;
-  beta: SurfaceStyle;
-  box: SurfaceStyle;
+export class ViewState {
+  dataset: string | null = null; // null: the server's first
+  pose: Pose | null = null; // null: shows the whole data set
+  pixelError = 1; // largest screen-space error, pixels; 0.1 to 64
+  maxTets: number | null = null; // null: no limit
+  memory: number | null = null; // MB for updates; null: no limit
+  clip: Plane | null = null;
+  region: Box | null = null;
+  tets = false; // shrunken tetrahedra in the region
+  shrink = 0.8; // their size, 0.4 to 1
+  thickness = false;
+  wireframe = false;
+  levels = false; // colour by level of detail
+  alpha: SurfaceStyle = { color: '#3d7fd6', opacity: 1 };
+  beta: SurfaceStyle = { color: '#f0862a', opacity: 1 };
+  box: SurfaceStyle = { color: '#d8c49a', opacity: 1 };
 }
 
-export const kDefaults: Readonly<ViewState> = {
-  dataset: null,
-  pose: null,
-  pixelError: 1,
-  maxTets: null,
-  memory: null,
-  clip: null,
-  region: null,
-  tets: false,
-  shrink: 0.8,
-  thickness: false,
-  wireframe: false,
-  levels: false,
-  alpha: { color: '#3d7fd6', opacity: 1 },
-  beta: { color: '#f0862a', opacity: 1 },
-  box: { color: '#d8c49a', opacity: 1 },
-};
+export const kDefaults: Readonly<ViewState> = { ...new ViewState() };
 
 const kFlags = ['tets', 'thickness', 'levels', 'wireframe'] as const;
 
@@ -104,7 +88,7 @@ function upFor(eye: Vec3, lookAt: Vec3, preferred: Vec3): Vec3 {
 
 function readClamped(text: string | null, least: number, greatest: number): number | null {
   const number = read(text, 1);
-  return number ? Math.min(greatest, Math.max(least, number[0]!)) : null;
+  return number && clamp(number[0]!, least, greatest);
 }
 
 // Fields that are missing or invalid get their defaults; numbers out of range are clamped.
@@ -112,13 +96,9 @@ export function fromHash(hash: string): ViewState {
   const fields = new URLSearchParams(hash.replace(/^#/, '').replaceAll('+', '%2B'));
   const get = (key: string) => fields.get(key);
   const state: ViewState = { ...kDefaults, dataset: get('data') };
-  const eye = read(get('eye'), 3);
-  const at = read(get('at'), 3);
-  const up = read(get('up'), 3);
-  if (eye && at && eye.some((x, i) => x !== at[i])) {
-    const [from, to] = [eye as Vec3, at as Vec3];
-    const fov = readClamped(get('fov'), 5, 120) ?? kFov;
-    state.pose = { eye: from, lookAt: to, up: upFor(from, to, (up ?? [0, 0, 1]) as Vec3), fov };
+  const [eye, lookAt, up] = ['eye', 'at', 'up'].map((key) => read(get(key), 3) as Vec3 | null);
+  if (eye && lookAt && eye.some((x, i) => x !== lookAt[i])) {
+    state.pose = { eye, lookAt, up: upFor(eye, lookAt, up ?? [0, 0, 1]), fov: readClamped(get('fov'), 5, 120) ?? kFov };
   }
   state.pixelError = readClamped(get('px'), 0.1, 64) ?? kDefaults.pixelError;
   state.maxTets = readClamped(get('tets'), 1, 1e9);

@@ -1,6 +1,9 @@
 // Vectors of three doubles, and boxes: for cameras and planes.
 import type { Box, Vec3 } from './messages';
 
+export const kAxes: readonly Vec3[] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+export const clamp = (x: number, least: number, greatest: number): number => Math.min(greatest, Math.max(least, x));
+
 export const add = (a: Vec3, b: Vec3): Vec3 => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 export const sub = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 export const scale = (a: Vec3, s: number): Vec3 => [a[0] * s, a[1] * s, a[2] * s];
