@@ -1,8 +1,10 @@
-// Elements of index.html by their ids. Throws if there is none: a defect of the page.
-export function element<T extends HTMLElement = HTMLElement>(id: string): T {
+// The elements of the page.
+
+// An element of index.html by its id. Throws if there is none: a defect of the page.
+export function element<T extends Element = HTMLElement>(id: string): T {
   const found = document.getElementById(id);
   if (!found) throw new Error(`index.html has no #${id}`);
-  return found as T;
+  return found as Element as T;
 }
 
 export const input = (id: string): HTMLInputElement => element<HTMLInputElement>(id);
@@ -12,6 +14,16 @@ export function onClick(id: string, run: () => void): void {
 }
 
 // Leaves equal text alone: a screen reader would announce it again.
-export function setText(target: HTMLElement, text: string): void {
+export function setText(target: Element, text: string): void {
   if (target.textContent !== text) target.textContent = text;
+}
+
+type Tags = HTMLElementTagNameMap;
+type Tag = keyof Tags;
+
+// A new element with these properties and children.
+export function create<T extends Tag>(tag: T, properties: Partial<Tags[T]>, ...children: (Node | string)[]): Tags[T] {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
 }

@@ -6,18 +6,18 @@ import type { ViewState } from './state';
 
 // maxThickness: world units at the end of the colour map.
 export function showLegend(view: Readonly<ViewState>, maxThickness: number): void {
-  const shown = view.thickness ? 'thickness' : view.levels ? 'levels' : null;
-  element('legend').hidden = shown === null;
-  if (!shown) return;
-  const put = (id: string, text: string) => (element(id).textContent = text);
-  put('legend-title', shown === 'thickness' ? 'Thickness along the line of sight, world units' : 'Level of detail');
-  put('legend-low', shown === 'thickness' ? '0' : 'finest');
-  put('legend-middle', shown === 'thickness' ? short(maxThickness / 2) : '');
-  put('legend-high', shown === 'thickness' ? `${short(maxThickness)} or more` : 'coarsest');
-  paint(shown === 'thickness' ? kThicknessColors : kLevelColors);
+  element('legend').hidden = !view.thickness && !view.levels;
+  if (view.thickness) {
+    const labels = ['0', short(maxThickness / 2), `${short(maxThickness)} or more`];
+    fill('Thickness along the line of sight, world units', labels, kThicknessColors);
+  } else if (view.levels) {
+    fill('Level of detail', ['finest', '', 'coarsest'], kLevelColors);
+  }
 }
 
-function paint(colors: ColorMap): void {
+function fill(title: string, labels: string[], colors: ColorMap): void {
+  element('legend-title').textContent = title;
+  ['low', 'middle', 'high'].forEach((name, i) => (element(`legend-${name}`).textContent = labels[i]!));
   const canvas = element<HTMLCanvasElement>('legend-ramp');
   const context = canvas.getContext('2d');
   if (!context) return;

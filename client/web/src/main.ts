@@ -78,7 +78,7 @@ class Page {
     viewer.onContext = (isLost) => status.set({ notice: isLost ? kContextLost : null });
     viewer.onDrawn = () => {
       const pose = viewer.pose();
-      if (pose) showAxes(element('axes') as unknown as Element, pose);
+      if (pose) showAxes(element<SVGSVGElement>('axes'), pose);
       this.handles.place();
       showLegend(view.value, viewer.picture.thickness.maximum);
     };

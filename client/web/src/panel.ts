@@ -1,6 +1,6 @@
 // The panel of controls: shows the view's state, and changes it.
 import type { Dataset } from './datasets';
-import { element, input, onClick, setText } from './dom';
+import { create, element, input, onClick, setText } from './dom';
 import { bytes, count, short } from './format';
 import { kSurfaces, type ViewState } from './state';
 import type { Status } from './status';
@@ -24,8 +24,6 @@ function nearest(choices: (number | null)[], value: number | null): number {
   const distance = (i: number) => Math.abs(choices[i]! - value);
   return choices.reduce<number>((best, _, i) => (i > 0 && distance(i) < distance(best) ? i : best), 1);
 }
-
-const rangeText = ([low, high]: Dataset['range']): string => `${short(low)} to ${short(high)}`;
 
 export function watchPanel(view: Store<ViewState>, status: Store<Status>): void {
   watchSurfaces(view, status);
@@ -91,8 +89,7 @@ function showDatasets(datasets: Dataset[] | null, open: Dataset | null, choose: 
   if (datasets === null) return;
   const list = element('datasets');
   if (datasets.length === 0) {
-    const hint = Object.assign(document.createElement('p'), { className: 'hint', textContent: 'This server has no data sets.' });
-    list.replaceChildren(hint);
+    list.replaceChildren(create('p', { className: 'hint' }, 'This server has no data sets.'));
     return;
   }
   // The same list keeps its elements, and with them the keyboard's focus.
@@ -101,21 +98,18 @@ function showDatasets(datasets: Dataset[] | null, open: Dataset | null, choose: 
     for (const radio of radios) radio.checked = radio.value === open?.name;
     return;
   }
-  list.replaceChildren(
-    ...datasets.map((dataset) => {
-      const { name } = dataset;
-      const radio = Object.assign(document.createElement('input'), { type: 'radio', name: 'dataset', value: name, checked: name === open?.name });
-      radio.addEventListener('change', () => choose(name));
-      const label = Object.assign(document.createElement('label'), { className: 'dataset' });
-      label.append(radio, Object.assign(document.createElement('span'), { className: 'name', textContent: name }), summary(dataset));
-      return label;
-    }),
-  );
+  const choices = datasets.map((dataset) => {
+    const { name } = dataset;
+    const radio = create('input', { type: 'radio', name: 'dataset', value: name, checked: name === open?.name });
+    radio.addEventListener('change', () => choose(name));
+    const title = create('span', { className: 'name' }, name);
+    return create('label', { className: 'dataset' }, radio, title, summary(dataset));
+  });
+  list.replaceChildren(...choices);
 }
 
-function summary(d: Dataset): HTMLElement {
-  const parts = [d.dims.join(' × '), rangeText(d.range), ...(d.fullTets > 0 ? [`${count(d.fullTets)} tetrahedra`, bytes(d.fullBytes)] : [])];
-  const line = document.createElement('small');
-  line.append(...parts.map((text) => Object.assign(document.createElement('span'), { textContent: text })));
-  return line;
+function summary({ dims, range, fullTets, fullBytes }: Dataset): HTMLElement {
+  const size = fullTets > 0 ? [`${count(fullTets)} tetrahedra`, bytes(fullBytes)] : [];
+  const parts = [dims.join(' × '), `${short(range[0])} to ${short(range[1])}`, ...size];
+  return create('small', {}, ...parts.map((part) => create('span', {}, part)));
 }

@@ -1,5 +1,5 @@
 // How far the view is refined: the status line below the picture, and the statistics in the panel.
-import { element, setText } from './dom';
+import { create, element, setText } from './dom';
 import { bounded, bytes, count, short } from './format';
 import type { Progress } from './messages';
 import type { Status } from './status';
@@ -64,11 +64,7 @@ function showStatusLine(status: Readonly<Status>): void {
     parts.push([bounded(p.volume, p.volumeBound), 'units³']);
   }
   element('status-values').replaceChildren(
-    ...parts.map(([value, label]) => {
-      const part = document.createElement('span');
-      part.append(Object.assign(document.createElement('b'), { textContent: value }), label && ` ${label}`);
-      return part;
-    }),
+    ...parts.map(([value, label]) => create('span', {}, create('b', {}, value), label && ` ${label}`)),
   );
 }
 
@@ -101,10 +97,10 @@ function showStatistics(status: Readonly<Status>): void {
   const rows = statistics(status);
   const list = element('statistics');
   // The elements are kept, so that their text can be selected while numbers change.
-  while (list.children.length < 2 * rows.length) list.append(document.createElement(list.children.length % 2 === 0 ? 'dt' : 'dd'));
+  while (list.children.length < 2 * rows.length) list.append(create(list.children.length % 2 === 0 ? 'dt' : 'dd', {}));
   while (list.children.length > 2 * rows.length) list.lastElementChild!.remove();
   rows.forEach(([name, value], i) => {
-    setText(list.children[2 * i] as HTMLElement, name);
-    setText(list.children[2 * i + 1] as HTMLElement, value);
+    setText(list.children[2 * i]!, name);
+    setText(list.children[2 * i + 1]!, value);
   });
 }
