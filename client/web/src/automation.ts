@@ -5,6 +5,7 @@ import type { ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
 import type { Stats, Viewer } from './viewer';
+import type { WorkerClient } from './worker_client';
 
 export interface Intervale {
   readonly state: Readonly<ViewState>; // the view, as in the address
@@ -24,34 +25,22 @@ declare global {
   }
 }
 
-export class Automation {
-  private awaited: { type: string; resolve: (report: never) => void }[] = [];
-
-  expose(view: Store<ViewState>, status: Store<Status>, viewer: Viewer, send: (request: Request) => void): void {
-    window.intervale = {
-      get state() {
-        return view.value;
-      },
-      get live() {
-        return status.value;
-      },
-      get progress() {
-        return status.value.progress;
-      },
-      stats: viewer.stats,
-      canvas: viewer.picture.canvas,
-      set: (change) => view.set(change),
-      send,
-      next: (type) => new Promise((resolve) => this.awaited.push({ type, resolve })),
-      photograph: () => viewer.photograph(),
-    };
-  }
-
-  // Resolves the promises of next() that wait for this report.
-  received(report: Report): void {
-    const resolved = this.awaited.filter(({ type }) => type === report.type);
-    if (resolved.length === 0) return;
-    this.awaited = this.awaited.filter(({ type }) => type !== report.type);
-    for (const { resolve } of resolved) resolve(report as never);
-  }
+export function expose(view: Store<ViewState>, status: Store<Status>, viewer: Viewer, worker: WorkerClient): void {
+  window.intervale = {
+    get state() {
+      return view.value;
+    },
+    get live() {
+      return status.value;
+    },
+    get progress() {
+      return status.value.progress;
+    },
+    stats: viewer.stats,
+    canvas: viewer.picture.canvas,
+    set: (change) => view.set(change),
+    send: (request) => worker.send(request),
+    next: (type) => worker.next(type),
+    photograph: () => viewer.photograph(),
+  };
 }

@@ -4,23 +4,19 @@
 import { BufferAttribute, BufferGeometry, Group, LineSegments, type Material, Mesh, Sphere, Vector3 } from 'three';
 import { type Frame, toDrawing } from './frame';
 import type { SurfaceMaterials } from './materials';
-import type { SurfacePiece, SurfaceChange, Vec3 } from './messages';
+import type { SurfaceChange, SurfacePiece, Vec3 } from './messages';
 import type { Uploader } from './upload';
 import { add, center, diagonal } from './vec';
 
 interface PieceObjects {
   mesh: Mesh;
-  lines: LineSegments | null;
-  bytes: number;
-  triangles: number;
+  lines: LineSegments | null; // the edges
 }
 
 export class BoundarySurfaceView {
   readonly faces = new Group();
   readonly edges = new Group();
   version = 0; // of what is shown; 0: nothing yet
-  triangles = 0; // shown
-  bytes = 0; // of the buffers of what is shown
   private pieces = new Map<number, PieceObjects>(); // shown, by id
   private pending: SurfaceChange[] = []; // oldest first
   private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
@@ -44,8 +40,8 @@ export class BoundarySurfaceView {
     while (this.uploaded.length < change.pieces.length && this.uploader.hasBudget) {
       const piece = change.pieces[this.uploaded.length]!;
       const objects = this.objectsOf(piece, frame);
-      this.uploader.send(objects.mesh.geometry, objects.bytes);
-      if (objects.lines) this.uploader.send(objects.lines.geometry, 0); // counted with the mesh
+      this.uploader.send(objects.mesh.geometry, piece.vertices.byteLength + piece.indices.byteLength);
+      if (objects.lines) this.uploader.send(objects.lines.geometry, piece.edges!.byteLength);
       this.uploaded.push({ id: piece.id, objects });
     }
     return this.uploaded.length === change.pieces.length;
@@ -54,15 +50,13 @@ export class BoundarySurfaceView {
   // Shows the first pending version.
   swap(): void {
     const change = this.pending.shift()!;
-    if (change.reset) for (const id of [...this.pieces.keys()]) this.remove(id);
+    if (change.reset) for (const id of this.pieces.keys()) this.remove(id);
     for (const id of change.removed) this.remove(id);
     for (const { id, objects } of this.uploaded) {
       this.remove(id);
       this.pieces.set(id, objects);
       this.faces.add(objects.mesh);
       if (objects.lines) this.edges.add(objects.lines);
-      this.triangles += objects.triangles;
-      this.bytes += objects.bytes;
     }
     this.uploaded = [];
     this.version = change.version;
@@ -72,7 +66,7 @@ export class BoundarySurfaceView {
     for (const { objects } of this.uploaded) dispose(objects);
     this.uploaded = [];
     this.pending = [];
-    for (const id of [...this.pieces.keys()]) this.remove(id);
+    for (const id of this.pieces.keys()) this.remove(id);
     this.version = 0;
   }
 
@@ -87,8 +81,6 @@ export class BoundarySurfaceView {
     this.pieces.delete(id);
     this.faces.remove(objects.mesh);
     if (objects.lines) this.edges.remove(objects.lines);
-    this.triangles -= objects.triangles;
-    this.bytes -= objects.bytes;
     dispose(objects);
   }
 
@@ -110,12 +102,7 @@ export class BoundarySurfaceView {
     const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials.opaque);
     const lines = piece.edges ? new LineSegments(geometry(piece.edges, piece.edgeCounts, 2), this.materials.edges) : null;
     for (const object of [mesh, lines]) if (object) object.matrixAutoUpdate = false;
-    return {
-      mesh,
-      lines,
-      bytes: piece.vertices.byteLength + piece.indices.byteLength + (piece.edges?.byteLength ?? 0),
-      triangles: piece.triangles[0] + piece.triangles[1] + piece.triangles[2],
-    };
+    return { mesh, lines };
   }
 }
 

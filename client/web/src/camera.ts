@@ -21,13 +21,27 @@ export function axes(pose: Pose): { right: Vec3; up: Vec3; back: Vec3 } {
   return { right, up: cross(back, right), back };
 }
 
-// A camera that shows the whole box, seen from the direction `from`. aspect: width over height.
-export function fitted(box: Box, aspect: number, from: Vec3 = [0.62, -1, 0.52]): Pose {
-  const half = Math.tan((kFov * Math.PI) / 360) * kFill;
-  const lookAt = center(box);
-  const back = unit(from);
-  const pose: Pose = { eye: add(lookAt, back), lookAt, up: Math.abs(back[2]) > 0.99 ? [0, 1, 0] : [0, 0, 1], fov: kFov };
+const tanHalfFov = (pose: Pose): number => Math.tan((pose.fov * Math.PI) / 360);
+
+// The vector with these lengths along the camera's right and up axes.
+export function inViewPlane(pose: Pose, right: number, up: number): Vec3 {
   const a = axes(pose);
+  return add(scale(a.right, right), scale(a.up, up));
+}
+
+// v without its component along the direction of view.
+export function ontoViewPlane(pose: Pose, v: Vec3): Vec3 {
+  const a = axes(pose);
+  return inViewPlane(pose, dot(a.right, v), dot(a.up, v));
+}
+
+// A camera that shows the whole box. aspect: width over height.
+export function fitted(box: Box, aspect: number): Pose {
+  const lookAt = center(box);
+  const back = unit([0.62, -1, 0.52]);
+  const pose: Pose = { eye: add(lookAt, back), lookAt, up: [0, 0, 1], fov: kFov };
+  const a = axes(pose);
+  const half = tanHalfFov(pose) * kFill;
   const distances = corners(box).map((corner) => {
     const c = sub(corner, lookAt);
     return dot(back, c) + Math.max(Math.abs(dot(a.right, c)) / aspect, Math.abs(dot(a.up, c))) / half;
@@ -37,7 +51,7 @@ export function fitted(box: Box, aspect: number, from: Vec3 = [0.62, -1, 0.52]):
 
 // World units per pixel at the distance of lookAt. height: of the canvas.
 export function unitsPerPixel(pose: Pose, height: number): number {
-  return (2 * length(sub(pose.eye, pose.lookAt)) * Math.tan((pose.fov * Math.PI) / 360)) / Math.max(1, height);
+  return (2 * length(sub(pose.eye, pose.lookAt)) * tanHalfFov(pose)) / Math.max(1, height);
 }
 
 // Rotates about lookAt: by `right` radians about up, by `down` radians about the right axis. up rotates too, so there
@@ -56,18 +70,16 @@ export function rolled(pose: Pose, angle: number): Pose {
 
 // Moves the scene by pixels, right and down.
 export function panned(pose: Pose, right: number, down: number, height: number): Pose {
-  const a = axes(pose);
   const perPixel = unitsPerPixel(pose, height);
-  const by = add(scale(a.right, -right * perPixel), scale(a.up, down * perPixel));
+  const by = inViewPlane(pose, -right * perPixel, down * perPixel);
   return { ...pose, eye: add(pose.eye, by), lookAt: add(pose.lookAt, by) };
 }
 
 // Scales the distance from lookAt by a factor (below 1: nearer). at: the point of the picture that does not move, in
 // pixels right and down from its centre.
 export function zoomed(pose: Pose, factor: number, at: [number, number], height: number): Pose {
-  const a = axes(pose);
   const perPixel = unitsPerPixel(pose, height);
-  const fixed = add(pose.lookAt, add(scale(a.right, at[0] * perPixel), scale(a.up, -at[1] * perPixel)));
+  const fixed = add(pose.lookAt, inViewPlane(pose, at[0] * perPixel, -at[1] * perPixel));
   const lookAt = along(fixed, sub(pose.lookAt, fixed), factor);
   return { ...pose, lookAt, eye: along(lookAt, sub(pose.eye, pose.lookAt), factor) };
 }
@@ -77,19 +89,12 @@ export function projected(pose: Pose, p: Vec3, width: number, height: number): {
   const a = axes(pose);
   const d = sub(p, pose.eye);
   const depth = -dot(a.back, d);
-  const perUnit = height / 2 / Math.tan((pose.fov * Math.PI) / 360) / Math.max(depth, 1e-12);
+  const perUnit = height / 2 / tanHalfFov(pose) / Math.max(depth, 1e-12);
   return { x: width / 2 + dot(a.right, d) * perUnit, y: height / 2 - dot(a.up, d) * perUnit, depth };
 }
 
 // The direction from the eye through a pixel, of length 1.
 export function rayThrough(pose: Pose, x: number, y: number, width: number, height: number): Vec3 {
-  const a = axes(pose);
-  const perPixel = (2 * Math.tan((pose.fov * Math.PI) / 360)) / height;
-  return unit(add(scale(a.back, -1), add(scale(a.right, (x - width / 2) * perPixel), scale(a.up, (height / 2 - y) * perPixel))));
-}
-
-// v without its component along the direction of view.
-export function inViewPlane(pose: Pose, v: Vec3): Vec3 {
-  const a = axes(pose);
-  return add(scale(a.right, dot(a.right, v)), scale(a.up, dot(a.up, v)));
+  const perPixel = (2 * tanHalfFov(pose)) / height;
+  return unit(sub(inViewPlane(pose, (x - width / 2) * perPixel, (height / 2 - y) * perPixel), axes(pose).back));
 }

@@ -1,14 +1,14 @@
 // The controls of the clip plane: a switch, buttons, a slider, and two handles in the picture that move and rotate it.
-import { axes, inViewPlane, type Pose } from './camera';
+import { axes, ontoViewPlane } from './camera';
 import { element, input, onClick } from './dom';
 import { short } from './format';
-import type { Frame } from './frame';
 import type { Handles } from './handles';
 import type { Box, Plane, Vec3 } from './messages';
 import { clamped, handlePosition, mainAxis, normalTip, offsetRange, rotatedTowards, throughCenter } from './plane';
 import type { ViewState } from './state';
 import type { Store } from './store';
-import { add, center, diagonal, dot, rotated, scale, sub } from './vec';
+import { add, diagonal, dot, kAxes, rotated, scale, sub } from './vec';
+import type { Viewer } from './viewer';
 
 const kMoveStep = 0.01; // per arrow key, as a fraction of the box's diagonal
 const kRotateStep = Math.PI / 60; // per arrow key, radians
@@ -16,13 +16,11 @@ const kRotateStep = Math.PI / 60; // per arrow key, radians
 export class ClipControls {
   private last: Plane | null = null; // the plane when it was switched off
 
-  constructor(private view: Store<ViewState>, private frame: () => Frame | null, private pose: () => Pose | null, handles: Handles) {
+  constructor(private view: Store<ViewState>, private viewer: Viewer, handles: Handles) {
     input('clip').addEventListener('change', () => this.toggle());
-    onClick('clip-x', () => this.setNormal([1, 0, 0]));
-    onClick('clip-y', () => this.setNormal([0, 1, 0]));
-    onClick('clip-z', () => this.setNormal([0, 0, 1]));
+    ['x', 'y', 'z'].forEach((name, axis) => onClick(`clip-${name}`, () => this.setNormal(kAxes[axis]!)));
     onClick('clip-view', () => {
-      const pose = this.pose();
+      const pose = viewer.pose();
       if (pose) this.setNormal(axes(pose).back);
     });
     onClick('clip-flip', () => this.change((plane) => ({ normal: scale(plane.normal, -1), offset: -plane.offset })));
@@ -40,12 +38,12 @@ export class ClipControls {
 
   // Without an earlier plane: through the centre of the box, facing the camera.
   toggle(): void {
-    const frame = this.frame();
+    const { frame } = this.viewer;
     const { clip } = this.view.value;
+    const pose = this.viewer.pose();
     if (clip) this.last = clip;
-    const pose = this.pose();
-    const normal = pose && frame ? mainAxis(sub(pose.eye, center(frame.box))) : ([1, 0, 0] as Vec3);
-    this.view.set({ clip: clip || !frame ? null : (this.last ?? throughCenter(frame.box, normal)) });
+    const plane = frame && pose && (this.last ?? throughCenter(frame.box, mainAxis(sub(pose.eye, frame.center))));
+    this.view.set({ clip: clip ? null : plane });
     this.show();
   }
 
@@ -60,14 +58,14 @@ export class ClipControls {
   }
 
   private change(make: (plane: Plane, box: Box) => Plane): void {
-    const frame = this.frame();
+    const { frame } = this.viewer;
     const { clip } = this.view.value;
     if (frame && clip) this.view.set({ clip: clamped(frame.box, make(clip, frame.box)) });
   }
 
   private show(): void {
+    const { frame } = this.viewer;
     const { clip } = this.view.value;
-    const frame = this.frame();
     input('clip').checked = clip !== null;
     element('clip-controls').hidden = clip === null;
     if (!clip || !frame) return;
@@ -100,7 +98,7 @@ export class ClipControls {
         return (by) => this.change((_, box) => rotatedTowards(box, plane, add(normalTip(box, plane), by)));
       },
       nudge: (right, up) => {
-        const pose = this.pose();
+        const pose = this.viewer.pose();
         if (!pose) return;
         const a = axes(pose);
         this.change((plane, box) => {
@@ -112,16 +110,17 @@ export class ClipControls {
   }
 
   private at(position: (box: Box, plane: Plane) => Vec3): Vec3 | null {
-    const [frame, plane] = [this.frame(), this.view.value.clip];
-    return frame && plane && position(frame.box, plane);
+    const { frame } = this.viewer;
+    const { clip } = this.view.value;
+    return frame && clip && position(frame.box, clip);
   }
 
   // The distance along the normal that keeps the handle under a pointer dragged by `by`. Where the normal points at the
   // eye, dragging up moves the plane towards it.
   private alongNormal(by: Vec3, normal: Vec3): number {
-    const pose = this.pose();
+    const pose = this.viewer.pose();
     if (!pose) return 0;
-    const projected = inViewPlane(pose, normal);
+    const projected = ontoViewPlane(pose, normal);
     const squared = dot(projected, projected);
     return squared > 0.05 ? dot(by, projected) / squared : dot(by, axes(pose).up);
   }

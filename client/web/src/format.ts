@@ -53,5 +53,3 @@ export function roundUp(x: number): number {
   const power = 10 ** Math.floor(Math.log10(x));
   return power * kRound.find((round) => x <= round * power * (1 + 1e-12))!;
 }
-
-export const sameJson = (a: unknown, b: unknown): boolean => JSON.stringify(a) === JSON.stringify(b);

@@ -1,7 +1,10 @@
 // Handles over the picture. They are buttons: reached by Tab, moved by arrow keys, dragged by pointer or touch.
-import { axes, type Pose, projected, unitsPerPixel } from './camera';
+import { inViewPlane, projected, unitsPerPixel } from './camera';
+import { create, element } from './dom';
+import { watchArrows } from './keyboard';
 import type { Vec3 } from './messages';
-import { add, dot, length, scale, sub } from './vec';
+import { length, sub } from './vec';
+import type { Viewer } from './viewer';
 
 export interface Handle {
   label: string;
@@ -14,18 +17,19 @@ export interface Handle {
 }
 
 export class Handles {
+  private layer = element('handles');
   private items: { button: HTMLButtonElement; handle: Handle }[] = [];
 
-  constructor(private layer: HTMLElement, private canvas: HTMLCanvasElement, private pose: () => Pose | null) {}
+  constructor(private viewer: Viewer) {}
 
   add(handle: Handle): void {
-    const button = document.createElement('button');
-    button.type = 'button';
-    button.className = handle.icon ? 'handle large' : 'handle';
-    button.setAttribute('aria-label', handle.label);
-    button.title = handle.label;
+    const { label, icon } = handle;
+    const button = create('button', { type: 'button', className: 'handle', title: label, ariaLabel: label });
     button.hidden = true; // until place()
-    if (handle.icon) button.append(icon(handle.icon));
+    if (icon) {
+      button.classList.add('large');
+      button.innerHTML = `<svg><use href="#i-${icon}"/></svg>`;
+    }
     this.layer.append(button);
     this.items.push({ button, handle });
     this.watch(button, handle);
@@ -33,8 +37,8 @@ export class Handles {
 
   // Positions the buttons. To be called whenever the camera or the position of a handle has changed.
   place(): void {
-    const pose = this.pose();
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const pose = this.viewer.pose();
+    const { clientWidth: width, clientHeight: height } = this.viewer.picture.canvas;
     for (const { button, handle } of this.items) {
       const position = pose && handle.position();
       const at = position ? projected(pose, position, width, height) : null;
@@ -53,31 +57,19 @@ export class Handles {
       start = { x: event.clientX, y: event.clientY, position, drag: handle.grab() };
     });
     button.addEventListener('pointermove', (event) => {
-      const pose = this.pose();
+      const pose = this.viewer.pose();
       if (!start || !pose) return;
-      const a = axes(pose);
-      const depth = dot(scale(a.back, -1), sub(start.position, pose.eye)) / length(sub(pose.lookAt, pose.eye));
-      const perPixel = unitsPerPixel(pose, this.canvas.clientHeight) * depth;
-      const [right, up] = [(event.clientX - start.x) * perPixel, (start.y - event.clientY) * perPixel];
-      start.drag(add(scale(a.right, right), scale(a.up, up)));
+      const { clientWidth: width, clientHeight: height } = this.viewer.picture.canvas;
+      const { depth } = projected(pose, start.position, width, height);
+      const perPixel = (unitsPerPixel(pose, height) * depth) / length(sub(pose.lookAt, pose.eye));
+      start.drag(inViewPlane(pose, (event.clientX - start.x) * perPixel, (start.y - event.clientY) * perPixel));
     });
     const end = () => (start = null);
     button.addEventListener('pointerup', end);
     button.addEventListener('pointercancel', end);
-    button.addEventListener('keydown', (event) => {
-      const by = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-      if (!by || event.ctrlKey || event.altKey || event.metaKey) return;
-      event.preventDefault();
-      const times = event.shiftKey ? 5 : 1;
-      handle.nudge(by[0]! * times, by[1]! * times);
+    watchArrows(button, (right, up, withShift) => {
+      const times = withShift ? 5 : 1;
+      handle.nudge(right * times, up * times);
     });
   }
-}
-
-export function icon(name: string): SVGSVGElement {
-  const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
-  const use = document.createElementNS('http://www.w3.org/2000/svg', 'use');
-  use.setAttribute('href', `#i-${name}`);
-  svg.append(use);
-  return svg;
 }

@@ -1,6 +1,7 @@
 // The keyboard. Letters work everywhere except in text fields; arrows, plus and minus only while the canvas has focus.
-import { orbited, panned, type Pose, zoomed } from './camera';
-import type { CameraController } from './pointer';
+import { orbited, panned, zoomed } from './camera';
+import { create } from './dom';
+import type { Viewer } from './viewer';
 
 export interface Command {
   key: string; // upper case
@@ -11,37 +12,42 @@ export interface Command {
 const kRotateStep = Math.PI / 24; // radians
 const kPanStep = 40; // pixels
 const kZoomStep = 1.15; // factor
-
-const kMoves: Record<string, { plain: (pose: Pose) => Pose; shifted: (pose: Pose, height: number) => Pose }> = {
-  ArrowLeft: { plain: (pose) => orbited(pose, -kRotateStep, 0), shifted: (pose, height) => panned(pose, -kPanStep, 0, height) },
-  ArrowRight: { plain: (pose) => orbited(pose, kRotateStep, 0), shifted: (pose, height) => panned(pose, kPanStep, 0, height) },
-  ArrowUp: { plain: (pose) => orbited(pose, 0, -kRotateStep), shifted: (pose, height) => panned(pose, 0, -kPanStep, height) },
-  ArrowDown: { plain: (pose) => orbited(pose, 0, kRotateStep), shifted: (pose, height) => panned(pose, 0, kPanStep, height) },
+const kArrows: Record<string, [right: number, up: number]> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
 };
+const kZooms: Record<string, number> = { '+': 1 / kZoomStep, '=': 1 / kZoomStep, '-': kZoomStep, _: kZoomStep };
 
-export function watchKeys(canvas: HTMLCanvasElement, controller: CameraController, commands: Command[]): void {
-  const zoom = (factor: number) => (pose: Pose, height: number) => zoomed(pose, factor, [0, 0], height);
+const isShortcut = (event: KeyboardEvent): boolean => event.ctrlKey || event.metaKey || event.altKey; // of the browser
 
-  canvas.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const arrow = kMoves[event.key];
-    const change = arrow
-      ? event.shiftKey
-        ? arrow.shifted
-        : arrow.plain
-      : event.key === '+' || event.key === '='
-        ? zoom(1 / kZoomStep)
-        : event.key === '-' || event.key === '_'
-          ? zoom(kZoomStep)
-          : null;
-    const pose = controller.pose();
-    if (!change || !pose) return;
+// Calls `move` for each press of an arrow key, with -1, 0 or 1 steps.
+export function watchArrows(target: HTMLElement, move: (right: number, up: number, withShift: boolean) => void): void {
+  target.addEventListener('keydown', (event) => {
+    const arrow = kArrows[event.key];
+    if (!arrow || isShortcut(event)) return;
     event.preventDefault();
-    controller.move(change(pose, canvas.clientHeight));
+    move(...arrow, event.shiftKey);
   });
+}
 
+export function watchKeys(canvas: HTMLElement, viewer: Viewer, commands: Command[]): void {
+  watchArrows(canvas, (right, up, withShift) =>
+    viewer.move((pose, _, height) =>
+      withShift
+        ? panned(pose, right * kPanStep, -up * kPanStep, height)
+        : orbited(pose, right * kRotateStep, -up * kRotateStep),
+    ),
+  );
+  canvas.addEventListener('keydown', (event) => {
+    const factor = kZooms[event.key];
+    if (!factor || isShortcut(event)) return;
+    event.preventDefault();
+    viewer.move((pose, _, height) => zoomed(pose, factor, [0, 0], height));
+  });
   document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || document.querySelector('dialog[open]')) return;
+    if (isShortcut(event) || event.repeat || document.querySelector('dialog[open]')) return;
     if (event.target instanceof HTMLInputElement && ['password', 'number', 'text'].includes(event.target.type)) return;
     const key = event.key === '?' ? 'H' : event.key.toUpperCase();
     const command = commands.find((one) => one.key === key);
@@ -61,8 +67,6 @@ export function listKeys(list: HTMLElement, commands: Command[]): void {
     [['Tab'], 'Next control or handle'],
   ];
   for (const [keys, description] of rows) {
-    const term = document.createElement('dt');
-    term.append(...keys.map((key) => Object.assign(document.createElement('kbd'), { textContent: key })));
-    list.append(term, Object.assign(document.createElement('dd'), { textContent: description }));
+    list.append(create('dt', {}, ...keys.map((key) => create('kbd', {}, key))), create('dd', {}, description));
   }
 }

@@ -1,5 +1,5 @@
 // The page: connects the controls, the view's state, the worker and the picture.
-import { Automation } from './automation';
+import { expose } from './automation';
 import { showAxes } from './axes';
 import { watchBanner } from './banner';
 import { ClipControls } from './clip';
@@ -9,7 +9,7 @@ import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
 import { showLegend } from './legend';
 import { watchPanel } from './panel';
-import { type CameraController, watchPointers } from './pointer';
+import { watchPointers } from './pointer';
 import { watchProgress } from './progress';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
@@ -28,17 +28,14 @@ const view = new Store<ViewState>(fromHash(location.hash));
 const status = new Store<Status>(new Status());
 
 class Page {
-  private readonly canvas = element<HTMLCanvasElement>('canvas');
   private readonly handles: Handles;
   private readonly clip: ClipControls;
   private readonly region: RegionControls;
 
   constructor(private readonly viewer: Viewer, private readonly worker: WorkerClient) {
-    const pose = () => viewer.pose();
-    const frame = () => viewer.frame;
-    this.handles = new Handles(element('handles'), this.canvas, pose);
-    this.clip = new ClipControls(view, frame, pose, this.handles);
-    this.region = new RegionControls(view, frame, pose, this.handles);
+    this.handles = new Handles(viewer);
+    this.clip = new ClipControls(view, viewer, this.handles);
+    this.region = new RegionControls(view, viewer, this.handles);
     this.watchViewer();
     view.watch([], (value) => {
       const chosen = value.dataset !== status.value.dataset?.name && status.value.datasets?.find(({ name }) => name === value.dataset);
@@ -85,21 +82,17 @@ class Page {
   }
 
   private watchControls(): void {
-    const { viewer, canvas } = this;
-    const controller: CameraController = {
-      pose: () => viewer.pose(),
-      move: (pose) => view.set({ pose }),
-      centerOn: (x, y) => viewer.centerOn(x, y),
-    };
+    const { viewer } = this;
+    const { canvas } = viewer.picture;
     const commands = this.commands();
     listKeys(element('keys'), commands);
-    watchKeys(canvas, controller, commands);
-    watchPointers(canvas, controller);
+    watchKeys(canvas, viewer, commands);
+    watchPointers(canvas, viewer);
     onClick('reset', resetView);
     onClick('fullscreen', toggleFullScreen);
     onClick('help', showHelp);
     watchPanel(view, status);
-    watchSaving(status, (request) => this.worker.send(request), () => viewer.photograph());
+    watchSaving(status, viewer, this.worker);
     watchTheme(() => {
       viewer.picture.setBackground(getComputedStyle(element('stage')).backgroundColor);
       viewer.picture.outlines.setColor(getComputedStyle(element('handles')).color);
@@ -140,8 +133,9 @@ class Page {
   private wanted(): Wanted | null {
     const pose = this.viewer.pose();
     if (!pose) return null;
+    const { canvas } = this.viewer.picture;
     const { pixelError, region, maxTets, memory, clip, tets, wireframe } = view.value;
-    const viewport: [number, number] = [this.canvas.width, this.canvas.height];
+    const viewport: [number, number] = [canvas.width, canvas.height];
     return {
       view: { camera: { ...pose, viewport }, pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
       plane: clip,
@@ -191,15 +185,11 @@ function watchAddress(): void {
 
 function start(): void {
   watchProgress(status);
-  const automation = new Automation();
   let viewer: Viewer;
   // First the worker: it loads the core while this thread prepares to draw.
-  const worker = new WorkerClient(status, {
-    surface: (change) => viewer.takeSurface(change),
-    cap: (cap) => viewer.takeCap(cap),
-    tets: (tets) => viewer.takeTets(tets),
-    saved: downloadMesh,
-    any: (report) => automation.received(report),
+  const worker = new WorkerClient(status, (report) => {
+    if (report.type === 'saved') downloadMesh(report);
+    else viewer.take(report);
   });
   const listing = listDatasets(null);
   try {
@@ -210,7 +200,7 @@ function start(): void {
     status.set({ error: kNoWebGl });
     return;
   }
-  automation.expose(view, status, viewer, (request) => worker.send(request));
+  expose(view, status, viewer, worker);
   void new Page(viewer, worker).load(listing);
 }
 

@@ -2,7 +2,7 @@
 import { BufferGeometry, Color, LinearSRGBColorSpace, type Material, Mesh, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { type Pose, rayThrough } from './camera';
 import { CapView } from './cap';
-import { type Frame, planeToDrawing, shiftOf, toDrawing } from './frame';
+import { type Frame, toDrawing } from './frame';
 import { setStyles, shared, surfaceMaterials } from './materials';
 import type { Box, Cap, Vec3 } from './messages';
 import { Outlines } from './outlines';
@@ -61,9 +61,16 @@ export class Picture {
     return true;
   }
 
-  setFrame(frame: Frame): void {
+  // Another data set: nothing of the last one is shown any more.
+  open(frame: Frame): void {
     shared.spacing.value.set(...frame.spacing);
-    shared.shift.value.set(...shiftOf(frame));
+    shared.shift.value.set(...toDrawing(frame, frame.origin));
+    shared.coarsestLevel.value = frame.coarsestLevel;
+    this.surface.clear();
+    this.setCap(frame, null);
+    this.tets.discardPending();
+    this.showTets(frame, null);
+    this.resize();
   }
 
   // color: a CSS colour.
@@ -71,19 +78,17 @@ export class Picture {
     this.background.setStyle(color, '');
   }
 
-  setStyles(view: ViewState, coarsestLevel: number): void {
+  setStyles(view: ViewState): void {
     setStyles(this.materials, view);
     shared.colorByLevel.value = view.levels ? 1 : 0;
-    shared.coarsestLevel.value = coarsestLevel;
     shared.shrink.value = view.shrink;
   }
 
   // null: no clip plane.
   setCap(frame: Frame, cap: Cap | null): void {
     this.cap.show(cap);
-    if (!cap?.plane) return void shared.clip.value.set(0, 0, 0, 0);
-    const { normal, offset } = planeToDrawing(frame, cap.plane);
-    shared.clip.value.set(...normal, offset);
+    const { normal, offset } = cap?.plane ?? { normal: [0, 0, 0] as Vec3, offset: 0 };
+    shared.clip.value.set(...normal, offset - dot(normal, frame.center));
   }
 
   // Shows the tetrahedra that have been uploaded, and hides the surface in their box; null: hides nothing.

@@ -1,22 +1,14 @@
 // Mouse, pen and touch on the canvas: rotate, pan, zoom, roll.
-import { orbited, panned, type Pose, rolled, zoomed } from './camera';
-
-export interface CameraController {
-  pose(): Pose | null; // null: no data set is open
-  move(pose: Pose): void;
-  centerOn(x: number, y: number): void; // see Viewer
-}
+import { orbited, panned, rolled, zoomed } from './camera';
+import { clamp } from './vec';
+import type { Viewer } from './viewer';
 
 const kRotation = Math.PI; // radians, for a drag across the canvas's shorter side
 const kWheel = 0.0016; // natural logarithm of the zoom factor, per pixel of the wheel
 
-export function watchPointers(canvas: HTMLCanvasElement, controller: CameraController): void {
+export function watchPointers(canvas: HTMLCanvasElement, viewer: Viewer): void {
   const down = new Map<number, { x: number; y: number }>();
 
-  const change = (make: (pose: Pose, width: number, height: number) => Pose) => {
-    const pose = controller.pose();
-    if (pose) controller.move(make(pose, canvas.clientWidth, canvas.clientHeight));
-  };
   const fromCenter = (x: number, y: number): [number, number] => {
     const box = canvas.getBoundingClientRect();
     return [x - box.left - box.width / 2, y - box.top - box.height / 2];
@@ -35,7 +27,7 @@ export function watchPointers(canvas: HTMLCanvasElement, controller: CameraContr
     const [dx, dy] = [now.x - last.x, now.y - last.y];
     if (down.size === 1) {
       const pans = event.shiftKey || (event.buttons & 6) !== 0;
-      change((pose, width, height) => {
+      viewer.move((pose, width, height) => {
         const angle = kRotation / Math.min(width, height);
         return pans ? panned(pose, dx, dy, height) : orbited(pose, dx * angle, dy * angle);
       });
@@ -47,7 +39,10 @@ export function watchPointers(canvas: HTMLCanvasElement, controller: CameraContr
       const angle = Math.atan2(after[1], after[0]) - Math.atan2(before[1], before[0]);
       const at = fromCenter((now.x + other.x) / 2, (now.y + other.y) / 2);
       const wrapped = Math.atan2(Math.sin(angle), Math.cos(angle)); // to (-π, π]
-      change((pose, _, height) => rolled(zoomed(panned(pose, dx / 2, dy / 2, height), factor, at, height), wrapped));
+      viewer.move((pose, _, height) => {
+        const moved = panned(pose, dx / 2, dy / 2, height);
+        return rolled(zoomed(moved, factor, at, height), wrapped);
+      });
     }
     down.set(event.pointerId, now);
   });
@@ -60,19 +55,16 @@ export function watchPointers(canvas: HTMLCanvasElement, controller: CameraContr
   canvas.addEventListener('pointercancel', up);
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
 
-  canvas.addEventListener(
-    'wheel',
-    (event) => {
-      event.preventDefault();
-      const pixels = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 33 : 1) * (event.ctrlKey ? 5 : 1);
-      const at = fromCenter(event.clientX, event.clientY);
-      change((pose, _, height) => zoomed(pose, Math.exp(Math.max(-300, Math.min(300, pixels)) * kWheel), at, height));
-    },
-    { passive: false },
-  );
+  const zoom = (event: WheelEvent) => {
+    event.preventDefault();
+    const pixels = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 33 : 1) * (event.ctrlKey ? 5 : 1);
+    const at = fromCenter(event.clientX, event.clientY);
+    viewer.move((pose, _, height) => zoomed(pose, Math.exp(clamp(pixels, -300, 300) * kWheel), at, height));
+  };
+  canvas.addEventListener('wheel', zoom, { passive: false });
 
   canvas.addEventListener('dblclick', (event) => {
     const box = canvas.getBoundingClientRect();
-    controller.centerOn(event.clientX - box.left, event.clientY - box.top);
+    viewer.centerOn(event.clientX - box.left, event.clientY - box.top);
   });
 }

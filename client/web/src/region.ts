@@ -1,13 +1,13 @@
 // The region of interest: a box in world coordinates that is refined to full detail. Its controls: a switch, six
 // numbers, and seven handles, of its faces and of the whole box.
-import { axes, inViewPlane, type Pose } from './camera';
-import { element, input } from './dom';
-import type { Frame } from './frame';
+import { inViewPlane, ontoViewPlane } from './camera';
+import { create, element, input } from './dom';
 import type { Handle, Handles } from './handles';
 import type { Box, Vec3 } from './messages';
 import type { ViewState } from './state';
 import type { Store } from './store';
-import { add, center, dot, scale, sub } from './vec';
+import { add, center, clamp, dot, kAxes, scale, sub } from './vec';
+import type { Viewer } from './viewer';
 
 const kAxisNames = ['X', 'Y', 'Z'];
 const kMoveStep = 0.02; // per arrow key, as a fraction of the data's box
@@ -26,13 +26,13 @@ export function faceMoved(region: Box, data: Box, axis: number, end: End, to: nu
   const moved: Box = { min: [...region.min], max: [...region.max] };
   const size = kLeastSize * (data.max[axis]! - data.min[axis]!);
   const [least, greatest] = end === 'min' ? [data.min[axis]!, region.max[axis]! - size] : [region.min[axis]! + size, data.max[axis]!];
-  moved[end][axis] = Math.min(greatest, Math.max(least, to));
+  moved[end][axis] = clamp(to, least, greatest);
   return moved;
 }
 
 // Moved as a whole, clamped to the data's box.
 export function wholeMoved(region: Box, data: Box, by: Vec3): Box {
-  const step = by.map((d, i) => Math.min(data.max[i]! - region.max[i]!, Math.max(data.min[i]! - region.min[i]!, d))) as Vec3;
+  const step = by.map((d, i) => clamp(d, data.min[i]! - region.min[i]!, data.max[i]! - region.max[i]!)) as Vec3;
   return { min: add(region.min, step), max: add(region.max, step) };
 }
 
@@ -40,7 +40,7 @@ export class RegionControls {
   private last: Box | null = null; // the region when it was switched off
   private fields: Record<End, HTMLInputElement[]> = { min: [], max: [] };
 
-  constructor(private view: Store<ViewState>, private frame: () => Frame | null, private pose: () => Pose | null, handles: Handles) {
+  constructor(private view: Store<ViewState>, private viewer: Viewer, handles: Handles) {
     input('region').addEventListener('change', () => this.toggle());
     input('tets').addEventListener('change', () => view.set({ tets: input('tets').checked }));
     input('shrink').addEventListener('input', () => view.set({ shrink: input('shrink').valueAsNumber }));
@@ -51,7 +51,7 @@ export class RegionControls {
   }
 
   toggle(): void {
-    const frame = this.frame();
+    const { frame } = this.viewer;
     const { region } = this.view.value;
     if (region) this.last = region;
     this.view.set(region || !frame ? { region: null, tets: false } : { region: this.last ?? middleHalf(frame.box) });
@@ -71,7 +71,7 @@ export class RegionControls {
   }
 
   private change(make: (region: Box, data: Box) => Box): void {
-    const frame = this.frame();
+    const { frame } = this.viewer;
     const { region } = this.view.value;
     if (frame && region) this.view.set({ region: make(region, frame.box) });
   }
@@ -93,12 +93,12 @@ export class RegionControls {
   }
 
   private addFields(): void {
-    const label = (text: string) => Object.assign(document.createElement('span'), { textContent: text });
+    const label = (text: string) => create('span', {}, text);
     const grid = element('region-fields');
     grid.append(label(''), ...kAxisNames.map(label));
     for (const [end, name] of [['min', 'From'], ['max', 'To']] as const) {
       this.fields[end] = kAxisNames.map((axisName, axis) => {
-        const field = Object.assign(document.createElement('input'), { type: 'number', step: 'any', ariaLabel: `${name} ${axisName}` });
+        const field = create('input', { type: 'number', step: 'any', ariaLabel: `${name} ${axisName}` });
         field.addEventListener('change', () => {
           const to = field.valueAsNumber;
           if (Number.isFinite(to)) this.change((region, data) => faceMoved(region, data, axis, end, to));
@@ -121,12 +121,11 @@ export class RegionControls {
         return (by) => this.change((_, data) => wholeMoved(from, data, by));
       },
       nudge: (right, up) => {
-        const pose = this.pose();
+        const pose = this.viewer.pose();
         if (!pose) return;
-        const a = axes(pose);
         this.change((now, data) => {
           const step = kMoveStep * Math.max(...sub(data.max, data.min));
-          return wholeMoved(now, data, add(scale(a.right, right * step), scale(a.up, up * step)));
+          return wholeMoved(now, data, inViewPlane(pose, right * step, up * step));
         });
       },
     };
@@ -157,10 +156,9 @@ export class RegionControls {
 
   // The distance along an axis that keeps the handle under a pointer dragged by `by`.
   private alongAxis(by: Vec3, axis: number): number {
-    const pose = this.pose();
+    const pose = this.viewer.pose();
     if (!pose) return 0;
-    const direction: Vec3 = [axis === 0 ? 1 : 0, axis === 1 ? 1 : 0, axis === 2 ? 1 : 0];
-    const projected = inViewPlane(pose, direction);
+    const projected = ontoViewPlane(pose, kAxes[axis]!);
     return dot(by, projected) / Math.max(dot(projected, projected), 0.05);
   }
 }

@@ -1,25 +1,24 @@
 // Saves pictures and meshes as files, and copies links to the view.
-import { element, onClick } from './dom';
-import type { Request } from './messages';
+import { create, element, onClick } from './dom';
+import type { MeshFormat, Report } from './messages';
 import type { Status } from './status';
 import type { Store } from './store';
+import type { Viewer } from './viewer';
+import type { WorkerClient } from './worker_client';
 
-const kMimeTypes: Record<string, string> = { vtu: 'application/xml', stl: 'model/stl', glb: 'model/gltf-binary', png: 'image/png' };
-const kFormats = ['vtu', 'stl', 'glb'] as const;
+const kMimeTypes: Record<MeshFormat, string> = { vtu: 'application/xml', stl: 'model/stl', glb: 'model/gltf-binary' };
+const kFormats = Object.keys(kMimeTypes) as MeshFormat[];
 
-export function download(name: string, blob: Blob): void {
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  window.setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+function download(name: string, blob: Blob): void {
+  const url = URL.createObjectURL(blob);
+  create('a', { href: url, download: name }).click();
+  window.setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }
 
-export const downloadMesh = (format: string, name: string, bytes: ArrayBuffer): void =>
-  download(name, new Blob([bytes], { type: kMimeTypes[format] ?? 'application/octet-stream' }));
+export const downloadMesh = ({ format, name, bytes }: Extract<Report, { type: 'saved' }>): void =>
+  download(name, new Blob([bytes], { type: kMimeTypes[format] }));
 
-// photograph: see Viewer.
-export function watchSaving(status: Store<Status>, send: (request: Request) => void, photograph: () => Promise<Blob | null>): void {
+export function watchSaving(status: Store<Status>, viewer: Viewer, worker: WorkerClient): void {
   const note = element('share-note');
   const show = (text: string) => (note.textContent = text);
   onClick('copy-link', async () => {
@@ -31,7 +30,7 @@ export function watchSaving(status: Store<Status>, send: (request: Request) => v
     }
   });
   onClick('save-picture', async () => {
-    const blob = await photograph();
+    const blob = await viewer.photograph();
     if (!blob) return void show('The picture could not be encoded.');
     download(`${status.value.dataset?.name ?? 'intervale'}.png`, blob);
     show('Picture saved.');
@@ -39,11 +38,11 @@ export function watchSaving(status: Store<Status>, send: (request: Request) => v
   for (const format of kFormats) {
     onClick(`save-${format}`, () => {
       status.set({ saving: format });
-      send({ type: 'save', format });
+      worker.send({ type: 'save', format });
       show(`Writing .${format}…`);
     });
   }
-  let last: string | null = null;
+  let last: MeshFormat | null = null;
   status.watch(['saving', 'surfaceVersion'], ({ saving, surfaceVersion }) => {
     if (last !== null && saving === null) show(status.value.error === null ? `.${last} saved.` : '');
     last = saving;

@@ -53,24 +53,19 @@ export class TetsView {
     const old = [...this.group.children] as Mesh[];
     this.group.remove(...old);
     dispose(old);
-    if (this.chunks.length > 0) this.group.add(...this.chunks);
+    for (const mesh of this.chunks) this.group.add(mesh);
     this.chunks = [];
     this.pending = null;
   }
 
-  clear(): void {
-    this.discardPending();
-    this.swap();
+  discardPending(): void {
+    this.pending = null;
+    dispose(this.chunks);
+    this.chunks = [];
   }
 
   use(material: Material): void {
     for (const mesh of this.group.children) (mesh as Mesh).material = material;
-  }
-
-  private discardPending(): void {
-    this.pending = null;
-    dispose(this.chunks);
-    this.chunks = [];
   }
 
   private chunk(words: Uint32Array): BufferGeometry {

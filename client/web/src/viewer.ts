@@ -4,44 +4,30 @@ import { fitted, type Pose } from './camera';
 import type { Dataset } from './datasets';
 import { type Frame, frameOf } from './frame';
 import { GpuFence } from './gpu_fence';
-import type { Cap, SurfaceChange, Tets } from './messages';
+import type { Cap, Report } from './messages';
 import { Picture } from './picture';
 import type { ViewState } from './state';
 import type { Store } from './store';
 import { add, sub } from './vec';
 
-export interface Stats {
-  frames: number; // drawn
-  lastFrameMs: number; // of this thread, for the last frame
-  longestBlock: number; // ms: longest block of this thread by uploads, since it was last set to 0
-  skinVersion: number; // shown; 0: none
-  surfaceTriangles: number;
-  surfaceBytes: number; // of buffers on the graphics card
-  capTriangles: number; // shown
-  tets: number; // shrunken tetrahedra shown
-  firstMeshMs: number; // from navigation to the first picture with triangles; 0: none yet
+export class Stats {
+  frames = 0; // drawn
+  longestBlock = 0; // ms: longest block of this thread by uploads, since it was last set to 0
+  skinVersion = 0; // of the boundary surface shown; 0: none
+  capTriangles = 0; // shown
+  tets = 0; // shrunken tetrahedra shown
+  firstMeshMs = 0; // from navigation to the first picture with triangles; 0: none yet
 }
 
 export class Viewer {
   readonly picture: Picture;
-  readonly stats: Stats = {
-    frames: 0,
-    lastFrameMs: 0,
-    longestBlock: 0,
-    skinVersion: 0,
-    surfaceTriangles: 0,
-    surfaceBytes: 0,
-    capTriangles: 0,
-    tets: 0,
-    firstMeshMs: 0,
-  };
+  readonly stats = new Stats();
   frame: Frame | null = null; // of the open data set
   onShown: (version: number) => void = () => {}; // of the surface
   onDrawn: () => void = () => {};
   onResize: () => void = () => {};
   onContext: (isLost: boolean) => void = () => {}; // the WebGL context was lost or restored
-  private coarsestLevel = 1;
-  private pendingCap: Cap | null = null;
+  private pendingCap: Cap | null = null; // shown with its surface, or at once if that is shown already
   private isDirty = true; // a draw is needed
   private isScheduled = false; // step() is requested
   private isLost = false; // the WebGL context
@@ -68,22 +54,15 @@ export class Viewer {
     });
     this.picture.thickness.onMaximum = () => this.invalidate();
     view.watch([], () => {
-      this.applyStyles();
+      this.picture.setStyles(view.value);
       this.invalidate();
     });
   }
 
   open(dataset: Dataset): void {
-    this.picture.surface.clear();
     this.pendingCap = null;
     this.frame = frameOf(dataset);
-    this.picture.setFrame(this.frame);
-    this.picture.setCap(this.frame, null);
-    this.picture.tets.clear();
-    this.picture.showTets(this.frame, null);
-    this.coarsestLevel = Math.max(1, Math.ceil(Math.log2(Math.max(...dataset.dims) - 1)) - 1);
-    this.picture.resize();
-    this.applyStyles();
+    this.picture.open(this.frame);
     this.invalidate();
   }
 
@@ -94,19 +73,19 @@ export class Viewer {
     return this.view.value.pose ?? (this.frame ? fitted(this.frame.box, aspect) : null);
   }
 
-  takeSurface(change: SurfaceChange): void {
-    this.timed(() => this.picture.surface.take(change));
-    this.schedule();
+  // Moves the camera. make: from where it is, and the size of the canvas, CSS pixels.
+  move(make: (pose: Pose, width: number, height: number) => Pose): void {
+    const pose = this.pose();
+    const { clientWidth, clientHeight } = this.picture.canvas;
+    if (pose) this.view.set({ pose: make(pose, clientWidth, clientHeight) });
   }
 
-  // Shown together with the surface that it belongs to, or at once if that is shown already.
-  takeCap(cap: Cap): void {
-    this.pendingCap = cap;
-    this.schedule();
-  }
-
-  takeTets(tets: Tets): void {
-    this.picture.tets.take(tets);
+  // What the worker sends to be drawn; other reports are ignored.
+  take(report: Report): void {
+    if (report.type === 'surface') this.picture.surface.take(report.change);
+    else if (report.type === 'cap') this.pendingCap = report.cap;
+    else if (report.type === 'tets') this.picture.tets.take(report.tets);
+    else return;
     this.schedule();
   }
 
@@ -144,13 +123,13 @@ export class Viewer {
     if (this.isLost) return;
     // While the graphics card draws, any other WebGL call could block this thread until it is done; so none is made.
     if (this.fence.isPending) return this.schedule();
-    const { surface } = this.picture;
-    const { frame } = this;
-    const shown = frame && this.isUploading() ? this.timed(() => this.upload(frame)) : 0;
+    const start = performance.now();
+    const shown = this.frame && this.isUploading() ? this.upload(this.frame) : 0;
+    this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
     if (this.isDirty) this.draw();
     if (shown > 0) {
-      Object.assign(this.stats, { skinVersion: shown, surfaceTriangles: surface.triangles, surfaceBytes: surface.bytes });
-      if (this.stats.firstMeshMs === 0 && surface.triangles > 0) {
+      this.stats.skinVersion = shown;
+      if (this.stats.firstMeshMs === 0 && this.picture.surface.faces.children.length > 0) {
         this.stats.firstMeshMs = performance.mark('intervale: first mesh').startTime;
       }
       this.onShown(shown);
@@ -174,7 +153,12 @@ export class Viewer {
       this.isDirty = true;
     }
     const cap = this.pendingCap;
-    if (cap && (!surface.isBusy || cap.version <= surface.version)) this.showCap(frame, cap);
+    if (cap && (!surface.isBusy || cap.version <= surface.version)) {
+      this.pendingCap = null;
+      this.picture.setCap(frame, cap);
+      this.stats.capTriangles = cap.plane ? cap.triangles : 0;
+      this.isDirty = true;
+    }
     const complete = surface.isBusy ? null : tets.upload();
     if (complete) {
       this.picture.showTets(frame, complete.box);
@@ -187,32 +171,12 @@ export class Viewer {
   private draw(withOutlines = true): void {
     const pose = this.pose();
     if (!this.frame || !pose || this.isLost) return;
-    const start = performance.now();
     this.isDirty = false;
     const { clip, region } = this.view.value;
     this.picture.outlines.set(this.frame, region, clip);
     this.picture.draw(this.frame, pose, this.view.value, withOutlines);
     this.fence.insert();
     this.stats.frames++;
-    this.stats.lastFrameMs = performance.now() - start;
     this.onDrawn();
-  }
-
-  private showCap(frame: Frame, cap: Cap): void {
-    this.pendingCap = null;
-    this.isDirty = true;
-    this.picture.setCap(frame, cap);
-    this.stats.capTriangles = cap.plane ? cap.triangles : 0;
-  }
-
-  private applyStyles(): void {
-    this.picture.setStyles(this.view.value, this.coarsestLevel);
-  }
-
-  private timed<T>(work: () => T): T {
-    const start = performance.now();
-    const result = work();
-    this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
-    return result;
   }
 }

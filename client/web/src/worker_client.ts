@@ -1,7 +1,6 @@
 // The page's side of the worker: sends what the view needs at a limited rate, and keeps the status current.
 import { streamUrl } from './datasets';
-import { sameJson } from './format';
-import type { Box, Cap, Plane, Report, Request, SurfaceChange, Tets, View } from './messages';
+import type { Box, Plane, Report, Request, View } from './messages';
 import type { Status } from './status';
 import type { Store } from './store';
 
@@ -12,14 +11,7 @@ const kBytesPerUpdate = 30; // see View.maxUpdates
 export const updatesIn = (megabytes: number | null): number | null =>
   megabytes === null ? null : Math.round((megabytes * 1e6) / kBytesPerUpdate);
 
-// What the page does with the worker's reports.
-export interface Receiver {
-  surface(change: SurfaceChange): void;
-  cap(cap: Cap): void;
-  tets(tets: Tets): void;
-  saved(format: string, name: string, bytes: ArrayBuffer): void;
-  any(report: Report): void; // every report, after the above
-}
+const sameJson = (a: unknown, b: unknown): boolean => JSON.stringify(a) === JSON.stringify(b);
 
 // What the view needs from the worker.
 export interface Wanted {
@@ -42,7 +34,8 @@ export class WorkerClient {
   private tetsTimer = 0;
   private edges = false;
 
-  constructor(private status: Store<Status>, private receiver: Receiver) {
+  // received: called with each report, after the status has changed.
+  constructor(private status: Store<Status>, private received: (report: Report) => void) {
     this.worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'intervale' });
     this.worker.onmessage = ({ data }: MessageEvent<Report>) => this.receive(data);
     this.worker.onerror = (event) => this.fail(`The worker failed: ${event.message || 'it could not be loaded'}.`);
@@ -55,6 +48,18 @@ export class WorkerClient {
 
   send(request: Request): void {
     this.worker.postMessage(request);
+  }
+
+  // The next report of this type.
+  next<T extends Report['type']>(type: T): Promise<Extract<Report, { type: T }>> {
+    return new Promise((resolve) => {
+      const listen = ({ data }: MessageEvent) => {
+        if (data.type !== type) return;
+        this.worker.removeEventListener('message', listen);
+        resolve(data);
+      };
+      this.worker.addEventListener('message', listen);
+    });
   }
 
   // wanted: what the session starts with.
@@ -132,27 +137,21 @@ export class WorkerClient {
       case 'progress':
         this.status.set({ progress: report.progress });
         break;
-      case 'surface':
-        this.receiver.surface(report.change);
-        break;
       case 'cap':
         this.isAwaitingCap = false;
-        this.receiver.cap(report.cap);
         this.requestCap();
         break;
       case 'tets':
         this.status.set({ tets: report.tets.box ? { count: report.tets.count, outOf: report.tets.outOf } : null });
-        this.receiver.tets(report.tets);
         break;
       case 'saved':
         this.status.set({ saving: null });
-        this.receiver.saved(report.format, report.name, report.bytes);
         break;
       case 'error':
         this.fail(report.text);
         break;
     }
-    this.receiver.any(report);
+    this.received(report);
   }
 
   private fail(text: string): void {
