@@ -27,15 +27,9 @@ declare global {
 
 export function expose(view: Store<ViewState>, status: Store<Status>, viewer: Viewer, worker: WorkerClient): void {
   window.intervale = {
-    get state() {
-      return view.value;
-    },
-    get live() {
-      return status.value;
-    },
-    get progress() {
-      return status.value.progress;
-    },
+    get state() { return view.value; },
+    get live() { return status.value; },
+    get progress() { return status.value.progress; },
     stats: viewer.stats,
     canvas: viewer.picture.canvas,
     set: (change) => view.set(change),

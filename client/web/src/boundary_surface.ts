@@ -1,7 +1,7 @@
 // The boundary surface of the mesh, as pieces on the graphics card. The pieces of a new version are uploaded a few per
 // frame; once all are there they replace the old ones in one step, so that no frame shows cracks. Nothing here visits
 // single vertices.
-import { BufferAttribute, BufferGeometry, Group, LineSegments, type Material, Mesh, Sphere, Vector3 } from 'three';
+import { BufferAttribute, BufferGeometry, LineSegments, type Material, Mesh, Scene, Sphere, Vector3 } from 'three';
 import { type Frame, toDrawing } from './frame';
 import type { SurfaceMaterials } from './materials';
 import type { SurfaceChange, SurfacePiece, Vec3 } from './messages';
@@ -14,15 +14,15 @@ interface PieceObjects {
 }
 
 export class BoundarySurfaceView {
-  readonly faces = new Group();
-  readonly edges = new Group();
+  readonly faces = new Scene();
+  readonly edges = new Scene();
   version = 0; // of what is shown; 0: nothing yet
   private pieces = new Map<number, PieceObjects>(); // shown, by id
   private pending: SurfaceChange[] = []; // oldest first
   private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
 
   constructor(private uploader: Uploader, private materials: SurfaceMaterials) {
-    for (const group of [this.faces, this.edges]) group.matrixAutoUpdate = false;
+    this.faces.matrixWorldAutoUpdate = this.edges.matrixWorldAutoUpdate = false; // pieces are in drawing space
   }
 
   get isBusy(): boolean {
@@ -101,7 +101,6 @@ export class BoundarySurfaceView {
     };
     const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials.opaque);
     const lines = piece.edges ? new LineSegments(geometry(piece.edges, piece.edgeCounts, 2), this.materials.edges) : null;
-    for (const object of [mesh, lines]) if (object) object.matrixAutoUpdate = false;
     return { mesh, lines };
   }
 }

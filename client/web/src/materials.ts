@@ -47,14 +47,13 @@ export interface SurfaceMaterials {
   edges: RawShaderMaterial[];
 }
 
+const kAdditive: Parameters = { blending: CustomBlending, blendSrc: OneFactor, blendDst: OneFactor, depthWrite: false };
+
 // See kTransparentFragment.
 const kAccumulation: Parameters = {
-  blending: CustomBlending,
-  blendSrc: OneFactor,
-  blendDst: OneFactor,
+  ...kAdditive,
   blendSrcAlpha: ZeroFactor,
   blendDstAlpha: OneMinusSrcAlphaFactor,
-  depthWrite: false,
   transparent: true,
 };
 
@@ -64,15 +63,6 @@ const kAlphaBlending: Parameters = {
   blendDst: OneMinusSrcAlphaFactor,
   blendSrcAlpha: OneFactor,
   blendDstAlpha: OneMinusSrcAlphaFactor,
-  depthWrite: false,
-};
-
-// Without depth test: hidden layers are added, too.
-const kAdditive: Parameters = {
-  blending: CustomBlending,
-  blendSrc: OneFactor,
-  blendDst: OneFactor,
-  depthTest: false,
   depthWrite: false,
 };
 
@@ -112,9 +102,11 @@ export const capDepthMaterial = () => material(shaders.kCapVertex, shaders.kCapF
 export const tetsMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {});
 export const tetsDepthMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {}, kDepthOnly);
 
-// capFacing: see kThicknessFragment.
-export const thicknessMaterial = (capFacing: -1 | 0 | 1) =>
-  material(shaders.kSurfaceVertex, shaders.kThicknessFragment, { capFacing: { value: capFacing } }, kAdditive);
+// capFacing: see kThicknessFragment. Without depth test: hidden layers are added, too.
+export const thicknessMaterial = (capFacing: -1 | 0 | 1) => {
+  const parameters = { ...kAdditive, depthTest: false };
+  return material(shaders.kSurfaceVertex, shaders.kThicknessFragment, { capFacing: { value: capFacing } }, parameters);
+};
 
 // For a full-screen pass that is blended over the picture.
 export const compositeMaterial = (fragment: string, uniforms: Uniforms) =>

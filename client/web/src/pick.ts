@@ -7,11 +7,12 @@ export class Pick {
   private target = new WebGLRenderTarget(1, 1, { type: FloatType });
   private pixel = new Float32Array(4);
 
-  // x, y: CSS pixels from the upper left corner of a canvas of width by height. draw: draws the scene.
+  // x, y: CSS pixels from the canvas's upper left corner. draw: draws the scene.
   // The distance from the eye in world units; null where nothing is drawn, or without float render targets.
-  distance(renderer: WebGLRenderer, camera: PerspectiveCamera, x: number, y: number, width: number, height: number, draw: () => void): number | null {
+  distance(renderer: WebGLRenderer, camera: PerspectiveCamera, x: number, y: number, draw: () => void): number | null {
     if (!renderer.extensions.has('EXT_color_buffer_float')) return null;
-    camera.setViewOffset(width, height, Math.floor(x), Math.floor(y), 1, 1);
+    const { clientWidth, clientHeight } = renderer.domElement;
+    camera.setViewOffset(clientWidth, clientHeight, Math.floor(x), Math.floor(y), 1, 1);
     renderer.setRenderTarget(this.target);
     renderer.setClearColor(0x000000, 0);
     renderer.clear();

@@ -29,8 +29,6 @@ export class Picture {
   private transparency = new Transparency();
   private pick = new Pick();
   private camera = new PerspectiveCamera();
-  private surfaceScene = new Scene();
-  private edgeScene = new Scene();
   private insideScene = new Scene(); // the cap and the tetrahedra
   private background = new Color();
 
@@ -45,10 +43,8 @@ export class Picture {
     this.cap = new CapView(this.uploader);
     this.tets = new TetsView(this.uploader);
     this.thickness = new Thickness(this.renderer);
-    this.surfaceScene.add(this.surface.faces);
-    this.edgeScene.add(this.surface.edges);
     this.insideScene.add(this.cap.mesh, this.tets.group);
-    for (const scene of [this.surfaceScene, this.edgeScene, this.insideScene]) scene.matrixWorldAutoUpdate = false;
+    this.insideScene.matrixWorldAutoUpdate = false; // all is in drawing space
   }
 
   // Adopts the canvas's size in the layout. Returns whether it changed; the canvas is empty then.
@@ -108,7 +104,7 @@ export class Picture {
       this.thickness.draw(renderer, camera, () => this.drawThicknessLayers(frame, pose));
     } else {
       this.drawOpaque(materials.opaque, this.cap.material, this.tets.material);
-      if (view.wireframe) renderer.render(this.edgeScene, camera);
+      if (view.wireframe) renderer.render(this.surface.edges, camera);
       if (materials.transparent.some((material) => material.visible)) {
         const drawDepth = () => this.drawOpaque(materials.depth, this.cap.depth, this.tets.depth);
         this.transparency.draw(renderer, camera, drawDepth, () => this.drawSurface(materials.transparent));
@@ -121,7 +117,7 @@ export class Picture {
   pointAt(frame: Frame, pose: Pose, x: number, y: number): Vec3 | null {
     this.setCamera(frame, pose);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    const distance = this.pick.distance(this.renderer, this.camera, x, y, width, height, () =>
+    const distance = this.pick.distance(this.renderer, this.camera, x, y, () =>
       this.drawOpaque(this.pick.material, this.pick.material, this.tets.material),
     );
     return distance === null ? null : along(pose.eye, rayThrough(pose, x, y, width, height), distance);
@@ -136,7 +132,7 @@ export class Picture {
 
   private drawSurface(materials: Material | Material[]): void {
     this.surface.use(materials);
-    this.renderer.render(this.surfaceScene, this.camera);
+    this.renderer.render(this.surface.faces, this.camera);
   }
 
   private drawOpaque(surface: Material | Material[], cap: Material, tets: Material): void {

@@ -18,9 +18,7 @@ export class TetsView {
   private pending: Tets | null = null;
   private chunks: Mesh[] = []; // of pending, uploaded so far
 
-  constructor(private uploader: Uploader) {
-    this.group.matrixAutoUpdate = false;
-  }
+  constructor(private uploader: Uploader) {}
 
   get isBusy(): boolean {
     return this.pending !== null;
