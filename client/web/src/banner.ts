@@ -32,10 +32,13 @@ export function watchBanner(status: Store<Status>, retry: () => void): void {
   let countdown = 0; // timer
   let wasLost = false;
   let last = status.value.connection;
-  let dismissed = ''; // text
+  let topic: string | null = null; // of the message
+  let dismissed: string | null = null; // the topic that the user does not want to see; until the next one
   const show = () => {
     const message = messageOf(status.value, Math.ceil((due - performance.now()) / 1000));
-    element('banner').hidden = !message || message.text === dismissed;
+    topic = message && (message.kind === 'warn' ? 'connection' : message.text); // the text has a countdown
+    if (topic !== dismissed) dismissed = null;
+    element('banner').hidden = !message || dismissed !== null;
     if (!message) return;
     element('banner').className = message.kind;
     element('banner-text').setAttribute('aria-live', message.kind === 'bad' ? 'assertive' : 'polite');
@@ -63,7 +66,7 @@ export function watchBanner(status: Store<Status>, retry: () => void): void {
   });
   onClick('retry', retry);
   onClick('dismiss', () => {
-    dismissed = element('banner-text').textContent ?? '';
+    dismissed = topic;
     if (status.value.notice !== null) status.set({ notice: null });
     show();
   });
