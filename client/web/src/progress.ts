@@ -36,13 +36,10 @@ export function watchProgress(status: Store<Status>): void {
 }
 
 function showBar({ progress, error, connection }: Readonly<Status>): void {
-  const isDone = progress?.done === true && error === null && connection.state === 'open';
-  const isWaiting = connection.state === 'waiting';
-  element('status').className = error !== null ? 'bad' : isWaiting ? 'waiting' : isDone ? 'done' : '';
+  const isDone = progress?.done && connection.state === 'open';
+  element('status').className = error !== null ? 'bad' : connection.state === 'waiting' ? 'waiting' : isDone ? 'done' : '';
   const share = progress ? (progress.done ? 1 : progress.updates / Math.max(1, progress.updates + progress.updatesToGo)) : 0;
-  const bar = element('bar');
-  bar.className = isWaiting ? 'waiting' : isDone ? 'done' : '';
-  bar.setAttribute('aria-valuenow', String(Math.round(100 * share)));
+  element('bar').setAttribute('aria-valuenow', String(Math.round(100 * share)));
   element('bar-fill').style.transform = `scaleX(${share.toFixed(4)})`;
 }
 
