@@ -87,8 +87,7 @@ class Viewer {
   }
   val take_messages() {
     val messages = val::array();
-    std::size_t n = 0;
-    for (const auto& message : session_.take_messages()) messages.set(n++, buffer_of(message));
+    for (const auto& message : session_.take_messages()) messages.call<void>("push", buffer_of(message));
     return messages;
   }
 
@@ -130,8 +129,7 @@ class Viewer {
   val update_surface(bool edges, bool all) {
     stale_ = false;
     const BoundarySurface::Change change = all ? surface_->all() : surface_->update();
-    val result = val::object(), pieces = val::array(), removed = val::array();
-    std::size_t n = 0;
+    val pieces = val::array();
     for (const std::uint32_t id : change.pieces) {
       const SurfacePiece p = surface_->piece(id, edges);
       val piece = val::object();
@@ -143,13 +141,12 @@ class Viewer {
       piece.set("edgeCounts", array_of(p.edge_counts));
       piece.set("min", array_of(p.min));
       piece.set("max", array_of(p.max));
-      pieces.set(n++, piece);
+      pieces.call<void>("push", piece);
     }
-    n = 0;
-    for (const std::uint32_t id : change.removed) removed.set(n++, id);
+    val result = val::object();
     result.set("reset", change.reset);
     result.set("pieces", pieces);
-    result.set("removed", removed);
+    result.set("removed", array_of(change.removed));
     return result;
   }
 
