@@ -1,5 +1,6 @@
 // The picture: what is drawn, with which materials, in which order. Draws only when asked to.
 import { BufferGeometry, Color, LinearSRGBColorSpace, type Material, Mesh, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+import { BoundarySurfaceView } from './boundary_surface';
 import { type Pose, rayThrough } from './camera';
 import { CapView } from './cap';
 import { type Frame, toDrawing } from './frame';
@@ -7,7 +8,6 @@ import { setStyles, shared, surfaceMaterials } from './materials';
 import type { Box, Cap, Vec3 } from './messages';
 import { Outlines } from './outlines';
 import { Pick } from './pick';
-import { BoundarySurfaceView } from './boundary_surface';
 import type { ViewState } from './state';
 import { TetsView } from './tets';
 import { Thickness } from './thickness';
