@@ -3,12 +3,13 @@ import { type ColorMap, kLevelColors, kThicknessColors } from './color_maps';
 import { element } from './dom';
 import { short } from './format';
 import type { ViewState } from './state';
+import type { Thickness } from './thickness';
 
-// maxThickness: world units at the end of the colour map.
-export function showLegend(view: Readonly<ViewState>, maxThickness: number): void {
-  element('legend').hidden = !view.thickness && !view.levels;
-  if (view.thickness) {
-    const labels = ['0', short(maxThickness / 2), `${short(maxThickness)} or more`];
+export function showLegend(view: Readonly<ViewState>, { isAvailable, maximum }: Thickness): void {
+  const showsThickness = view.thickness && isAvailable;
+  element('legend').hidden = !showsThickness && !view.levels;
+  if (showsThickness) {
+    const labels = ['0', short(maximum / 2), `${short(maximum)} or more`];
     fill('Thickness along the line of sight, world units', labels, kThicknessColors);
   } else if (view.levels) {
     fill('Level of detail', ['finest', '', 'coarsest'], kLevelColors);

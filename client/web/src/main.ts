@@ -77,7 +77,7 @@ class Page {
       const pose = viewer.pose();
       if (pose) showAxes(element<SVGSVGElement>('axes'), pose);
       this.handles.place();
-      showLegend(view.value, viewer.picture.thickness.maximum);
+      showLegend(view.value, viewer.picture.thickness);
     };
   }
 
