@@ -121,7 +121,7 @@ export async function open(browser, url, { width = 800, height = 600, ...options
 export async function settled(page) {
   await page.waitForFunction(() => {
     const { progress, live, stats } = window.intervale;
-    return progress?.done && live.connection.state === 'open' && stats.skinVersion === progress.skin;
+    return progress?.done && live.connection.state === 'open' && stats.surfaceVersion === progress.surfaceVersion;
   });
   await drawn(page);
 }

@@ -15,7 +15,7 @@ export interface Viewer {
   faultCode(): number; // the close code of an error that the server reported; else 1000
   updates(): number;
   done(): boolean;
-  progress(): Omit<Progress, 'skin' | 'memory' | 'busy'>;
+  progress(): Omit<Progress, 'surfaceVersion' | 'memory' | 'busy'>;
   updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version'>; // all: every piece, changed or not
   isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap() and tets() must not be called
   cap(plane: Plane): Pick<Cap, 'vertices' | 'triangles'>;

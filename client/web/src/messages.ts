@@ -70,7 +70,7 @@ export interface Progress {
   updatesToGo: number; // upper bound for this view; 0 when done
   remainingError: number; // field units
   remainingPixels: number; // screen-space error, pixels
-  skin: number; // version of the last boundary surface sent to the page
+  surfaceVersion: number; // of the last boundary surface sent to the page
   done: boolean; // all that this view wants was received, and is in that surface
   full: boolean; // the memory budget leaves some updates out
   volume: number; // of the mesh, cubic world units

@@ -186,7 +186,8 @@ export class StreamSession {
     const progress = this.viewer.progress();
     const done = progress.done && !this.isChanged; // not before the complete surface was sent
     const memory = this.core.HEAPU8.byteLength;
-    this.report({ type: 'progress', progress: { ...progress, done, skin: this.version, memory, busy: { ...this.busy } } });
+    const { version: surfaceVersion, busy } = this;
+    this.report({ type: 'progress', progress: { ...progress, done, surfaceVersion, memory, busy: { ...busy } } });
   }
 
   private scheduleSurface(): void {

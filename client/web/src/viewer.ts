@@ -13,7 +13,7 @@ import { add, sub } from './vec';
 export class Stats {
   frames = 0; // drawn
   longestBlock = 0; // ms: longest block of this thread by uploads, since it was last set to 0
-  skinVersion = 0; // of the boundary surface shown; 0: none
+  surfaceVersion = 0; // of the boundary surface shown; 0: none
   capTriangles = 0; // shown
   tets = 0; // shrunken tetrahedra shown
   firstMeshMs = 0; // from navigation to the first picture with triangles; 0: none yet
@@ -128,7 +128,7 @@ export class Viewer {
     this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
     if (this.isDirty) this.draw();
     if (shown > 0) {
-      this.stats.skinVersion = shown;
+      this.stats.surfaceVersion = shown;
       if (this.stats.firstMeshMs === 0 && this.picture.surface.faces.children.length > 0) {
         this.stats.firstMeshMs = performance.mark('intervale: first mesh').startTime;
       }

@@ -197,9 +197,9 @@ onPage('the worker is asked for the chosen detail, and for the last view of a mo
 onPage('the address restores the picture', async (page) => {
   await page.keyboard.press('c');
   await drag(page, [400, 400], [100, 50]);
-  const { skinVersion } = await stats(page);
+  const { surfaceVersion } = await stats(page);
   await page.keyboard.press('w');
-  await page.waitForFunction((version) => window.intervale.stats.skinVersion > version, skinVersion); // it has edges now
+  await page.waitForFunction((version) => window.intervale.stats.surfaceVersion > version, surfaceVersion); // it has edges now
   await page.waitForFunction(() => location.hash.includes('wireframe') && location.hash.includes('eye='));
   await settled(page);
   const [old, url] = [await pixels(page), page.url()];
