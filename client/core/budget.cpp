@@ -183,7 +183,7 @@ std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, 
     }
   }
   std::vector<SlotGroup> result;
-  for (const auto& [key, slots] : chosen) result.push_back({0, 0, key, slots});
+  for (const auto& [key, slots] : chosen) result.push_back({{}, {}, key, slots});
   std::sort(result.begin(), result.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.key < b.key; });
   return result;
 }

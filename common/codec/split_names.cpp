@@ -72,7 +72,7 @@ Result<std::vector<SlotGroup>> decode_splits(std::span<const std::uint8_t> bytes
   const auto words = join_bytes(*slots, kSlotBytes);
   for (std::size_t k = 0; k < words.size(); ++k) {
     if (words[k] == 0) return fail("a supercube without a diamond");
-    groups.push_back({0, 0, (*keys)[k], words[k]});
+    groups.push_back({{}, {}, (*keys)[k], words[k]});
   }
   return groups;
 }

@@ -39,11 +39,11 @@ std::uint64_t SplitSet::slots(UpdateIndex first, std::uint64_t occupancy) const 
 std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {
   std::vector<SlotGroup> groups;
   const auto bricks = set.bricks();
-  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
-    const UpdateIndex first = bricks[b].first, end = b + 1 < bricks.size() ? bricks[b + 1].first : set.size();
+  for (BrickIndex b{0}; b < bricks.size(); ++b) {
+    const std::uint32_t first = bricks[b].first, end = b + 1 < bricks.size() ? bricks[b + 1].first : set.size();
     const auto from = words_.begin() + first / 64, to = words_.begin() + (end + 63) / 64;
     if (std::all_of(from, to, [](std::uint64_t w) { return w == 0; })) continue;
-    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       if (const std::uint64_t some = slots(set.first(b, s), set.occupancy()[s])) groups.push_back({b, s, key, some});
     });
   }

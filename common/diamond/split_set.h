@@ -15,7 +15,7 @@ namespace intervale {
 // A set of updates: one bit for each, by number.
 class SplitSet {
  public:
-  explicit SplitSet(UpdateIndex size = 0) : words_((std::size_t(size) + 63) / 64) {}
+  explicit SplitSet(std::uint32_t size = 0) : words_((std::size_t(size) + 63) / 64) {}
   [[nodiscard]] bool contains(UpdateIndex i) const { return words_[i / 64] >> (i % 64) & 1; }
   // Which of `count` updates from `first` on are in it, a bit each; count in [1, 64].
   [[nodiscard]] std::uint64_t some(UpdateIndex first, unsigned count) const {

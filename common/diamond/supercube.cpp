@@ -62,12 +62,12 @@ Vertex centre_of(SupercubeKey key, int slot) { return centre_of(scale_of_key(key
 SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy) : occupancy_(std::move(occupancy)) {
   assert(keys.size() == occupancy_.size() && "one word for each supercube");
   first_in_brick_.reserve(keys.size());
-  for (std::uint32_t s = 0; s < keys.size(); ++s) {
+  for (SupercubeIndex s{0}; s < keys.size(); ++s) {
     const SupercubeKey brick = keys[s] & ~SupercubeKey(63);
-    if (bricks_.empty() || bricks_.back().key != brick) bricks_.push_back({brick, 0, s, size_});
+    if (bricks_.empty() || bricks_.back().key != brick) bricks_.push_back({brick, 0, s, UpdateIndex(size_)});
     bricks_.back().mask |= std::uint64_t(1) << (keys[s] & 63);
     first_in_brick_.push_back(std::uint16_t(size_ - bricks_.back().first));
-    size_ += UpdateIndex(std::popcount(occupancy_[s]));
+    size_ += std::uint32_t(std::popcount(occupancy_[s]));
   }
   bricks_.shrink_to_fit();
   directory_.assign(bricks_.size() + bricks_.size() / 2 + 1, 0);
@@ -78,7 +78,7 @@ SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::
   }
   for (std::size_t i = 0; i < scale_begin_.size(); ++i) {
     const auto before = [](const Brick& b, SupercubeKey key) { return b.key < key; };
-    scale_begin_[i] = std::uint32_t(std::lower_bound(bricks_.begin(), bricks_.end(), std::uint64_t(i) << 57, before) - bricks_.begin());
+    scale_begin_[i] = BrickIndex(std::lower_bound(bricks_.begin(), bricks_.end(), std::uint64_t(i) << 57, before) - bricks_.begin());
   }
 }
 
@@ -89,15 +89,15 @@ std::size_t SupercubeSet::home(SupercubeKey brick_key) const {
   return std::size_t((unsigned __int128)(h)*directory_.size() >> 64);
 }
 
-std::optional<std::uint32_t> SupercubeSet::find_brick(SupercubeKey brick_key) const {
+std::optional<BrickIndex> SupercubeSet::find_brick(SupercubeKey brick_key) const {
   if (bricks_.empty()) return {};
   for (std::size_t i = home(brick_key); directory_[i] != 0; i = i + 1 == directory_.size() ? 0 : i + 1) {
-    if (bricks_[directory_[i] - 1].key == brick_key) return directory_[i] - 1;
+    if (bricks_[directory_[i] - 1].key == brick_key) return BrickIndex(directory_[i] - 1);
   }
   return {};
 }
 
-std::optional<std::uint32_t> SupercubeSet::find_brick(int scale, Vertex position) const {
+std::optional<BrickIndex> SupercubeSet::find_brick(int scale, Vertex position) const {
   if (scale >= kMaxLevels) return {};
   return find_brick(supercube_key(scale, {4 * position.x, 4 * position.y, 4 * position.z}));
 }
@@ -108,7 +108,7 @@ std::optional<SupercubeSet::Supercube> SupercubeSet::find_supercube(int scale, V
   const auto b = find_brick(key & ~SupercubeKey(63));
   const int i = int(key & 63);
   if (!b || !(bricks_[*b].mask >> i & 1)) return {};
-  return Supercube{*b, bricks_[*b].first_supercube + std::uint32_t(count_below(bricks_[*b].mask, i)), key};
+  return Supercube{*b, bricks_[*b].first_supercube + count_below(bricks_[*b].mask, i), key};
 }
 
 std::optional<Place> SupercubeSet::find(const Diamond& d) const {
@@ -122,11 +122,11 @@ std::optional<Place> SupercubeSet::find(const Diamond& d) const {
 
 Place SupercubeSet::place(UpdateIndex index) const {
   const auto after = [](UpdateIndex i, const Brick& b) { return i < b.first; };
-  const auto brick = std::uint32_t(std::upper_bound(bricks_.begin(), bricks_.end(), index, after) - bricks_.begin() - 1);
-  std::uint32_t s = bricks_[brick].first_supercube;
+  const auto brick = BrickIndex(std::upper_bound(bricks_.begin(), bricks_.end(), index, after) - bricks_.begin() - 1);
+  SupercubeIndex s = bricks_[brick].first_supercube;
   std::uint64_t mask = bricks_[brick].mask;
-  UpdateIndex skip = index - bricks_[brick].first;
-  for (; skip >= UpdateIndex(std::popcount(occupancy_[s])); ++s, mask &= mask - 1) skip -= UpdateIndex(std::popcount(occupancy_[s]));
+  std::uint32_t skip = index - bricks_[brick].first;
+  for (; skip >= std::uint32_t(std::popcount(occupancy_[s])); ++s, mask &= mask - 1) skip -= std::uint32_t(std::popcount(occupancy_[s]));
   std::uint64_t word = occupancy_[s];
   for (; skip > 0; --skip) word &= word - 1;
   return {bricks_[brick].key + unsigned(std::countr_zero(mask)), brick, s, std::uint32_t(std::countr_zero(word)), index};

@@ -15,6 +15,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/util/bits.h"
+#include "common/util/index.h"
 
 namespace intervale {
 
@@ -39,19 +40,23 @@ using SupercubeKey = std::uint64_t;
   return {coordinate(position.x, type), coordinate(position.y, type >> 2), coordinate(position.z, type >> 4)};
 }
 
-// Number of a diamond in a set.
-using UpdateIndex = std::uint32_t;
+// Numbers in a set: of a diamond, a brick and a supercube.
+using UpdateIndex = Index<struct UpdateTag>;
+using BrickIndex = Index<struct BrickTag>;
+using SupercubeIndex = Index<struct SupercubeTag>;
 
 struct Place {
   SupercubeKey key = 0;
-  std::uint32_t brick = 0, supercube = 0;  // numbers in the set
+  BrickIndex brick;
+  SupercubeIndex supercube;
   std::uint32_t slot = 0;
-  UpdateIndex index = 0;
+  UpdateIndex index;
 };
 
 // Some diamonds of one supercube.
 struct SlotGroup {
-  std::uint32_t brick = 0, supercube = 0;  // numbers in the set
+  BrickIndex brick;
+  SupercubeIndex supercube;
   SupercubeKey key = 0;
   std::uint64_t slots = 0;
   friend bool operator==(const SlotGroup&, const SlotGroup&) = default;
@@ -82,13 +87,13 @@ class SupercubeSet {
   struct Brick {
     SupercubeKey key = 0;    // the supercubes' keys with the lowest six bits 0
     std::uint64_t mask = 0;  // which of its 64 supercubes are there
-    std::uint32_t first_supercube = 0;
-    UpdateIndex first = 0;  // number of its first diamond
+    SupercubeIndex first_supercube;
+    UpdateIndex first;  // number of its first diamond
   };
 
   [[nodiscard]] std::span<const Brick> bricks() const { return bricks_; }
   [[nodiscard]] std::size_t supercubes() const { return occupancy_.size(); }
-  [[nodiscard]] UpdateIndex size() const { return size_; }
+  [[nodiscard]] std::uint32_t size() const { return size_; }
   [[nodiscard]] std::span<const std::uint64_t> occupancy() const { return occupancy_; }  // by supercube
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -98,12 +103,13 @@ class SupercubeSet {
 
   // The supercube at a position (not negative), if it is in the set. O(1).
   struct Supercube {
-    std::uint32_t brick = 0, supercube = 0;
+    BrickIndex brick;
+    SupercubeIndex supercube;
     SupercubeKey key = 0;
   };
   [[nodiscard]] std::optional<Supercube> find_supercube(int scale, Vertex position) const;
   // The brick at a position, in bricks; not negative.
-  [[nodiscard]] std::optional<std::uint32_t> find_brick(int scale, Vertex position) const;
+  [[nodiscard]] std::optional<BrickIndex> find_brick(int scale, Vertex position) const;
 
   [[nodiscard]] static Vertex centre(const Place& p) { return centre_of(p.key, int(p.slot)); }
 
@@ -111,21 +117,21 @@ class SupercubeSet {
   [[nodiscard]] Place place(UpdateIndex index) const;
 
   // Bricks of one scale: [begin, end).
-  [[nodiscard]] std::array<std::uint32_t, 2> of_scale(int scale) const {
+  [[nodiscard]] std::array<BrickIndex, 2> of_scale(int scale) const {
     return {scale_begin_[kMaxLevels - scale], scale_begin_[kMaxLevels - scale + 1]};
   }
 
   // Calls visit(supercube, key) for the supercubes of a brick, ascending.
   template <class Visit>
-  void for_each_supercube(std::uint32_t brick, Visit&& visit) const {
+  void for_each_supercube(BrickIndex brick, Visit&& visit) const {
     const Brick& b = bricks_[brick];
-    std::uint32_t supercube = b.first_supercube;
+    SupercubeIndex supercube = b.first_supercube;
     for (const int i : set_bits(b.mask)) visit(supercube++, b.key + unsigned(i));
   }
   // Calls visit(Place) for those of a brick's diamonds whose slots are among `slots`, in order of their numbers.
   template <class Visit>
-  void for_each_in_brick(std::uint32_t brick, std::uint64_t slots, Visit&& visit) const {
-    for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+  void for_each_in_brick(BrickIndex brick, std::uint64_t slots, Visit&& visit) const {
+    for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
       for (const int slot : set_bits(occupancy_[s] & slots)) visit(place_in(brick, s, key, slot));
     });
   }
@@ -133,7 +139,7 @@ class SupercubeSet {
   template <class Visit>
   void for_each(int scale, int cls, Visit&& visit) const {
     const auto [begin, end] = of_scale(scale);
-    for (std::uint32_t b = begin; b < end; ++b) for_each_in_brick(b, kSlotsOfClass[cls], visit);
+    for (BrickIndex b = begin; b < end; ++b) for_each_in_brick(b, kSlotsOfClass[cls], visit);
   }
   // The same, for all diamonds: parents before children; or children before parents.
   template <class Visit>
@@ -149,20 +155,20 @@ class SupercubeSet {
     }
   }
   // The number of a supercube's first diamond.
-  [[nodiscard]] UpdateIndex first(std::uint32_t brick, std::uint32_t supercube) const { return bricks_[brick].first + first_in_brick_[supercube]; }
-  [[nodiscard]] Place place_in(std::uint32_t brick, std::uint32_t supercube, SupercubeKey key, int slot) const {
-    return {key, brick, supercube, std::uint32_t(slot), first(brick, supercube) + UpdateIndex(count_below(occupancy_[supercube], slot))};
+  [[nodiscard]] UpdateIndex first(BrickIndex brick, SupercubeIndex supercube) const { return bricks_[brick].first + first_in_brick_[supercube]; }
+  [[nodiscard]] Place place_in(BrickIndex brick, SupercubeIndex supercube, SupercubeKey key, int slot) const {
+    return {key, brick, supercube, std::uint32_t(slot), first(brick, supercube) + count_below(occupancy_[supercube], slot)};
   }
 
  private:
   [[nodiscard]] std::size_t home(SupercubeKey brick_key) const;
-  [[nodiscard]] std::optional<std::uint32_t> find_brick(SupercubeKey brick_key) const;
+  [[nodiscard]] std::optional<BrickIndex> find_brick(SupercubeKey brick_key) const;
   std::vector<Brick> bricks_;
   std::vector<std::uint64_t> occupancy_;
   std::vector<std::uint16_t> first_in_brick_;  // at most 63 * 56
   std::vector<std::uint32_t> directory_;       // open addressing: brick number + 1, 0 for an empty place
-  std::array<std::uint32_t, kMaxLevels + 2> scale_begin_{};
-  UpdateIndex size_ = 0;
+  std::array<BrickIndex, kMaxLevels + 2> scale_begin_{};
+  std::uint32_t size_ = 0;
 };
 
 // Calls visit(number) for those of a diamond's parents that are in the set.

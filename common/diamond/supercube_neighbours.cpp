@@ -115,7 +115,7 @@ void SetFinder::move_to(int scale, Vertex position) {
   finer_is_reset_ = false;
 }
 
-std::uint32_t& SetFinder::brick_at(int where, Vertex at) {
+BrickIndex& SetFinder::brick_at(int where, Vertex at) {
   if (where < kCoarser) return same_[std::size_t(at.x - brick_.x + 1 + 3 * (at.y - brick_.y + 1) + 9 * (at.z - brick_.z + 1))];
   if (where < kCorner) return coarser_[std::size_t(at.x - (brick_.x >> 1) + 2 * (at.y - (brick_.y >> 1)) + 4 * (at.z - (brick_.z >> 1)))];
   if (!finer_is_reset_) finer_.fill(kUnknown);
@@ -125,14 +125,14 @@ std::uint32_t& SetFinder::brick_at(int where, Vertex at) {
 
 SetFinder::Found SetFinder::find(int where, const SupercubePlace& place) {
   const Vertex p = place.position, at{p.x >> 2, p.y >> 2, p.z >> 2};
-  std::uint32_t looked_up = kUnknown;  // bricks around a corner are not kept
-  std::uint32_t& brick = where >= kCorner && where < kFiner ? looked_up : brick_at(where, at);
+  BrickIndex looked_up = kUnknown;  // bricks around a corner are not kept
+  BrickIndex& brick = where >= kCorner && where < kFiner ? looked_up : brick_at(where, at);
   if (brick == kUnknown) brick = set_.find_brick(place.scale, at).value_or(kNone);
   if (brick == kNone) return none();
   const unsigned bit = parity_of(p) | parity_of({p.x >> 1, p.y >> 1, p.z >> 1}) << 3;
   const SupercubeSet::Brick& b = set_.bricks()[brick];
   if (!(b.mask >> bit & 1)) return none();
-  const std::uint32_t s = b.first_supercube + std::uint32_t(count_below(b.mask, int(bit)));
+  const SupercubeIndex s = b.first_supercube + count_below(b.mask, int(bit));
   return {b.key + bit, set_.occupancy()[s], brick, s, set_.first(brick, s)};
 }
 

@@ -175,10 +175,11 @@ class SetFinder {
   struct Found {
     SupercubeKey key = 0;
     std::uint64_t occupancy = 0;
-    std::uint32_t brick = 0, supercube = 0;
-    UpdateIndex first = 0;  // number of its first diamond
+    BrickIndex brick;
+    SupercubeIndex supercube;
+    UpdateIndex first;  // number of its first diamond
     [[nodiscard]] bool has(int slot) const { return (occupancy >> slot & 1) != 0; }
-    [[nodiscard]] UpdateIndex index(int slot) const { return first + UpdateIndex(count_below(occupancy, slot)); }
+    [[nodiscard]] UpdateIndex index(int slot) const { return first + count_below(occupancy, slot); }
     [[nodiscard]] Place place(int slot) const { return {key, brick, supercube, std::uint32_t(slot), index(slot)}; }
   };
 
@@ -188,15 +189,15 @@ class SetFinder {
   [[nodiscard]] static Found none() { return {}; }
 
  private:
-  static constexpr std::uint32_t kUnknown = ~std::uint32_t(0), kNone = kUnknown - 1;
-  [[nodiscard]] std::uint32_t& brick_at(int where, Vertex in_bricks);
+  static constexpr BrickIndex kUnknown{~std::uint32_t(0)}, kNone{kUnknown - 1};
+  [[nodiscard]] BrickIndex& brick_at(int where, Vertex in_bricks);
 
   const SupercubeSet& set_;
-  int scale_ = -1;                          // of the brick last moved to
-  Vertex brick_;                            // its position, in bricks
-  std::array<std::uint32_t, 27> same_{};    // bricks around that one
-  std::array<std::uint32_t, 8> coarser_{};  // and of the next coarser scale, from its own half position on
-  std::array<std::uint32_t, 64> finer_{};   // and of the next finer one, from one before its double position on
+  int scale_ = -1;                       // of the brick last moved to
+  Vertex brick_;                         // its position, in bricks
+  std::array<BrickIndex, 27> same_{};    // bricks around that one
+  std::array<BrickIndex, 8> coarser_{};  // and of the next coarser scale, from its own half position on
+  std::array<BrickIndex, 64> finer_{};   // and of the next finer one, from one before its double position on
   bool finer_is_reset_ = false;
 };
 using SetNeighbours = SupercubeNeighbours<SetFinder>;

@@ -161,7 +161,7 @@ void Front::forget(std::span<const SlotGroup> groups) {
 std::vector<SlotGroup> Front::splits() const {
   std::vector<SlotGroup> splits;
   for (const Block& b : state_.blocks) {
-    if (!state_.is_root_block(b) && b.split != 0) splits.push_back({0, 0, supercube_key(b.scale, b.position), b.split});
+    if (!state_.is_root_block(b) && b.split != 0) splits.push_back({{}, {}, supercube_key(b.scale, b.position), b.split});
   }
   std::sort(splits.begin(), splits.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.key < b.key; });
   return splits;

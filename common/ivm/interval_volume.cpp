@@ -84,12 +84,12 @@ IntervalVolume::IntervalVolume(Parts parts)
   first_in_brick_.reserve(set_.supercubes());
   brick_step_.reserve(set_.bricks().size());
   std::uint32_t n = 0;
-  for (std::uint32_t b = 0; b < set_.bricks().size(); ++b) {
+  for (BrickIndex b{0}; b < set_.bricks().size(); ++b) {
     brick_first_.push_back(n);
     brick_step_.push_back(0);
-    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+    set_.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
-      const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
+      const UpdateIndex first = set_.first(b, s), end = first + std::popcount(set_.occupancy()[s]);
       unsigned most = 0;
       for (UpdateIndex i = first; i < end; ++i) {
         n += codes_[i].coefficients();

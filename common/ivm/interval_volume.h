@@ -87,12 +87,12 @@ class IntervalVolume {
   [[nodiscard]] const Description& description() const { return description_; }
   [[nodiscard]] const Domain& domain() const { return domain_; }
   [[nodiscard]] const SupercubeSet& set() const { return set_; }
-  [[nodiscard]] UpdateIndex size() const { return set_.size(); }
+  [[nodiscard]] std::uint32_t size() const { return set_.size(); }
 
   // Saturated error in the field's units, rounded up: no smaller than that of any child. Monotone in error_step.
   [[nodiscard]] float error(UpdateIndex i) const { return error_steps_[codes_[i].error_step()]; }
   [[nodiscard]] unsigned error_step(UpdateIndex i) const { return codes_[i].error_step(); }
-  [[nodiscard]] unsigned brick_error_step(std::uint32_t brick) const { return brick_step_[brick]; }  // the highest of a brick's updates
+  [[nodiscard]] unsigned brick_error_step(BrickIndex brick) const { return brick_step_[brick]; }  // the highest of a brick's updates
   [[nodiscard]] std::span<const float> error_steps() const { return error_steps_; }
   [[nodiscard]] std::span<const UpdateCode> codes() const { return codes_; }
   [[nodiscard]] std::span<const std::uint8_t> residuals() const { return residuals_; }
@@ -104,17 +104,17 @@ class IntervalVolume {
   // How far the surfaces can still move, in world units, while an update's diamond is refined completely. An estimate:
   // 99 % of the surface should move no further, and nothing more than twice as far (FORMAT.md, "From errors to
   // distances"). It depends on the update's supercube and scale, and grows with the error step. Not saturated.
-  [[nodiscard]] float object_error(std::uint32_t supercube, int scale, unsigned step) const {
+  [[nodiscard]] float object_error(SupercubeIndex supercube, int scale, unsigned step) const {
     const ErrorToDistance to_distance = error_to_distance_[supercube];
     const float distance = error_steps_[step] * factor_[to_distance.code()];
     return std::min(distance, reach_ * (to_distance.is_far() ? kMaxFarDeviation : float(1 << scale)));
   }
-  [[nodiscard]] float brick_object_error(std::uint32_t brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
+  [[nodiscard]] float brick_object_error(BrickIndex brick) const { return brick_object_error_[brick]; }  // the largest of a brick's updates
   [[nodiscard]] std::span<const ErrorToDistance> error_to_distance() const { return error_to_distance_; }
   [[nodiscard]] UpdateView update(const Place& p) const;  // O(1): at most 55 codes are summed
   // The same, in steps, for loops over a supercube that keep the sum: its first residual, and an update by the number
   // of its first residual.
-  [[nodiscard]] std::uint32_t first_residual(std::uint32_t brick, std::uint32_t supercube) const {
+  [[nodiscard]] std::uint32_t first_residual(BrickIndex brick, SupercubeIndex supercube) const {
     return brick_first_[brick] + first_in_brick_[supercube];
   }
   [[nodiscard]] UpdateView update(UpdateIndex i, std::uint32_t residual) const {

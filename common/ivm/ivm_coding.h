@@ -51,7 +51,7 @@ template <class Coder>
 void code_residuals(Coder& coder, const SupercubeSet& set, std::span<const std::uint8_t> shapes, std::span<std::uint8_t> residuals) {
   ResidualCoder model;
   std::uint8_t* next = residuals.data();
-  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
       const UpdateCode code(shapes[p.index]);
       model.code_cuts(coder, class_of_slot(int(p.slot)), code.side_residual(), code.coefficients(), code.first_cuts(), next);

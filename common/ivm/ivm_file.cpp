@@ -273,7 +273,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> file, std::string n
   if (entries[kErrors].raw_bytes > kMaxErrorSteps * sizeof(float) || entries[kErrors].raw_bytes % sizeof(float) != 0)
     return fail("the number of errors is out of range");
   if (meta.bricks > meta.supercubes || meta.supercubes > meta.updates || meta.updates > meta.supercubes * kSlots ||
-      meta.coefficients > meta.updates * kMaxCuts || meta.updates > std::numeric_limits<UpdateIndex>::max()) {
+      meta.coefficients > meta.updates * kMaxCuts || meta.updates > std::numeric_limits<std::uint32_t>::max()) {
     return fail("the counts contradict each other");
   }
   const std::pair<Section, std::uint64_t> expected[] = {{kMasks, meta.bricks * 8},

@@ -37,7 +37,7 @@ bool Ranking::meets_roi(const Diamond& d) const {
   return true;
 }
 
-Ranking::Brick Ranking::of_brick(std::uint32_t brick, unsigned step, float object_error) const {
+Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_error) const {
   Brick b;
   b.ranking_ = this;
   const SupercubeKey key = volume_.set().bricks()[brick].key;
@@ -64,7 +64,7 @@ Ranking::Brick Ranking::of_brick(std::uint32_t brick, unsigned step, float objec
   return b;
 }
 
-Ranking::Supercube Ranking::Brick::supercube(std::uint32_t supercube, SupercubeKey key) const {
+Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, SupercubeKey key) const {
   Supercube s;
   s.ranking_ = ranking_;
   s.supercube_ = supercube;

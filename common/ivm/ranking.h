@@ -58,7 +58,7 @@ class Ranking {
    private:
     friend class Ranking;
     const Ranking* ranking_ = nullptr;
-    std::uint32_t supercube_ = 0;
+    SupercubeIndex supercube_;
     SupercubeKey key_ = 0;
     int scale_ = 0, off_centre_ = 0;
     float pixels_ = 0;  // of one world unit
@@ -69,7 +69,7 @@ class Ranking {
    public:
     // No lower than the rank of any update here.
     [[nodiscard]] Rank bound() const { return bound_; }
-    [[nodiscard]] Supercube supercube(std::uint32_t supercube, SupercubeKey key) const;
+    [[nodiscard]] Supercube supercube(SupercubeIndex supercube, SupercubeKey key) const;
 
    private:
     friend class Ranking;
@@ -79,11 +79,9 @@ class Ranking {
     float pixels_ = 0;
     Rank bound_ = 0;
   };
-  [[nodiscard]] Brick of_brick(std::uint32_t brick) const {
-    return of_brick(brick, volume_.brick_error_step(brick), volume_.brick_object_error(brick));
-  }
+  [[nodiscard]] Brick of_brick(BrickIndex brick) const { return of_brick(brick, volume_.brick_error_step(brick), volume_.brick_object_error(brick)); }
   // The same, if only updates with no higher error step and no larger object error remain.
-  [[nodiscard]] Brick of_brick(std::uint32_t brick, unsigned step, float object_error) const;
+  [[nodiscard]] Brick of_brick(BrickIndex brick, unsigned step, float object_error) const;
 
   // The error that remains once all updates of higher ranks are applied: the largest field error, or the pixels on the
   // screen, of this rank.

@@ -25,10 +25,10 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
   const Ranking ranking(volume, lod);
   SplitSet wanted(volume.size());
   const SupercubeSet& set = volume.set();
-  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     const Ranking::Brick brick = ranking.of_brick(b);
     if (brick.bound() == 0) continue;
-    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
       for (const int slot : set_bits(set.occupancy()[s])) {
@@ -45,9 +45,9 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& 
   const Ranking ranking(volume, lod);
   const SupercubeSet& set = volume.set();
   std::vector<Ranking::Rank> ranks(volume.size());
-  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     const Ranking::Brick brick = ranking.of_brick(b);
-    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
       for (const int slot : set_bits(set.occupancy()[s])) {
@@ -65,7 +65,7 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& 
   // A counting sort over the coarse to fine order.
   constexpr std::size_t kRanks = std::numeric_limits<Ranking::Rank>::max() + std::size_t(1);
   std::vector<std::uint32_t> begin(kRanks + 1, 0);
-  for (UpdateIndex i = 0; i < volume.size(); ++i) {
+  for (UpdateIndex i{0}; i < volume.size(); ++i) {
     if (updates.contains(i)) ++begin[kRanks - ranks[i]];
   }
   for (std::size_t k = 0; k < kRanks; ++k) begin[k + 1] += begin[k];

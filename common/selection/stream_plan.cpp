@@ -25,15 +25,15 @@ struct StreamPlan::BatchBuilder {
   SetNeighbours around;              // of the supercube visited
   std::vector<SetNeighbours> above;  // of ancestors, by scale
   std::vector<SlotGroup> groups;
-  boost::unordered_flat_map<std::uint32_t, std::uint32_t> group_of;  // by supercube
-  boost::unordered_flat_set<std::uint32_t> bricks;
+  boost::unordered_flat_map<SupercubeIndex, std::uint32_t> group_of;  // by supercube
+  boost::unordered_flat_set<BrickIndex> bricks;
   std::size_t max_bytes = 0, bytes = kPlaneBytes;
   std::uint32_t updates = 0;
   std::uint32_t visited = 0;  // supercubes and updates
 
   BatchBuilder(const IntervalVolume& volume, std::size_t max_payload)
       : around(volume.set()), above(kMaxLevels, SetNeighbours(volume.set())), max_bytes(max_payload) {}
-  SlotGroup* find(std::uint32_t supercube) {
+  SlotGroup* find(SupercubeIndex supercube) {
     if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
     const auto found = group_of.find(supercube);
     return found == group_of.end() ? nullptr : &groups[found->second];
@@ -47,8 +47,8 @@ struct StreamPlan::BatchBuilder {
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()) {
   const auto bricks = volume_->set().bricks();
   pending_.resize(bricks.size());
-  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
-    const UpdateIndex end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
+  for (BrickIndex b{0}; b < bricks.size(); ++b) {
+    const std::uint32_t end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
     pending_[b].unsent = std::uint16_t(end - bricks[b].first);
     pending_[b].level = std::uint16_t(volume_->brick_error_step(b));
     pending_[b].object_error = Up16(volume_->brick_object_error(b));
@@ -105,7 +105,7 @@ void StreamPlan::set_lod(const Lod& lod) {
     budget_ = std::move(wanted);
   }
   ranking_.emplace(*volume_, lod);
-  for (std::uint32_t b = 0; b < pending_.size(); ++b) {
+  for (BrickIndex b{0}; b < pending_.size(); ++b) {
     const Pending& w = pending_[b];
     if (w.unsent == 0) continue;
     set_pending(b, std::max(ranking_->of_brick(b, w.level, float(w.object_error)).bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
@@ -113,7 +113,7 @@ void StreamPlan::set_lod(const Lod& lod) {
   begin_band();
 }
 
-void StreamPlan::set_pending(std::uint32_t brick, Rank rank, unsigned wanted) {
+void StreamPlan::set_pending(BrickIndex brick, Rank rank, unsigned wanted) {
   Pending& w = pending_[brick];
   if (w.unsent == 0) rank = 0;
   wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, w.unsent);
@@ -141,7 +141,7 @@ StreamPlan::Remaining StreamPlan::remaining() const {
   }
   remaining.pixels = ranking_->bound(top);
   unsigned level = 0;
-  for (std::uint32_t b = 0; b < pending_.size(); ++b) {
+  for (BrickIndex b{0}; b < pending_.size(); ++b) {
     if (pending_[b].rank != 0) level = std::max(level, unsigned(pending_[b].level));
   }
   remaining.error = volume_->error_steps()[level];
@@ -187,13 +187,13 @@ bool StreamPlan::add(const Place& place, BatchBuilder& builder) {
 }
 
 // Adds the updates of a brick that belong to the band. False if the batch is full first.
-bool StreamPlan::visit_brick(std::uint32_t brick, BatchBuilder& builder) {
+bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   const SupercubeSet& set = volume_->set();
   const Ranking::Brick ranking = ranking_->of_brick(brick);
   Unsent rest;
   float object_error = 0;
   bool full = false;
-  set.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+  set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     if (full) return;
     ++builder.visited;
     const UpdateIndex first = set.first(brick, s);
@@ -219,7 +219,7 @@ bool StreamPlan::visit_brick(std::uint32_t brick, BatchBuilder& builder) {
 // for each of its updates, in their order. nullopt if the batch is full first.
 std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent,
                                                               BatchBuilder& builder) {
-  const std::uint32_t s = first.supercube;
+  const SupercubeIndex s = first.supercube;
   const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
   Unsent rest{.level = volume_->step_of_half(half_steps_[s])};
@@ -237,7 +237,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   rest = {};
   if (!add_band(ranking, first, candidates, builder, rest)) return {};
   for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
-    rest.level = std::max(rest.level, volume_->error_step(first.index + UpdateIndex(std::countr_zero(others))));
+    rest.level = std::max(rest.level, volume_->error_step(first.index + std::countr_zero(others)));
   }
   half_steps_[s] = volume_->half_of_step(rest.level);
   return rest;
@@ -281,7 +281,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
       --next_brick_;
       continue;
     }
-    if (!visit_brick(next_brick_ - 1, builder)) break;
+    if (!visit_brick(BrickIndex(next_brick_ - 1), builder)) break;
     --next_brick_;
     if (builder.visited >= kMaxVisited) break;
   }

@@ -90,14 +90,14 @@ class StreamPlan {
     std::uint16_t level = 0;   // of error
     Up16 object_error;
   };
-  void set_pending(std::uint32_t brick, Rank rank, unsigned wanted);
+  void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
   void begin_band();
   // Upper bounds over updates that were visited and not sent.
   struct Unsent {
     Rank rank = 0;
     unsigned wanted = 0, level = 0;
   };
-  bool visit_brick(std::uint32_t brick, BatchBuilder& builder);
+  bool visit_brick(BrickIndex brick, BatchBuilder& builder);
   std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent, BatchBuilder& builder);
   bool add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest);
   bool add_with_ancestors(const Place& place, SetNeighbours& around, BatchBuilder& builder);

@@ -181,8 +181,9 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
     for (int scale = 0; scale < domain_.levels(); ++scale) {
       const DiamondErrors<T> error_of(field, extremes, domain_, scale);
       const auto [begin, end] = set_.of_scale(scale);
-      tbb::parallel_for(begin, end, [&](std::uint32_t brick) {
-        set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+      tbb::parallel_for<std::uint32_t>(begin, end, [&](std::uint32_t b) {
+        const BrickIndex brick(b);
+        set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
           const SupercubeDiamonds diamonds(shapes_, key);
           UpdateIndex next = set_.first(brick, s);
           for (const int slot : set_bits(set_.occupancy()[s])) {
@@ -204,13 +205,14 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
   for (int scale = 0; scale < domain_.levels(); ++scale) {
     const auto [begin, end] = set_.of_scale(scale);
     for (int cls = scale > 0 ? 2 : 1; cls >= 0; --cls) {
-      tbb::parallel_for(begin, end, [&](std::uint32_t brick) {
+      tbb::parallel_for<std::uint32_t>(begin, end, [&](std::uint32_t b) {
+        const BrickIndex brick(b);
         SetNeighbours neighbours(set_);
-        set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+        set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
           const std::uint64_t slots = set_.occupancy()[s] & kSlotsOfClass[cls];
           if (slots == 0) return;
           neighbours.move_to(key);
-          UpdateIndex next = set_.first(brick, s) + UpdateIndex(std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots));
+          UpdateIndex next = set_.first(brick, s) + std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots);
           for (const int slot : set_bits(slots)) {
             float& error = errors[next++];
             for (const Link link : neighbours.children(slot)) {
@@ -233,8 +235,9 @@ std::vector<ErrorToDistance> FieldHierarchy::error_to_distance(const IntervalVol
   const double unit = error_to_distance_unit(volume_.grid, parts.description.max_error);
   std::vector<ErrorToDistance> result(set_.supercubes());
   tbb::parallel_for(std::uint32_t(0), std::uint32_t(set_.bricks().size()), [&](std::uint32_t b) {
-    set_.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
-      const UpdateIndex first = set_.first(b, s), end = first + UpdateIndex(std::popcount(set_.occupancy()[s]));
+    const BrickIndex brick(b);
+    set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+      const UpdateIndex first = set_.first(brick, s), end = first + std::popcount(set_.occupancy()[s]);
       const double width = diamond_width(volume_.grid) * double(1 << scale_of_key(key));
       double furthest = 0, ratio = 0;
       for (UpdateIndex i = first; i < end; ++i) {
@@ -295,12 +298,12 @@ struct FieldHierarchy::BrickPart {
 
 // Encodes one brick's updates into `codes`.
 template <class T>
-FieldHierarchy::BrickPart FieldHierarchy::encode_brick(const Field<T>& field, std::uint32_t brick, const ErrorStepFinder& step_of,
+FieldHierarchy::BrickPart FieldHierarchy::encode_brick(const Field<T>& field, BrickIndex brick, const ErrorStepFinder& step_of,
                                                        std::vector<UpdateCode>& codes) const {
   const TetCases& cases = tet_cases();
   BrickPart part;
   SetNeighbours neighbours(set_);
-  set_.for_each_supercube(brick, [&](std::uint32_t s, SupercubeKey key) {
+  set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     const SupercubeDiamonds diamonds(shapes_, key);
     neighbours.move_to(key);
     UpdateIndex next = set_.first(brick, s);
@@ -374,7 +377,7 @@ Result<IntervalVolume> FieldHierarchy::compact() const {
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain_.last()};
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()),
-                      [&](std::uint32_t b) { by_brick[b] = encode_brick(field, b, step_of, parts.codes); });
+                      [&](std::uint32_t b) { by_brick[b] = encode_brick(field, BrickIndex(b), step_of, parts.codes); });
   });
   parts.error_to_distance = error_to_distance(parts);
   d.full = full_mesh(by_brick);

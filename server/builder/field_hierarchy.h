@@ -58,8 +58,7 @@ class FieldHierarchy {
   [[nodiscard]] std::vector<ErrorToDistance> error_to_distance(const IntervalVolume::Parts& parts) const;
   struct BrickPart;
   template <class T>
-  [[nodiscard]] BrickPart encode_brick(const Field<T>& field, std::uint32_t brick, const ErrorStepFinder& step_of,
-                                       std::vector<UpdateCode>& codes) const;
+  [[nodiscard]] BrickPart encode_brick(const Field<T>& field, BrickIndex brick, const ErrorStepFinder& step_of, std::vector<UpdateCode>& codes) const;
   [[nodiscard]] FullMesh full_mesh(const std::vector<BrickPart>& parts) const;
 
   const Volume& volume_;

@@ -233,8 +233,8 @@ class Descent {
   struct Near {
     Vertex position{-1, -1, -1};
     std::uint64_t occupancy = 0;
-    std::uint32_t supercube = 0;
-    UpdateIndex first = 0;
+    SupercubeIndex supercube;
+    UpdateIndex first;
   };
   struct NearByScale : std::array<Near, kTopScale + 1> {
     bool inside = false;  // the cube lies in the box
@@ -246,11 +246,11 @@ class Descent {
     if (here.position != position) {
       const auto found = set_.find_supercube(scale, position);
       here = found ? Near{position, set_.occupancy()[found->supercube], found->supercube, set_.first(found->brick, found->supercube)}
-                   : Near{position, 0, 0, 0};
+                   : Near{position, 0, {}, {}};
     }
     const int slot = kSlotOfType[type_of(centre, scale)];
     if (!(here.occupancy >> slot & 1)) return {};
-    return here.first + UpdateIndex(count_below(here.occupancy, slot));
+    return here.first + count_below(here.occupancy, slot);
   }
 
   // Whether the tetrahedron, or at least its diamond, has a patch of that surface.
@@ -360,7 +360,7 @@ SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, con
     set.for_each(top, 0, [&](const Place& p) { cubes.emplace_back(set.centre(p)); });
     tbb::parallel_for(std::size_t(0), cubes.size(), [&](std::size_t i) { descent.measure(cubes[i]); });
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(set.bricks().size()), [&](std::uint32_t b) {
-      set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
+      set.for_each_in_brick(BrickIndex(b), ~std::uint64_t(0), [&](const Place& p) {
         const double tip = descent.measure_tip(Diamond(SupercubeSet::centre(p), scale_of_key(p.key), kTypeOfSlot[p.slot]));
         if (tip > kLeastDeviation * width) largest[p.index] = std::max(largest[p.index], round_up(tip));
       });
@@ -368,12 +368,12 @@ SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, con
   });
   for (int scale = top + 1; scale < domain.levels(); ++scale) {
     const auto [begin, end] = set.of_scale(scale);
-    for (std::uint32_t b = begin; b < end; ++b)
+    for (BrickIndex b = begin; b < end; ++b)
       set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) { largest[p.index] = round_up(width * double(1 << scale)); });
   }
-  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     set.for_each_supercube(
-        b, [&](std::uint32_t s, SupercubeKey key) { result.mean[s] = float(means[s].value() * width * double(1 << scale_of_key(key))); });
+        b, [&](SupercubeIndex s, SupercubeKey key) { result.mean[s] = float(means[s].value() * width * double(1 << scale_of_key(key))); });
   }
   return result;
 }

@@ -96,8 +96,8 @@ void encode_one_batch(benchmark::State& state) {
   std::vector<SlotGroup> groups;
   std::size_t updates = 0;
   const SupercubeSet& set = f.sigma->set();
-  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
-    set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const auto more = std::size_t(std::popcount(set.occupancy()[s]));
       if (updates + more > kBatchUpdatesMost) return;
       updates += more;

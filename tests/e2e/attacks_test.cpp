@@ -95,7 +95,7 @@ std::vector<Attack> attacks() {
       {"ForgetsWhatIsNotThere", CloseCode::malformed,
        [](RawClient& c) {
          c.send(kOpen);
-         c.send(View{1, {}, {}, {{0, 0, supercube_key(0, {1000, 0, 0}), 1}}});
+         c.send(View{1, {}, {}, {{{}, {}, supercube_key(0, {1000, 0, 0}), 1}}});
        }},
       {"OpenTwice", CloseCode::out_of_order,
        [](RawClient& c) {

@@ -252,7 +252,7 @@ TEST_P(Frames, CutShortAreMalformedAndOversizeAreTooLarge) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Faults, Frames,
-                         testing::Values(Kind{"Open", {}, kOpen}, Kind{"Have", {kOpen}, Have{{{0, 0, supercube_key(0, {0, 0, 0}), 1}}}},
+                         testing::Values(Kind{"Open", {}, kOpen}, Kind{"Have", {kOpen}, Have{{{{}, {}, supercube_key(0, {0, 0, 0}), 1}}}},
                                          Kind{"View", {kOpen}, kEverything}, Kind{"Credit", {kOpen}, Credit{1}}),
                          [](const auto& kind) { return kind.param.name; });
 

@@ -75,7 +75,7 @@ TEST(Server, ResumesTheSameDataOnlyAndRefusesWhatItDoesNotHave) {
   const auto opened = first.expect<Opened>();
   EXPECT_FALSE(opened.resumed);
   const std::uint64_t hash = opened.description.content_hash;
-  const protocol::Have nowhere{{{0, 0, supercube_key(0, {1 << 17, 0, 0}), 1}}};
+  const protocol::Have nowhere{{{{}, {}, supercube_key(0, {1 << 17, 0, 0}), 1}}};
 
   Open other = kOpen;
   other.resume = hash + 1;

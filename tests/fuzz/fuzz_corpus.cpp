@@ -78,9 +78,9 @@ void add_messages(const Corpus& corpus) {
   corpus.add("protocol", "view", {0}, encode(ClientMessage(View{7, {0.5, 10.0, Box{{-1, 0, 1}, {2, 0, 3}}, Camera{.eye = {9, 9, 9}}, 5, 6}})));
   corpus.add("protocol", "view-all", {0}, encode(ClientMessage(View{1, {}})));
   corpus.add("protocol", "view-forget", {0},
-             encode(ClientMessage(View{9, {}, 1000, {{0, 0, supercube_key(3, {1, 2, 0}), 5}, {0, 0, supercube_key(2, {3, 3, 1}), 129}}})));
+             encode(ClientMessage(View{9, {}, 1000, {{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));
   corpus.add("protocol", "have", {0},
-             encode(ClientMessage(Have{{{0, 0, supercube_key(3, {1, 2, 0}), 5}, {0, 0, supercube_key(2, {3, 3, 1}), 129}}})));
+             encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));
   corpus.add("protocol", "credit", {0}, encode(ClientMessage(Credit{65536})));
   corpus.add("protocol", "opened", {1}, encode(ServerMessage(Opened{testing::small_volumes()[1].description(), {}})));
   const IntervalVolume& v = testing::small_volumes()[0];

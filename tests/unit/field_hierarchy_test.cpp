@@ -188,9 +188,9 @@ TEST_P(Hierarchy, SigmaKeepsTheErrorsAtLeastAndInOrder) {
   ASSERT_TRUE(sigma) << sigma.error().message;
   std::set<float> distinct;
   float most = 0;
-  for (UpdateIndex i = 0; i < delta.set().size(); ++i) distinct.insert(delta.error(i)), most = std::max(most, delta.error(i));
+  for (UpdateIndex i{0}; i < delta.set().size(); ++i) distinct.insert(delta.error(i)), most = std::max(most, delta.error(i));
   EXPECT_EQ(sigma->description().max_error, double(most));
-  for (UpdateIndex i = 0; i < delta.set().size(); ++i) {
+  for (UpdateIndex i{0}; i < delta.set().size(); ++i) {
     EXPECT_GE(sigma->error(i), delta.error(i));
     if (distinct.size() <= std::size_t(kMaxErrorSteps)) {
       EXPECT_EQ(sigma->error(i), delta.error(i));
@@ -265,12 +265,12 @@ TEST(FieldHierarchy, ALinearFieldHasNoErrorAndAllItsUpdates) {
     const Volume volume = testing::volume_of_type(SampleType::f32, {n, n, n}, f);
     const auto all = FieldHierarchy(volume, {.range = {-kInf, kInf}, .refine = Refine::uniform}).compact();
     ASSERT_TRUE(all);
-    EXPECT_EQ(all->size(), UpdateIndex(n * n * n - 8)) << "every vertex but the corners";
+    EXPECT_EQ(all->size(), std::uint32_t(n * n * n - 8)) << "every vertex but the corners";
     EXPECT_EQ(all->description().max_error, 0);
     EXPECT_EQ(all->error_steps().size(), 1u);
     const auto some = FieldHierarchy(volume, {.range = {-1.5, 0.5}}).compact();
     ASSERT_TRUE(some);
-    EXPECT_GT(some->size(), UpdateIndex(n * n));
+    EXPECT_GT(some->size(), std::uint32_t(n * n));
     EXPECT_EQ(some->description().max_error, 0);
   }
 }

@@ -161,7 +161,7 @@ TEST_P(ObjectErrors, OfABrickAreThoseOfOneOfItsUpdates) {
   set.for_each_down([&](const Place& p) {
     largest[p.brick] = std::max(largest[p.brick], sigma_->object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index)));
   });
-  for (std::uint32_t b = 0; b < largest.size(); ++b) EXPECT_EQ(sigma_->brick_object_error(b), largest[b]);
+  for (BrickIndex b{0}; b < largest.size(); ++b) EXPECT_EQ(sigma_->brick_object_error(b), largest[b]);
 }
 
 INSTANTIATE_TEST_SUITE_P(Fields, ObjectErrors, ::testing::Range(0u, 12u));

@@ -247,7 +247,7 @@ TEST(Assemble, PartsThatFitButMeanNothingAreNotValid) {
   EXPECT_TRUE(refused([](auto& p) { p.description.grid.dims = {3, 2, 2}; })) << "updates outside the box";
   EXPECT_TRUE(refused([](auto& p) { p.codes[0] = UpdateCode(std::uint16_t(p.codes[0].bits() & 127)); }))
       << "the root's error is its descendants' least";
-  for (UpdateIndex i = 0; i < sigma.size(); i += 7) {
+  for (UpdateIndex i{0}; i < sigma.size(); i += 7) {
     const unsigned turned = (sigma.codes()[i].side_residual() + 1) % 3;
     EXPECT_TRUE(refused([&](auto& p) { p.codes[i] = UpdateCode(std::uint16_t((p.codes[i].bits() & ~3) | turned)); })) << "side of update " << i;
   }

@@ -34,14 +34,14 @@ Description some_description() {
 std::vector<ClientMessage> client_messages() {
   return {Open{"buckyball", "test 1", 262144},
           View{1, {}},
-          View{2, {}, 12345, {{0, 0, supercube_key(3, {1, 0, 2}), 5}, {0, 0, supercube_key(0, {7, 8, 9}), 1}}},
+          View{2, {}, 12345, {{{}, {}, supercube_key(3, {1, 0, 2}), 5}, {{}, {}, supercube_key(0, {7, 8, 9}), 1}}},
           View{std::numeric_limits<std::uint64_t>::max(),
                {.error = 0.5, .error_percent = 10, .roi = Box{{-1, 0, 1}, {2, 0, 3}}, .max_updates = 1ull << 60}},
           View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}},
           Credit{65536},
           Open{"buckyball", "test 1", 0, 0xfedcba9876543210u},
           Have{},
-          Have{{{0, 0, supercube_key(5, {1, 2, 3}), 1}, {0, 0, supercube_key(0, {4, 0, 9}), (std::uint64_t(1) << kSlots) - 1}}}};
+          Have{{{{}, {}, supercube_key(5, {1, 2, 3}), 1}, {{}, {}, supercube_key(0, {4, 0, 9}), (std::uint64_t(1) << kSlots) - 1}}}};
 }
 
 std::vector<ServerMessage> server_messages() {

@@ -211,7 +211,7 @@ TEST_P(Ranks, BoundIsANumberWhateverTheCamera) {
       lod.camera->pixel_error = pixel_error;
       ASSERT_TRUE(check_lod(lod));
       const Ranking ranking(volume_, lod);
-      for (std::uint32_t b = 0; b < volume_.set().bricks().size(); ++b) {
+      for (BrickIndex b{0}; b < volume_.set().bricks().size(); ++b) {
         ASSERT_TRUE(std::isfinite(ranking.bound(ranking.of_brick(b).bound()))) << "fov " << fov << ", pixel error " << pixel_error;
       }
       for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ASSERT_LE(rank, ranking.of_brick(p.brick).bound()); });
@@ -245,7 +245,7 @@ TEST_P(Ranks, AFinerPictureChoosesNoLess) {
     for (const double pixels : {1e6, 100.0, 10.0, 3.0, 1.0, 0.1, 1e-300}) {
       lod.camera->pixel_error = pixels;
       const SplitSet chosen = select(volume_, lod);
-      for (UpdateIndex i = 0; i < volume_.size(); ++i) ASSERT_TRUE(chosen.contains(i) || !coarser.contains(i)) << "trial " << trial << ", " << pixels;
+      for (UpdateIndex i{0}; i < volume_.size(); ++i) ASSERT_TRUE(chosen.contains(i) || !coarser.contains(i)) << "trial " << trial << ", " << pixels;
       coarser = chosen;
     }
     // In the end all that moves anything, wherever it is.

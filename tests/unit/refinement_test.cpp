@@ -118,7 +118,7 @@ TEST_P(Select, AFinerErrorChoosesNoLess) {
   for (double percent : {90.0, 60.0, 30.0, 10.0, 3.0, 0.3, 0.0}) {
     const SplitSet chosen = select(v, of_percent(percent));
     expect_closed(v, chosen);
-    for (UpdateIndex i = 0; i < v.size(); ++i) {
+    for (UpdateIndex i{0}; i < v.size(); ++i) {
       EXPECT_TRUE(!coarser.contains(i) || chosen.contains(i));
       EXPECT_EQ(chosen.contains(i), percent == 0 || v.error(i) > percent / 100 * v.description().max_error);
     }
@@ -180,7 +180,7 @@ TEST(SplitSetLaws, HoldsWhatWasPutInAndNothingElse) {
     else
       set.erase(n), model[n] = false;
   }
-  for (UpdateIndex n = 0; n < 1000; ++n) EXPECT_EQ(set.contains(n), model[n]);
+  for (UpdateIndex n{0}; n < 1000; ++n) EXPECT_EQ(set.contains(n), model[n]);
   EXPECT_EQ(set.count(), std::uint64_t(std::count(model.begin(), model.end(), true)));
 }
 

@@ -17,7 +17,7 @@ std::vector<SlotGroup> some_groups(unsigned seed) {
   for (unsigned i = 0; i < seed * 50; ++i) {
     const Vertex position{std::int32_t(random() % 40), std::int32_t(random() % 9), std::int32_t(random() % 300)};
     const std::uint64_t slots = random() & ((std::uint64_t(1) << kSlots) - 1);
-    groups.push_back({0, 0, supercube_key(int(random() % 6), position), slots | 1});
+    groups.push_back({{}, {}, supercube_key(int(random() % 6), position), slots | 1});
   }
   std::sort(groups.begin(), groups.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
   groups.erase(std::unique(groups.begin(), groups.end(), [](const auto& a, const auto& b) { return a.key == b.key; }), groups.end());

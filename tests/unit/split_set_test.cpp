@@ -36,8 +36,8 @@ TEST_P(SplitSets, SlotsAreThoseOfTheUpdatesInIt) {
     const SplitSet split = some_of(volume_, share, random_);
     std::vector<std::uint64_t> expected(set.supercubes());
     set.for_each_down([&](const Place& p) { expected[p.supercube] |= std::uint64_t(split.contains(p.index)) << p.slot; });
-    for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
-      set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey) { ASSERT_EQ(split.slots(set.first(b, s), set.occupancy()[s]), expected[s]); });
+    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) { ASSERT_EQ(split.slots(set.first(b, s), set.occupancy()[s]), expected[s]); });
     }
   }
 }
@@ -46,8 +46,8 @@ TEST_P(SplitSets, SlotsAreThoseOfTheUpdatesInIt) {
 TEST_P(SplitSets, NeighboursAreTheSupercubesFoundByTheirPlaces) {
   const SupercubeSet& set = volume_.set();
   std::vector<SupercubeKey> keys;
-  for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
-    set.for_each_supercube(b, [&](std::uint32_t, SupercubeKey key) { keys.push_back(key); });
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    set.for_each_supercube(b, [&](SupercubeIndex, SupercubeKey key) { keys.push_back(key); });
   }
   for (const bool shuffled : {false, true}) {
     if (shuffled) std::shuffle(keys.begin(), keys.end(), random_);
@@ -94,8 +94,8 @@ TEST_P(SplitSets, ReadyIsWhatAFrontCanSplit) {
         });
     ASSERT_TRUE(extraction);
     SplittableSlots splittable(set, volume_.domain(), split);
-    for (std::uint32_t b = 0; b < set.bricks().size(); ++b) {
-      set.for_each_supercube(b, [&](std::uint32_t s, SupercubeKey key) {
+    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
         splittable.move_to(key);
         const std::uint64_t ready = splittable.slots(), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
         ASSERT_EQ(is_split & ~ready, 0u) << "the ancestors of what is split are split";

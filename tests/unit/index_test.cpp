@@ -1,0 +1,51 @@
+#include "common/util/index.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <type_traits>
+
+#include "common/diamond/supercube.h"
+
+namespace intervale {
+namespace {
+
+template <class To, class... From>
+constexpr bool none_makes = (!std::is_constructible_v<To, From> && ...);
+
+TEST(Index, OneKindDoesNotBecomeAnother) {
+  static_assert(none_makes<UpdateIndex, BrickIndex, SupercubeIndex>);
+  static_assert(none_makes<BrickIndex, UpdateIndex, SupercubeIndex>);
+  static_assert(none_makes<SupercubeIndex, UpdateIndex, BrickIndex>);
+}
+
+TEST(Index, AnIntegerBecomesOneOnlyExplicitly) {
+  static_assert(std::is_constructible_v<UpdateIndex, int> && !std::is_convertible_v<int, UpdateIndex>);
+  static_assert(std::is_constructible_v<UpdateIndex, std::size_t> && !std::is_convertible_v<std::size_t, UpdateIndex>);
+  static_assert(none_makes<UpdateIndex, double, void*>);
+}
+
+TEST(Index, BecomesAnIntegerImplicitly) {
+  static_assert(std::is_convertible_v<UpdateIndex, std::uint32_t>);
+  constexpr std::array<int, 3> values{5, 6, 7};
+  static_assert(values[BrickIndex(2)] == 7 && 1u << BrickIndex(2) == 4);
+}
+
+TEST(Index, CostsNoMoreThanItsInteger) {
+  static_assert(sizeof(UpdateIndex) == sizeof(std::uint32_t) && alignof(UpdateIndex) == alignof(std::uint32_t));
+  static_assert(std::is_trivially_copyable_v<UpdateIndex> && std::is_trivially_destructible_v<UpdateIndex>);
+}
+
+TEST(Index, CountsUp) {
+  UpdateIndex i;
+  EXPECT_EQ(i, 0u);
+  EXPECT_EQ(i++, 0u);
+  EXPECT_EQ(++i, 2u);
+  static_assert(std::is_same_v<decltype(i + 3), UpdateIndex>);
+  EXPECT_EQ(i += 1, 3u);
+  EXPECT_EQ(i + 3, 6u);
+  static_assert(std::is_same_v<decltype(i - i), std::uint32_t>, "a difference is a count");
+}
+
+}  // namespace
+}  // namespace intervale
