@@ -78,7 +78,7 @@ class Balance {
       const std::uint64_t hidden = groups_[g].slots & ~front_.shown_slots(groups_[g].key);
       for (std::uint64_t left = hidden; left != 0; left &= left - 1) {
         wanted_.clear();
-        if (!show({groups_[g].key, std::countr_zero(left)}, groups_[g].importance / kHysteresis)) return;
+        if (!show({groups_[g].key, Slot(std::countr_zero(left))}, groups_[g].importance / kHysteresis)) return;
       }
     }
   }
@@ -116,7 +116,7 @@ class Balance {
       bool hidden = false;
       for (int cls = 2; cls >= 0; --cls) {
         for (std::uint64_t left = front_.shown_slots(key) & kSlotsOfClass[cls]; left != 0; left &= left - 1) {
-          hidden = hide({key, std::countr_zero(left)}) || hidden;
+          hidden = hide({key, Slot(std::countr_zero(left))}) || hidden;
         }
       }
       if (hidden) return true;
@@ -179,7 +179,8 @@ std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, 
   };
   while (now-- > 0 && count > 0) {
     for (const std::uint64_t cls : {kSlotsOfClass[2], kSlotsOfClass[1], kSlotsOfClass[0]}) {
-      for (std::uint64_t slots = groups[now].slots & cls; slots != 0; slots &= slots - 1) choose(choose, {groups[now].key, std::countr_zero(slots)});
+      for (std::uint64_t slots = groups[now].slots & cls; slots != 0; slots &= slots - 1)
+        choose(choose, {groups[now].key, Slot(std::countr_zero(slots))});
     }
   }
   std::vector<SlotGroup> result;

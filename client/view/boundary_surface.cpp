@@ -79,7 +79,7 @@ void BoundarySurface::mark_parents(std::size_t number, std::uint64_t slots, std:
   const auto mark = [&](int of_scale, Vertex at) {
     if (const std::uint32_t found = front.find_number(of_scale, at); found != FrontState::kNone) dirty[found] = 1;
   };
-  for (const int slot : set_bits(slots)) {
+  for (const Slot slot : set_bits<Slot>(slots)) {
     const Diamond d(centre_of(scale, position, slot), scale, kTypeOfSlot[slot]);
     if (d.centre == front.domain.root()) {
       mark(root_scale, {});

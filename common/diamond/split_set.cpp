@@ -62,7 +62,7 @@ struct Parents {
 
 std::vector<Parents> parents_of(const std::array<Links, kSlots>& links) {
   std::array<std::array<std::uint64_t, 64>, kCorner> children{};
-  for (int slot = 0; slot < kSlots; ++slot) {
+  for (Slot slot{0}; slot < kSlots; ++slot) {
     for (int k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
       const Link link = links[slot].vertex[links[slot].parent[k]];
       children[link.where][link.slot] |= std::uint64_t(1) << slot;
@@ -72,7 +72,7 @@ std::vector<Parents> parents_of(const std::array<Links, kSlots>& links) {
   for (int where = 0; where < kCorner; ++where) {
     Parents some;
     some.where = where;
-    for (int slot = 0; slot < kSlots; ++slot) {
+    for (Slot slot{0}; slot < kSlots; ++slot) {
       if (children[where][slot] == 0) continue;
       some.parents |= std::uint64_t(1) << slot;
       some.all |= children[where][slot];
@@ -121,7 +121,7 @@ std::uint64_t SplittableSlots::slots_inside() {
   std::uint64_t ready = (std::uint64_t(1) << kSlots) - 1;
   for (const Parents& some : parents_of(around_.position())) {
     if ((some.all & ready) == 0) continue;
-    for (const int missing : set_bits(some.parents & ~split_slots(some.where))) {
+    for (const Slot missing : set_bits<Slot>(some.parents & ~split_slots(some.where))) {
       ready &= ~some.by_parent[std::size_t(count_below(some.parents, missing))];
     }
   }
@@ -133,7 +133,7 @@ std::uint64_t SplittableSlots::slots() {
   if (scale >= domain_.levels()) return 0;
   if (is_interior(domain_, scale, around_.position())) return slots_inside();
   std::uint64_t ready = 0;
-  for (int slot = 0; slot < kSlots; ++slot) {
+  for (Slot slot{0}; slot < kSlots; ++slot) {
     const Diamond d(centre_of(scale, around_.position(), slot));
     const unsigned tets = domain_.tets(d);
     if (tets == 0 || domain_.is_noop(d)) continue;

@@ -18,10 +18,10 @@ constexpr std::array<std::uint8_t, kSlots> types_by_slot() {
   return types;
 }
 
-constexpr std::array<std::uint8_t, 64> slots_by_type() {
-  std::array<std::uint8_t, 64> slots{};
+constexpr std::array<Slot, 64> slots_by_type() {
+  std::array<Slot, 64> slots{};
   const auto types = types_by_slot();
-  for (int s = 0; s < kSlots; ++s) slots[types[s]] = std::uint8_t(s);
+  for (Slot s{0}; s < kSlots; ++s) slots[types[s]] = s;
   return slots;
 }
 
@@ -46,7 +46,7 @@ constexpr std::int32_t gather(std::uint64_t v) {
 }  // namespace
 
 constinit const std::array<std::uint8_t, kSlots> kTypeOfSlot = types_by_slot();
-constinit const std::array<std::uint8_t, 64> kSlotOfType = slots_by_type();
+constinit const std::array<Slot, 64> kSlotOfType = slots_by_type();
 
 SupercubeKey supercube_key(int scale, Vertex p) {
   return std::uint64_t(kMaxLevels - scale) << 57 | spread(std::uint64_t(p.x)) | spread(std::uint64_t(p.y)) << 1 | spread(std::uint64_t(p.z)) << 2;
@@ -57,7 +57,7 @@ Vertex position_of_key(SupercubeKey key) {
   return {gather(morton), gather(morton >> 1), gather(morton >> 2)};
 }
 
-Vertex centre_of(SupercubeKey key, int slot) { return centre_of(scale_of_key(key), position_of_key(key), slot); }
+Vertex centre_of(SupercubeKey key, Slot slot) { return centre_of(scale_of_key(key), position_of_key(key), slot); }
 
 SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy) : occupancy_(std::move(occupancy)) {
   assert(keys.size() == occupancy_.size() && "one word for each supercube");
@@ -115,7 +115,7 @@ std::optional<Place> SupercubeSet::find(const Diamond& d) const {
   if (d.row->cls == 3) return {};
   const int up = d.scale + 2;
   const auto found = find_supercube(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
-  const int slot = kSlotOfType[d.type];
+  const Slot slot = kSlotOfType[d.type];
   if (!found || !(occupancy_[found->supercube] >> slot & 1)) return {};
   return place_in(found->brick, found->supercube, found->key, slot);
 }
@@ -129,7 +129,7 @@ Place SupercubeSet::place(UpdateIndex index) const {
   for (; skip >= std::uint32_t(std::popcount(occupancy_[s])); ++s, mask &= mask - 1) skip -= std::uint32_t(std::popcount(occupancy_[s]));
   std::uint64_t word = occupancy_[s];
   for (; skip > 0; --skip) word &= word - 1;
-  return {bricks_[brick].key + unsigned(std::countr_zero(mask)), brick, s, std::uint32_t(std::countr_zero(word)), index};
+  return {bricks_[brick].key + unsigned(std::countr_zero(mask)), brick, s, Slot(std::countr_zero(word)), index};
 }
 
 std::size_t SupercubeSet::memory_bytes() const {

@@ -21,10 +21,11 @@ namespace intervale {
 
 // A slot is a diamond's number in its supercube: 0..7 class 0, 8..31 class 1, 32..55 class 2, so that parents come
 // before children.
+using Slot = Index<struct SlotTag, std::uint8_t>;
 inline constexpr int kSlots = 56;
 extern const std::array<std::uint8_t, kSlots> kTypeOfSlot;
-extern const std::array<std::uint8_t, 64> kSlotOfType;
-[[nodiscard]] constexpr int class_of_slot(int slot) { return slot < 8 ? 0 : slot < 32 ? 1 : 2; }
+extern const std::array<Slot, 64> kSlotOfType;
+[[nodiscard]] constexpr int class_of_slot(Slot slot) { return slot < 8 ? 0 : slot < 32 ? 1 : 2; }
 inline constexpr std::array<std::uint64_t, 3> kSlotsOfClass{0xffu, 0xffffff00u, 0xffffff00000000u};
 
 // A supercube's name. Ascending: coarse scales before fine ones, then along a Morton curve.
@@ -33,8 +34,8 @@ using SupercubeKey = std::uint64_t;
 [[nodiscard]] SupercubeKey supercube_key(int scale, Vertex position);
 [[nodiscard]] inline int scale_of_key(SupercubeKey key) { return kMaxLevels - int(key >> 57); }
 [[nodiscard]] Vertex position_of_key(SupercubeKey key);
-[[nodiscard]] Vertex centre_of(SupercubeKey key, int slot);
-[[nodiscard]] inline Vertex centre_of(int scale, Vertex position, int slot) {
+[[nodiscard]] Vertex centre_of(SupercubeKey key, Slot slot);
+[[nodiscard]] inline Vertex centre_of(int scale, Vertex position, Slot slot) {
   const unsigned type = kTypeOfSlot[slot];
   const auto coordinate = [scale](std::int32_t high, unsigned low) { return std::int32_t((std::uint32_t(high) << 2 | (low & 3)) << scale); };
   return {coordinate(position.x, type), coordinate(position.y, type >> 2), coordinate(position.z, type >> 4)};
@@ -49,7 +50,7 @@ struct Place {
   SupercubeKey key = 0;
   BrickIndex brick;
   SupercubeIndex supercube;
-  std::uint32_t slot = 0;
+  Slot slot;
   UpdateIndex index;
 };
 
@@ -111,7 +112,7 @@ class SupercubeSet {
   // The brick at a position, in bricks; not negative.
   [[nodiscard]] std::optional<BrickIndex> find_brick(int scale, Vertex position) const;
 
-  [[nodiscard]] static Vertex centre(const Place& p) { return centre_of(p.key, int(p.slot)); }
+  [[nodiscard]] static Vertex centre(const Place& p) { return centre_of(p.key, p.slot); }
 
   // The place of the diamond with a number. O(log bricks).
   [[nodiscard]] Place place(UpdateIndex index) const;
@@ -132,7 +133,7 @@ class SupercubeSet {
   template <class Visit>
   void for_each_in_brick(BrickIndex brick, std::uint64_t slots, Visit&& visit) const {
     for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-      for (const int slot : set_bits(occupancy_[s] & slots)) visit(place_in(brick, s, key, slot));
+      for (const Slot slot : set_bits<Slot>(occupancy_[s] & slots)) visit(place_in(brick, s, key, slot));
     });
   }
   // The same, for all diamonds of one scale and class.
@@ -156,8 +157,8 @@ class SupercubeSet {
   }
   // The number of a supercube's first diamond.
   [[nodiscard]] UpdateIndex first(BrickIndex brick, SupercubeIndex supercube) const { return bricks_[brick].first + first_in_brick_[supercube]; }
-  [[nodiscard]] Place place_in(BrickIndex brick, SupercubeIndex supercube, SupercubeKey key, int slot) const {
-    return {key, brick, supercube, std::uint32_t(slot), first(brick, supercube) + count_below(occupancy_[supercube], slot)};
+  [[nodiscard]] Place place_in(BrickIndex brick, SupercubeIndex supercube, SupercubeKey key, Slot slot) const {
+    return {key, brick, supercube, slot, first(brick, supercube) + count_below(occupancy_[supercube], slot)};
   }
 
  private:

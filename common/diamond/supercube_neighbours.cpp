@@ -32,7 +32,7 @@ Link link_to(const Near& p, unsigned parity) {
     cell[i] = at >> 2;
     type |= unsigned(at & 3) << (2 * i);
   }
-  if (k == 2) return {std::uint8_t(kCorner + cell[0] + 2 * cell[1] + 4 * cell[2]), 0};
+  if (k == 2) return {std::uint8_t(kCorner + cell[0] + 2 * cell[1] + 4 * cell[2]), {}};
   if (k == 1) return {std::uint8_t(kCoarser + cell[0] + 2 * cell[1] + 4 * cell[2]), kSlotOfType[type]};
   return {std::uint8_t(kSame + (cell[0] + 1) + 3 * (cell[1] + 1) + 9 * (cell[2] + 1)), kSlotOfType[type]};
 }
@@ -44,7 +44,7 @@ Link link_to_finer(unsigned type, Offset f) {
   return {std::uint8_t(kFiner + ((at[0] >> 2) + 1) + 3 * ((at[1] >> 2) + 1) + 9 * ((at[2] >> 2) + 1)), kSlotOfType[child]};
 }
 
-Links links_of(int slot, unsigned parity) {
+Links links_of(Slot slot, unsigned parity) {
   const unsigned type = kTypeOfSlot[slot];
   const DiamondType& row = diamond_type(type);
   Links links;
@@ -84,7 +84,7 @@ const LinkTable& link_table() {
   static const std::unique_ptr<const LinkTable> table = [] {
     auto made = std::make_unique<LinkTable>();
     for (unsigned parity = 0; parity < 8; ++parity) {
-      for (int slot = 0; slot < kSlots; ++slot) (*made)[parity][slot] = links_of(slot, parity);
+      for (Slot slot{0}; slot < kSlots; ++slot) (*made)[parity][slot] = links_of(slot, parity);
     }
     return made;
   }();

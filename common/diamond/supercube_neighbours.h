@@ -34,7 +34,7 @@ inline constexpr int kHere = 13;  // the supercube itself
 // A diamond around another one.
 struct Link {
   std::uint8_t where = 0;  // the neighbour that holds it
-  std::uint8_t slot = 0;   // in that supercube; 0 for a corner, whose slot depends on the supercube's position
+  Slot slot;               // in that supercube; 0 for a corner, whose slot depends on the supercube's position
 };
 
 // What is around the diamond in one slot.
@@ -63,7 +63,7 @@ using LinkTable = std::array<std::array<Links, kSlots>, 8>;
 struct SupercubePlace {
   int scale = 0;
   Vertex position;
-  int slot = 0;  // of a corner's vertex
+  Slot slot{};  // of a corner's vertex
   [[nodiscard]] bool exists() const { return (scale | position.x | position.y | position.z) >= 0; }
 };
 inline constexpr int kOriginScale = 32;  // scale_of((0, 0, 0)): that corner of the domain is in no supercube
@@ -112,8 +112,8 @@ class SupercubeNeighbours {
   }
   [[nodiscard]] int scale() const { return scale_; }
   [[nodiscard]] Vertex position() const { return position_; }
-  [[nodiscard]] const Links& links(int slot) const { return (*links_)[std::size_t(slot)]; }
-  [[nodiscard]] std::span<const Link> children(int slot) const {
+  [[nodiscard]] const Links& links(Slot slot) const { return (*links_)[std::size_t(slot)]; }
+  [[nodiscard]] std::span<const Link> children(Slot slot) const {
     return std::span(links(slot).child).first(diamond_type(kTypeOfSlot[std::size_t(slot)]).children);
   }
 
@@ -124,11 +124,11 @@ class SupercubeNeighbours {
   }
   struct Diamond {
     const Found& supercube;
-    int slot;
+    Slot slot;
   };
   [[nodiscard]] Diamond at(Link link) {
     const Found& found = at(int(link.where));
-    return {found, link.slot | corner_slot_[link.where]};
+    return {found, Slot(link.slot | corner_slot_[link.where])};
   }
   // Replaces what was found of the supercube itself, which has since come into being.
   void set_here(const Found& found) {
@@ -139,7 +139,7 @@ class SupercubeNeighbours {
  private:
   void look_up(int where) {
     const SupercubePlace place = neighbour_at(where, scale_, position_);
-    corner_slot_[std::size_t(where)] = std::uint8_t(place.slot);
+    corner_slot_[std::size_t(where)] = place.slot;
     keep(where, place.exists() ? finder_.find(where, place) : finder_.none());
   }
   // A pointer is null until it is looked up: one load fewer on the front's hottest path. Any other Found has a bit.
@@ -163,7 +163,7 @@ class SupercubeNeighbours {
   const std::array<Links, kSlots>* links_ = nullptr;
   std::array<std::uint64_t, 2> known_{};  // a bit for each neighbour looked up; unused for pointers
   std::array<Found, kNeighbours> found_{};
-  std::array<std::uint8_t, kNeighbours> corner_slot_{};  // of a corner's vertex; 0 elsewhere
+  std::array<Slot, kNeighbours> corner_slot_{};  // of a corner's vertex; 0 elsewhere
 };
 
 // Finds the supercubes of a set. Bricks that were found stay known while it moves within one brick, so it is fastest
@@ -178,9 +178,9 @@ class SetFinder {
     BrickIndex brick;
     SupercubeIndex supercube;
     UpdateIndex first;  // number of its first diamond
-    [[nodiscard]] bool has(int slot) const { return (occupancy >> slot & 1) != 0; }
-    [[nodiscard]] UpdateIndex index(int slot) const { return first + count_below(occupancy, slot); }
-    [[nodiscard]] Place place(int slot) const { return {key, brick, supercube, std::uint32_t(slot), index(slot)}; }
+    [[nodiscard]] bool has(Slot slot) const { return (occupancy >> slot & 1) != 0; }
+    [[nodiscard]] UpdateIndex index(Slot slot) const { return first + count_below(occupancy, slot); }
+    [[nodiscard]] Place place(Slot slot) const { return {key, brick, supercube, slot, index(slot)}; }
   };
 
   explicit SetFinder(const SupercubeSet& set) : set_(set) {}  // which must outlive it
@@ -207,7 +207,7 @@ using SetNeighbours = SupercubeNeighbours<SetFinder>;
 // and its server's plan agree. groups: keys strictly ascending. split_slots(Found): of a supercube.
 template <class Finder, class SplitSlots, class Merge>
 void merge_finest_first(std::span<const SlotGroup> groups, SupercubeNeighbours<Finder>& around, const SplitSlots& split_slots, const Merge& merge) {
-  const auto has_split_child = [&](int slot) {
+  const auto has_split_child = [&](Slot slot) {
     for (const Link link : around.children(slot)) {
       const auto child = around.at(link);
       if (split_slots(child.supercube) >> child.slot & 1) return true;
@@ -216,7 +216,7 @@ void merge_finest_first(std::span<const SlotGroup> groups, SupercubeNeighbours<F
   };
   for_each_finest_first(groups, [&](const SlotGroup& group, std::uint64_t slots) {
     around.move_to(group.key);
-    for (const int slot : set_bits(slots & split_slots(around.at(kHere)))) {
+    for (const Slot slot : set_bits<Slot>(slots & split_slots(around.at(kHere)))) {
       if (!has_split_child(slot)) merge(group, slot);
     }
   });

@@ -61,7 +61,7 @@ Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> by
       keys->size(), [&](std::size_t g) { return (*keys)[g]; },
       [&](std::size_t g, int cls) {
         cursor.move_to((*keys)[g]);
-        for (const int slot : set_bits(kSlotsOfClass[cls] & ~cursor.here().split)) {
+        for (const Slot slot : set_bits<Slot>(kSlotsOfClass[cls] & ~cursor.here().split)) {
           if (cursor.find(slot) && !take(cls)) return false;
         }
         return true;

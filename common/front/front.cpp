@@ -12,7 +12,7 @@ namespace {
 using Block = FrontState::Block;
 using Split = FrontState::Split;
 
-constexpr std::uint64_t bit(int slot) { return std::uint64_t(1) << slot; }
+constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
 
 // The cuts of the root's edges that a corner of the domain owns: its split's bits, and q of each cut in order of the
 // bits.
@@ -20,7 +20,7 @@ void add_corner(FrontState& state, const RootPatch& root_patch, const DiamondPar
   const Links& links = link_table()[0][kSlotOfType[root.type]];
   const Vertex at = root.vertex(corner);
   const bool is_origin = (at.x | at.y | at.z) == 0;
-  const int slot = is_origin ? 0 : links.vertex[corner].slot;
+  const Slot slot = is_origin ? Slot() : links.vertex[corner].slot;
   assert((is_origin || links.vertex[corner].where == kCoarser) && "the other corners are in the supercube at (0, 0, 0)");
   Block& block = is_origin ? state.origin : state.blocks.front();
   block.split |= bit(slot);
@@ -65,7 +65,7 @@ std::optional<Front::Handle> Front::find(Vertex centre) const {
   const Diamond d(centre);
   FrontCursor cursor(state_);
   cursor.move_to(d);
-  const int slot = kSlotOfType[d.type];
+  const Slot slot = kSlotOfType[d.type];
   if (!cursor.find(slot)) return {};
   return Handle{supercube_key(d.scale, cursor.position()), slot};
 }
@@ -150,7 +150,7 @@ bool Front::show(Handle handle, std::uint64_t max_tets) {
 void Front::forget(std::span<const SlotGroup> groups) {
   SupercubeNeighbours<BlockFinder> neighbours(state_);
   const auto split_slots = [this](const Block* block) { return state_.is_root_block(*block) ? 0 : block->split; };
-  merge_finest_first(groups, neighbours, split_slots, [this](const SlotGroup& group, int slot) {
+  merge_finest_first(groups, neighbours, split_slots, [this](const SlotGroup& group, Slot slot) {
     hide(Handle{group.key, slot});
     state_.obtain_block(scale_of_key(group.key), position_of_key(group.key)).split &= ~bit(slot);
     --state_.split_count;

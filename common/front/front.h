@@ -41,7 +41,7 @@ class Front {
   // A diamond of the front that can be split now; valid until the next split or merge.
   struct Handle {
     SupercubeKey supercube = 0;
-    int slot = 0;
+    Slot slot;
     friend bool operator==(const Handle&, const Handle&) = default;
   };
 

@@ -22,7 +22,7 @@ bool has_splits_of(const FrontState& whole, const FrontState& part, const Block&
   if (block.split == 0) return true;  // all of it was merged
   const Block* const same = whole.find_block(block.scale, block.position);
   if (same == nullptr || (block.split & ~same->split) != 0) return false;
-  for (const int slot : set_bits(block.split)) {
+  for (const Slot slot : set_bits<Slot>(block.split)) {
     if (!are_equal(part, block.of[slot], whole, same->of[slot])) return false;
   }
   return true;
@@ -49,7 +49,7 @@ bool Front::coarsen_to(const Front& coarse) {
       for (auto block = first; block != last; ++block) {
         const Block* const kept = coarse.state_.find_block((*block)->scale, (*block)->position);
         const std::uint64_t surplus = (*block)->split & kSlotsOfClass[cls] & ~(kept == nullptr ? 0 : kept->shown);
-        for (const int slot : set_bits(surplus)) {
+        for (const Slot slot : set_bits<Slot>(surplus)) {
           if (!merge(centre_of((*block)->scale, (*block)->position, slot))) return false;
         }
       }

@@ -32,7 +32,7 @@ void FrontCursor::move_to(const Diamond& d) {
   move_to(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
 }
 
-bool FrontCursor::gather(int slot) {
+bool FrontCursor::gather(Slot slot) {
   slot_ = slot;
   const DiamondType& row = diamond_type(kTypeOfSlot[std::size_t(slot)]);
   if (scale() >= state_.domain.levels()) return false;
@@ -56,7 +56,7 @@ bool FrontCursor::gather(int slot) {
 
 // Rejects most of the diamonds that cannot be split, at a fraction of gather()'s cost. At the border some parents may
 // not exist: gather() decides.
-bool FrontCursor::parents_are_split(int slot) {
+bool FrontCursor::parents_are_split(Slot slot) {
   if (!is_interior_) return true;
   const Links& links = neighbours_.links(slot);
   const int parents = diamond_type(kTypeOfSlot[std::size_t(slot)]).parents;

@@ -46,12 +46,12 @@ class FrontCursor {
 
   // Finds the diamond in a slot if it exists and all its vertices' diamonds are split: if it is split, or in the front
   // with all its tetrahedra. The functions below are of the diamond found last.
-  bool gather(int slot);
+  bool gather(Slot slot);
   // The same, if it can be split now.
-  bool find(int slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
+  bool find(Slot slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
 
   [[nodiscard]] const Diamond& diamond() const { return *diamond_; }
-  [[nodiscard]] int slot() const { return slot_; }
+  [[nodiscard]] Slot slot() const { return slot_; }
   [[nodiscard]] const DiamondParts& parts() const { return parts_; }
   [[nodiscard]] const Links& links() const { return neighbours_.links(slot_); }
   // Of the vertex's diamond
@@ -73,7 +73,7 @@ class FrontCursor {
   [[nodiscard]] const Block& here() { return *neighbours_.at(kHere); }
   struct Neighbour {
     const Block& block;
-    int slot;
+    Slot slot;
     [[nodiscard]] bool is_split() const { return block.is_split(slot); }
     [[nodiscard]] bool is_shown() const { return block.is_shown(slot); }
     [[nodiscard]] const Split& split() const { return block.of[std::size_t(slot)]; }
@@ -82,20 +82,20 @@ class FrontCursor {
     const auto found = neighbours_.at(link);
     return {*found.supercube, found.slot};
   }
-  [[nodiscard]] const Links& links(int slot) const { return neighbours_.links(slot); }
-  [[nodiscard]] std::span<const Link> children(int slot) const { return neighbours_.children(slot); }
+  [[nodiscard]] const Links& links(Slot slot) const { return neighbours_.links(slot); }
+  [[nodiscard]] std::span<const Link> children(Slot slot) const { return neighbours_.children(slot); }
   [[nodiscard]] int scale() const { return neighbours_.scale(); }
   [[nodiscard]] Vertex position() const { return neighbours_.position(); }
   // Takes note of the supercube's block, which was added since the cursor moved there.
   void set_here(const Block& block) { neighbours_.set_here(&block); }
 
  private:
-  [[nodiscard]] bool parents_are_split(int slot);
+  [[nodiscard]] bool parents_are_split(Slot slot);
 
   const FrontState& state_;
   SupercubeNeighbours<BlockFinder> neighbours_;
   bool is_interior_ = false;  // all diamonds of the supercube are inside the box
-  int slot_ = 0;
+  Slot slot_;
   std::optional<Diamond> diamond_;
   DiamondParts parts_;
   std::array<Split, kMaxVertices> split_;  // of each vertex that exists

@@ -23,7 +23,7 @@ FrontMesher::Corners FrontMesher::corners_of(const TetShape& s) {
 const FrontMesher::HalfCorners& FrontMesher::half_corners() {
   static const std::unique_ptr<const HalfCorners> table = [] {
     auto made = std::make_unique<HalfCorners>();
-    for (int slot = 0; slot < kSlots; ++slot) {
+    for (Slot slot{0}; slot < kSlots; ++slot) {
       const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
       for (int t = 0; t < row.tets; ++t) {
         for (int end = 0; end < 2; ++end) (*made)[slot][t][end] = corners_of(row.half_shape[t][end]);
@@ -55,7 +55,7 @@ void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) 
   }
   const FrontState::Block& block = state_.blocks[number];
   const bool at_border = is_at_border(number);
-  for (const int slot : set_bits(block.shown)) {
+  for (const Slot slot : set_bits<Slot>(block.shown)) {
     const Diamond d(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]);
     const FrontState::Split& split = block.of[slot];
     const Vertex c = at_border ? state_.domain.clamp(d.centre) : d.centre;
@@ -76,7 +76,7 @@ void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) 
 
 void FrontMesher::append_runs(std::size_t number, std::vector<Run>& runs) const {
   if (number == 0) runs.push_back({state_.origin.of[0].first, state_.origin.of[0].points()});
-  for (const int slot : set_bits(block(number).shown)) {
+  for (const Slot slot : set_bits<Slot>(block(number).shown)) {
     const FrontState::Split& split = block(number).of[slot];
     runs.push_back({split.first, split.points()});
   }
@@ -86,7 +86,7 @@ void FrontMesher::append_removed_runs(std::size_t number, std::vector<Run>& runs
   if (state_.is_root_block(block(number))) return;
   FrontCursor cursor(state_);
   cursor.move_to(block(number).scale, block(number).position);
-  for (const int slot : set_bits(block(number).shown)) {
+  for (const Slot slot : set_bits<Slot>(block(number).shown)) {
     const Links& links = cursor.links(slot);
     const Links::Edge spine = links.edge[0];
     const FrontState::Split& owner = cursor.at(links.vertex[spine.owner]).split();
@@ -113,7 +113,7 @@ void FrontMesher::append(const Output<Numbers>& out, std::size_t number) const {
   if (block(number).shown == 0) return;
   FrontCursor cursor(state_);
   cursor.move_to(block(number).scale, block(number).position);
-  for (const int slot : set_bits(block(number).shown)) {
+  for (const Slot slot : set_bits<Slot>(block(number).shown)) {
     unsigned unsplit = 0, bit = 1;  // a bit for each child whose split is not shown
     for (const Link link : cursor.children(slot)) {
       if (!cursor.at(link).is_shown()) unsplit |= bit;

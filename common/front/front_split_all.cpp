@@ -27,7 +27,7 @@ class AllSplits {
       Block& block = state.obtain_block(scale_of_key(g.key), position_of_key(g.key));
       blocks_.push_back(&block);
       updates_of(g, updates);
-      for (const int slot : set_bits(g.slots)) {
+      for (const Slot slot : set_bits<Slot>(g.slots)) {
         block.of[slot].first = PointId(points);
         points += updates[slot].residuals.size() + 1;  // room for the centre, too
       }
@@ -73,7 +73,7 @@ class AllSplits {
       cursor.move_to(blocks_[k]->scale, blocks_[k]->position);
       updates_of_(groups_[k], updates);
       splits += std::uint64_t(std::popcount(chosen));
-      for (const int slot : set_bits(chosen)) {
+      for (const Slot slot : set_bits<Slot>(chosen)) {
         Split& split = blocks_[k]->of[slot];
         const bool is_there = cursor.gather(slot) && !cursor.is_noop();
         const std::optional<Side> side = is_there ? decode_update(cursor.gather_cuts(), updates[slot], &state_.q[split.first]) : std::nullopt;

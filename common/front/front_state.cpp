@@ -32,7 +32,7 @@ void FrontState::pack() {
   std::vector<std::uint8_t> kept_q;
   const auto pack_cuts = [&](Block& block) {
     block.neighbours = {};
-    for (int slot = 0; slot < kSlots; ++slot) {
+    for (Slot slot{0}; slot < kSlots; ++slot) {
       Split& s = block.of[std::size_t(slot)];
       if (!block.is_split(slot)) {
         s = {};

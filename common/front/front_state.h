@@ -78,8 +78,8 @@ struct FrontState {
     std::uint64_t shown = 0;         // those of `split` that the mesh is made with; the others are hidden
     std::array<Split, kSlots> of{};  // by slot
     NeighbourCache neighbours;
-    [[nodiscard]] bool is_split(int slot) const { return (split >> slot & 1) != 0; }
-    [[nodiscard]] bool is_shown(int slot) const { return (shown >> slot & 1) != 0; }
+    [[nodiscard]] bool is_split(Slot slot) const { return (split >> slot & 1) != 0; }
+    [[nodiscard]] bool is_shown(Slot slot) const { return (shown >> slot & 1) != 0; }
   };
   static constexpr std::uint32_t kNone = ~std::uint32_t(0);
 

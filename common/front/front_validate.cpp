@@ -19,7 +19,7 @@ std::optional<std::string> validate_block(const FrontState& state, const Block& 
   if ((block.shown & ~block.split) != 0) return "a diamond is shown as split, but is not split";
   if (state.is_root_block(block)) return {};
   cursor.move_to(block.scale, block.position);
-  for (const int slot : set_bits(block.split)) {
+  for (const Slot slot : set_bits<Slot>(block.split)) {
     const Vertex c = centre_of(block.scale, block.position, slot);
     const auto where = " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")";
     const Split& split = block.of[slot];

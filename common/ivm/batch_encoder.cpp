@@ -44,7 +44,7 @@ std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const Split
       for (std::uint64_t left = set.occupancy()[g.supercube] & kSlotsOfClass[cls]; left != 0; left &= left - 1, ++i) {
         const UpdateCode code = volume.codes()[i];
         residual += code.coefficients();
-        const int slot = std::countr_zero(left);
+        const Slot slot(std::countr_zero(left));
         if (!(c.ready >> slot & 1)) continue;
         int vertices = diamond_type(kTypeOfSlot[slot]).vertices;
         if (!interior) {

@@ -49,7 +49,7 @@ Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const O
     const auto updates_of = [&volume](const SlotGroup& g, std::span<UpdateView, kSlots> updates) {
       UpdateIndex i = volume.set().first(g.brick, g.supercube);
       std::uint32_t residual = volume.first_residual(g.brick, g.supercube);
-      for (const int slot : set_bits(volume.set().occupancy()[g.supercube])) {
+      for (const Slot slot : set_bits<Slot>(volume.set().occupancy()[g.supercube])) {
         updates[std::size_t(slot)] = volume.update(i++, residual);
         residual += std::uint32_t(updates[std::size_t(slot)].residuals.size());
       }

@@ -22,7 +22,7 @@ void code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint
   std::vector<std::uint16_t> least(set.size());  // the largest step of a child plus 1; 0 without children
   static_assert(kMaxErrorSteps == 512);
   set.for_each_up([&](const Place& p) {
-    const int cls = class_of_slot(int(p.slot)), finest = scale_of_key(p.key) == 0;
+    const int cls = class_of_slot(p.slot), finest = scale_of_key(p.key) == 0;
     std::uint16_t& step = steps[p.index];
     const unsigned from = least[p.index];
     if (from == 0) {
@@ -42,7 +42,7 @@ void code_shapes(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> 
     unsigned cuts = 0;
     for_each_parent(set, p, [&](UpdateIndex parent) { cuts += UpdateCode(shapes[parent]).coefficients(); });
     std::uint8_t& shape = shapes[p.index];
-    shape = std::uint8_t(model[class_of_slot(int(p.slot))][scale_of_key(p.key) == 0][std::min(cuts, 15u)].code(coder, shape));
+    shape = std::uint8_t(model[class_of_slot(p.slot)][scale_of_key(p.key) == 0][std::min(cuts, 15u)].code(coder, shape));
   });
 }
 
@@ -54,7 +54,7 @@ void code_residuals(Coder& coder, const SupercubeSet& set, std::span<const std::
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
       const UpdateCode code(shapes[p.index]);
-      model.code_cuts(coder, class_of_slot(int(p.slot)), code.side_residual(), code.coefficients(), code.first_cuts(), next);
+      model.code_cuts(coder, class_of_slot(p.slot), code.side_residual(), code.coefficients(), code.first_cuts(), next);
       next += code.coefficients();
     });
   }

@@ -49,9 +49,9 @@ class Ranking {
     // No lower than the rank of any update here whose error step is no higher.
     [[nodiscard]] Rank bound(unsigned step) const { return rank(importance(step)); }
     // Whether the diamond in a slot meets the region of interest.
-    [[nodiscard]] bool meets_roi(int slot) const { return !ranking_->roi_ || ranking_->meets_roi(Diamond(centre_of(key_, slot))); }
+    [[nodiscard]] bool meets_roi(Slot slot) const { return !ranking_->roi_ || ranking_->meets_roi(Diamond(centre_of(key_, slot))); }
     // The rank of update i, in this slot.
-    [[nodiscard]] Rank operator()(UpdateIndex i, int slot) const {
+    [[nodiscard]] Rank operator()(UpdateIndex i, Slot slot) const {
       return meets_roi(slot) ? rank(importance(ranking_->volume_.error_step(i))) : Rank(0);
     }
 

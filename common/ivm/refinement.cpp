@@ -31,7 +31,7 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
-      for (const int slot : set_bits(set.occupancy()[s])) {
+      for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
         if (rank(i, slot) != 0) wanted.insert(i);
         ++i;
       }
@@ -50,7 +50,7 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& 
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
       UpdateIndex i = set.first(b, s);
-      for (const int slot : set_bits(set.occupancy()[s])) {
+      for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
         if (updates.contains(i)) ranks[i] = rank(i, slot);
         ++i;
       }

@@ -62,7 +62,7 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
   if (!found || (slots & ~set.occupancy()[found->supercube]) != 0) return false;
   for (; slots != 0; slots &= slots - 1) {
-    const UpdateIndex i = set.place_in(found->brick, found->supercube, key, std::countr_zero(slots)).index;
+    const UpdateIndex i = set.place_in(found->brick, found->supercube, key, Slot(std::countr_zero(slots))).index;
     if (sent_.contains(i)) continue;
     sent_.insert(i);
     ++sent_count_;
@@ -79,7 +79,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   }
   SetNeighbours around(set);
   const auto sent_slots = [this](const SetFinder::Found& found) { return found.occupancy == 0 ? 0 : sent_.slots(found.first, found.occupancy); };
-  merge_finest_first(groups, around, sent_slots, [&](const SlotGroup& g, int slot) {
+  merge_finest_first(groups, around, sent_slots, [&](const SlotGroup& g, Slot slot) {
     const SetFinder::Found& here = around.at(kHere);
     const UpdateIndex i = here.index(slot);
     sent_.erase(i);
@@ -152,7 +152,7 @@ StreamPlan::Remaining StreamPlan::remaining() const {
 // builder, since the next update is near by. False if the batch is full first; even then the batch is closed under
 // parents.
 bool StreamPlan::add_with_ancestors(const Place& place, SetNeighbours& around, BatchBuilder& builder) {
-  const Links& links = around.links(int(place.slot));
+  const Links& links = around.links(place.slot);
   const int parents = diamond_type(kTypeOfSlot[place.slot]).parents;
   for (int k = 0; k < parents; ++k) {
     const Link link = links.vertex[links.parent[k]];
@@ -200,7 +200,7 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
     const auto count = unsigned(std::popcount(set.occupancy()[s]));
     const std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
     if (unsent == 0) return;
-    const auto here = visit_supercube(ranking, {key, brick, s, 0, first}, unsent, builder);
+    const auto here = visit_supercube(ranking, {key, brick, s, {}, first}, unsent, builder);
     full = !here;
     if (full) return;
     rest.rank = std::max(rest.rank, here->rank);
@@ -252,10 +252,10 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
   unsigned at = 0;
   for (; candidates != 0; candidates &= candidates - 1) {
     const auto k = unsigned(std::countr_zero(candidates));
-    for (; at <= k; ++at, slots &= slots - 1) place.slot = std::uint32_t(std::countr_zero(slots));
+    for (; at <= k; ++at, slots &= slots - 1) place.slot = Slot(std::countr_zero(slots));
     const unsigned level = volume_->error_step(first + k);
     float importance = ranking.importance(level);
-    if (importance > 0 && !ranking.meets_roi(int(place.slot))) importance = 0;
+    if (importance > 0 && !ranking.meets_roi(place.slot)) importance = 0;
     importance = std::max(importance, least);
     if (importance > 0 && importance >= in_band) {
       place.index = first + k;

@@ -8,17 +8,18 @@
 
 namespace intervale {
 
-// The positions of the bits that are set, ascending: for (const int i : set_bits(word)).
-template <std::unsigned_integral Word>
+// The positions of the bits that are set, ascending: for (const int i : set_bits(word)), or set_bits<Slot>(word), which
+// makes each a Slot.
+template <std::unsigned_integral Word, class Position>
 class SetBits {
  public:
   class Iterator {
    public:
-    using value_type = int;
+    using value_type = Position;
     using difference_type = std::ptrdiff_t;
     constexpr Iterator() = default;
     constexpr explicit Iterator(Word left) : left_(left) {}
-    [[nodiscard]] constexpr int operator*() const { return std::countr_zero(left_); }
+    [[nodiscard]] constexpr Position operator*() const { return Position(std::countr_zero(left_)); }
     constexpr Iterator& operator++() {
       left_ &= Word(left_ - 1);
       return *this;
@@ -36,9 +37,9 @@ class SetBits {
   Word word_;
 };
 
-template <std::unsigned_integral Word>
-[[nodiscard]] constexpr SetBits<Word> set_bits(Word word) {
-  return SetBits<Word>(word);
+template <class Position = int, std::unsigned_integral Word>
+[[nodiscard]] constexpr SetBits<Word, Position> set_bits(Word word) {
+  return SetBits<Word, Position>(word);
 }
 
 // How many bits below position i are set. i: less than the width of the word.

@@ -134,7 +134,7 @@ std::uint64_t leaves(const TetCases& cases, const Domain& domain, const Diamond&
 }
 
 // A bit for each child that is in the set.
-unsigned children_in_set(SetNeighbours& neighbours, int slot) {
+unsigned children_in_set(SetNeighbours& neighbours, Slot slot) {
   unsigned some = 0, bit = 1;
   for (const Link link : neighbours.children(slot)) {
     if (neighbours.at(link.where).has(link.slot)) some |= bit;
@@ -186,7 +186,7 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
         set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
           const SupercubeDiamonds diamonds(shapes_, key);
           UpdateIndex next = set_.first(brick, s);
-          for (const int slot : set_bits(set_.occupancy()[s])) {
+          for (const Slot slot : set_bits<Slot>(set_.occupancy()[s])) {
             const Diamond d = diamonds.diamond(slot);
             const BorderShape& shape = diamonds.shape(slot);
             errors_[next++] = round_up(scale < kShared ? error_of(d, shape) : error_in_parallel(error_of, d, shape));
@@ -213,7 +213,7 @@ void FieldHierarchy::saturate(std::vector<float>& errors) const {
           if (slots == 0) return;
           neighbours.move_to(key);
           UpdateIndex next = set_.first(brick, s) + std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots);
-          for (const int slot : set_bits(slots)) {
+          for (const Slot slot : set_bits<Slot>(slots)) {
             float& error = errors[next++];
             for (const Link link : neighbours.children(slot)) {
               const SetFinder::Found& found = neighbours.at(link.where);
@@ -307,7 +307,7 @@ FieldHierarchy::BrickPart FieldHierarchy::encode_brick(const Field<T>& field, Br
     const SupercubeDiamonds diamonds(shapes_, key);
     neighbours.move_to(key);
     UpdateIndex next = set_.first(brick, s);
-    for (const int slot : set_bits(set_.occupancy()[s])) {
+    for (const Slot slot : set_bits<Slot>(set_.occupancy()[s])) {
       const Diamond diamond = diamonds.diamond(slot);
       const BorderShape& shape = diamonds.shape(slot);
       const Around f = around(field, domain_, diamond, shape);

@@ -15,12 +15,12 @@ class SupercubeDiamonds {
   // shapes: of every scale; they outlive this.
   SupercubeDiamonds(const std::vector<BorderShapes>& shapes, SupercubeKey key);
 
-  [[nodiscard]] Diamond diamond(int slot) const {
+  [[nodiscard]] Diamond diamond(Slot slot) const {
     const unsigned type = kTypeOfSlot[slot];
     return Diamond({(corner_.x + std::int32_t(type & 3)) << scale_, (corner_.y + std::int32_t(type >> 2 & 3)) << scale_,
                     (corner_.z + std::int32_t(type >> 4)) << scale_});
   }
-  [[nodiscard]] const BorderShape& shape(int slot) const {
+  [[nodiscard]] const BorderShape& shape(Slot slot) const {
     const unsigned type = kTypeOfSlot[slot];
     return shapes_.of(place_[type & 3][0], place_[type >> 2 & 3][1], place_[type >> 4][2]);
   }

@@ -248,7 +248,7 @@ class Descent {
       here = found ? Near{position, set_.occupancy()[found->supercube], found->supercube, set_.first(found->brick, found->supercube)}
                    : Near{position, 0, {}, {}};
     }
-    const int slot = kSlotOfType[type_of(centre, scale)];
+    const Slot slot = kSlotOfType[type_of(centre, scale)];
     if (!(here.occupancy >> slot & 1)) return {};
     return here.first + count_below(here.occupancy, slot);
   }

@@ -257,7 +257,7 @@ class TypedDelta final : public Delta {
           std::uint64_t left = level.words[level.touched[k]].wanted & cls;
           if (left != 0) cursor.move_to(scale, p);
           for (; left != 0; left &= left - 1) {
-            const int slot = std::countr_zero(left);
+            const Slot slot(std::countr_zero(left));
             if (!cursor.gather(slot)) throw std::logic_error(kTooSoon);
             const Diamond& d = cursor.diamond();
             const bool interior = domain_.is_interior(d);

@@ -120,7 +120,7 @@ std::size_t bytes_of(const IntervalVolume& volume, const SplitSet& updates) {
     count += more;
     groups.push_back(g);
     for (std::uint64_t left = g.slots; left != 0; left &= left - 1) {
-      sent.insert(set.place_in(g.brick, g.supercube, g.key, std::countr_zero(left)).index);
+      sent.insert(set.place_in(g.brick, g.supercube, g.key, Slot(std::countr_zero(left))).index);
     }
   }
   flush();

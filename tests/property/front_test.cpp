@@ -148,7 +148,7 @@ TEST_P(FrontLaws, HidingIsLeavingOut) {
   std::mt19937 random(GetParam());
   for (int step = 0; step < 400 && !all.empty(); ++step) {
     const Place& p = all[random() % all.size()];
-    const Front::Handle handle{p.key, int(p.slot)};
+    const Front::Handle handle{p.key, p.slot};
     ASSERT_NE(front.is_hidden(handle), shown.contains(p.index));
     const std::uint64_t before = front.tet_count();
     if (random() % 3 != 0) {
@@ -177,7 +177,7 @@ TEST_P(FrontLaws, HidingIsLeavingOut) {
   }
   for (const Place& p : all) {
     if (!shown.contains(p.index)) {
-      ASSERT_TRUE(front.show({p.key, int(p.slot)}, ~std::uint64_t(0)));
+      ASSERT_TRUE(front.show({p.key, p.slot}, ~std::uint64_t(0)));
     }
   }
   EXPECT_EQ(canonical(front.mesh()), full);

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "common/diamond/supercube.h"
+#include "common/diamond/supercube_neighbours.h"
 
 namespace intervale {
 namespace {
@@ -14,9 +15,10 @@ template <class To, class... From>
 constexpr bool none_makes = (!std::is_constructible_v<To, From> && ...);
 
 TEST(Index, OneKindDoesNotBecomeAnother) {
-  static_assert(none_makes<UpdateIndex, BrickIndex, SupercubeIndex>);
-  static_assert(none_makes<BrickIndex, UpdateIndex, SupercubeIndex>);
-  static_assert(none_makes<SupercubeIndex, UpdateIndex, BrickIndex>);
+  static_assert(none_makes<UpdateIndex, BrickIndex, SupercubeIndex, Slot>);
+  static_assert(none_makes<BrickIndex, UpdateIndex, SupercubeIndex, Slot>);
+  static_assert(none_makes<SupercubeIndex, UpdateIndex, BrickIndex, Slot>);
+  static_assert(none_makes<Slot, UpdateIndex, BrickIndex, SupercubeIndex>);
 }
 
 TEST(Index, AnIntegerBecomesOneOnlyExplicitly) {
@@ -33,6 +35,7 @@ TEST(Index, BecomesAnIntegerImplicitly) {
 
 TEST(Index, CostsNoMoreThanItsInteger) {
   static_assert(sizeof(UpdateIndex) == sizeof(std::uint32_t) && alignof(UpdateIndex) == alignof(std::uint32_t));
+  static_assert(sizeof(Slot) == 1 && sizeof(Link) == 2);
   static_assert(std::is_trivially_copyable_v<UpdateIndex> && std::is_trivially_destructible_v<UpdateIndex>);
 }
 

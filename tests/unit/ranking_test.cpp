@@ -49,7 +49,7 @@ Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
 
 using Visit = std::function<void(const Place&, Ranking::Rank)>;
 void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const Visit& visit) {
-  v.set().for_each_down([&](const Place& p) { visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, int(p.slot))); });
+  v.set().for_each_down([&](const Place& p) { visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot)); });
 }
 
 // Half of how far the surfaces can move in an update's diamond, from what is stored.
@@ -71,7 +71,7 @@ ScreenError::Region region_of(const IntervalVolume& v, SupercubeKey first, Super
   const Vertex last = v.domain().last();
   Vector low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
   for (const SupercubeKey key : {first, last_of_all}) {
-    for (int slot = 0; slot < kSlots; ++slot) {
+    for (Slot slot{0}; slot < kSlots; ++slot) {
       const Diamond d(centre_of(key, slot));
       const std::array<std::int32_t, 3> c{d.centre.x, d.centre.y, d.centre.z}, end{last.x, last.y, last.z};
       for (int i = 0; i < 3; ++i) {

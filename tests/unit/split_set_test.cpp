@@ -64,7 +64,7 @@ TEST_P(SplitSets, NeighboursAreTheSupercubesFoundByTheirPlaces) {
         ASSERT_EQ(seen.brick, found->brick);
         ASSERT_EQ(seen.supercube, found->supercube);
         ASSERT_EQ(seen.occupancy, set.occupancy()[found->supercube]);
-        for (int slot = 0; slot < kSlots; ++slot) {
+        for (Slot slot{0}; slot < kSlots; ++slot) {
           if (!seen.has(slot)) continue;
           const Place p = set.place_in(found->brick, found->supercube, found->key, slot);
           ASSERT_EQ(seen.index(slot), p.index);
@@ -99,7 +99,7 @@ TEST_P(SplitSets, ReadyIsWhatAFrontCanSplit) {
         splittable.move_to(key);
         const std::uint64_t ready = splittable.slots(), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
         ASSERT_EQ(is_split & ~ready, 0u) << "the ancestors of what is split are split";
-        for (int slot = 0; slot < kSlots; ++slot) {
+        for (Slot slot{0}; slot < kSlots; ++slot) {
           const bool can_be = extraction->front.find(centre_of(key, slot)).has_value();
           ASSERT_EQ(((ready & ~is_split) >> slot & 1) != 0, can_be) << "share " << share << ", slot " << slot;
         }

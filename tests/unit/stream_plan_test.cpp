@@ -91,7 +91,7 @@ class Receiver {
     Own own;
     for (UpdateIndex i : left()) {
       const Place p = volume_->set().place(i);
-      if (ranking.of_brick(p.brick).supercube(p.supercube, p.key)(i, int(p.slot)) == 0) continue;
+      if (ranking.of_brick(p.brick).supercube(p.supercube, p.key)(i, p.slot) == 0) continue;
       ++own.updates;
       own.error = std::max(own.error, double(volume_->error(i)));
     }

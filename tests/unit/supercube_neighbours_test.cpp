@@ -14,9 +14,9 @@ TEST(SupercubeNeighbours, LeadToVerticesChildrenAndEdges) {
     const Vertex position{4 + std::int32_t(parity & 1), 6 + std::int32_t(parity >> 1 & 1), 2 + std::int32_t(parity >> 2)};
     const auto target = [&](Link link) {
       const SupercubePlace there = neighbour_at(link.where, scale, position);
-      return centre_of(there.scale, there.position, link.slot | there.slot);
+      return centre_of(there.scale, there.position, Slot(link.slot | there.slot));
     };
-    for (int slot = 0; slot < kSlots; ++slot) {
+    for (Slot slot{0}; slot < kSlots; ++slot) {
       const Diamond d(centre_of(scale, position, slot));
       const Links& links = link_table()[parity][slot];
       for (int v = 0; v < d.row->vertices; ++v) EXPECT_EQ(target(links.vertex[v]), d.vertex(v));
@@ -40,7 +40,7 @@ TEST(SupercubeNeighbours, OnlyASupercubeAllOfWhoseDiamondsAreInsideIsInterior) {
     for (std::int32_t x = 0; x < 18; ++x) {
       const Vertex position{x, x / 2, x % 3};
       bool all = true;
-      for (int slot = 0; slot < kSlots; ++slot) all = all && domain.is_interior(Diamond(centre_of(scale, position, slot)));
+      for (Slot slot{0}; slot < kSlots; ++slot) all = all && domain.is_interior(Diamond(centre_of(scale, position, slot)));
       EXPECT_EQ(is_interior(domain, scale, position), all);
     }
   }

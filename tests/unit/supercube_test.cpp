@@ -25,7 +25,7 @@ TEST(Supercube, EveryCentreHasOneNameAndSlot) {
 }
 
 TEST(Supercube, SlotsGoByClass) {
-  for (int slot = 0; slot < kSlots; ++slot) {
+  for (Slot slot{0}; slot < kSlots; ++slot) {
     EXPECT_EQ(kSlotsOfClass[diamond_type(kTypeOfSlot[slot]).cls] >> slot & 1, 1u);
     EXPECT_EQ(kSlotOfType[kTypeOfSlot[slot]], slot);
   }
