@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/cli/commands.h"
-#include "server/volume/nrrd_writer.h"
+#include "server/volume/nrrd.h"
 #include "server/volume/samples.h"
 
 namespace intervale {

@@ -5,10 +5,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <bit>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -18,16 +16,6 @@ namespace {
 
 std::string because(const char* what, const std::filesystem::path& path, int error) {
   return std::string("cannot ") + what + " " + in_quotes(path) + ": " + std::generic_category().message(error);
-}
-
-template <class Word>
-void swap_words(std::span<std::byte> samples, Word (*swapped)(Word)) {
-  for (std::size_t i = 0; i + sizeof(Word) <= samples.size(); i += sizeof(Word)) {
-    Word word;
-    std::memcpy(&word, samples.data() + i, sizeof word);
-    word = swapped(word);
-    std::memcpy(samples.data() + i, &word, sizeof word);
-  }
 }
 
 }  // namespace
@@ -94,16 +82,8 @@ Result<void> check_grid(const std::array<std::int64_t, 3>& dims, const std::arra
 }
 
 void swap_bytes(std::span<std::byte> samples, SampleType type) {
-  switch (size_of(type)) {
-    case 2:
-      return swap_words<std::uint16_t>(samples, [](std::uint16_t w) { return __builtin_bswap16(w); });
-    case 4:
-      return swap_words<std::uint32_t>(samples, [](std::uint32_t w) { return __builtin_bswap32(w); });
-    case 8:
-      return swap_words<std::uint64_t>(samples, [](std::uint64_t w) -> std::uint64_t { return __builtin_bswap64(w); });
-    default:
-      return;
-  }
+  const std::size_t size = size_of(type);
+  for (; samples.size() >= size; samples = samples.subspan(size)) std::reverse(samples.begin(), samples.begin() + std::ptrdiff_t(size));
 }
 
 }  // namespace intervale

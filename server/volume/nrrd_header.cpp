@@ -103,29 +103,14 @@ std::string last_teem_error() {
 }
 
 Result<SampleType> sample_type(int type, const std::string& name) {
-  switch (type) {
-    case nrrdTypeChar:
-      return SampleType::i8;
-    case nrrdTypeUChar:
-      return SampleType::u8;
-    case nrrdTypeShort:
-      return SampleType::i16;
-    case nrrdTypeUShort:
-      return SampleType::u16;
-    case nrrdTypeInt:
-      return SampleType::i32;
-    case nrrdTypeUInt:
-      return SampleType::u32;
-    case nrrdTypeFloat:
-      return SampleType::f32;
-    case nrrdTypeDouble:
-      return SampleType::f64;
-    case nrrdTypeLLong:
-    case nrrdTypeULLong:
-      return fail(name + ": 64-bit integers do not fit a double exactly; convert them first, e.g. unu convert -t double");
-    default:
-      return fail(name + ": samples of type 'block' are not numbers");
-  }
+  // In SampleType's order.
+  constexpr std::array<int, 8> kTypes{nrrdTypeUChar, nrrdTypeChar, nrrdTypeUShort, nrrdTypeShort,
+                                      nrrdTypeUInt,  nrrdTypeInt,  nrrdTypeFloat,  nrrdTypeDouble};
+  const auto* const found = std::find(kTypes.begin(), kTypes.end(), type);
+  if (found != kTypes.end()) return SampleType(found - kTypes.begin());
+  if (type == nrrdTypeLLong || type == nrrdTypeULLong)
+    return fail(name + ": 64-bit integers do not fit a double exactly; convert them first, e.g. unu convert -t double");
+  return fail(name + ": samples of type 'block' are not numbers");
 }
 
 Result<NrrdHeader::Encoding> encoding_of(const NrrdEncoding* encoding, const std::string& name) {

@@ -1,5 +1,3 @@
-#include "server/volume/nrrd_reader.h"
-
 #include <algorithm>
 #include <charconv>
 #include <cstring>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "server/volume/gzip_decoder.h"
+#include "server/volume/nrrd.h"
 #include "server/volume/nrrd_header.h"
 
 namespace intervale {
@@ -122,18 +121,6 @@ Result<void> read_text_data(const InputFile& file, std::uint64_t offset, const N
   });
 }
 
-Result<void> read_data(const InputFile& file, std::uint64_t offset, const NrrdHeader& header, std::vector<std::byte>& out) {
-  switch (header.encoding) {
-    case NrrdHeader::Encoding::raw:
-      return read_raw_data(file, offset, header, out);
-    case NrrdHeader::Encoding::gzip:
-      return read_gzip_data(file, offset, header, out);
-    case NrrdHeader::Encoding::ascii:
-      break;
-  }
-  return read_text_data(file, offset, header, out);
-}
-
 }  // namespace
 
 Result<Volume> read_nrrd(const std::filesystem::path& path) {
@@ -148,6 +135,8 @@ Result<Volume> read_nrrd(const std::filesystem::path& path) {
   const auto start = skip_lines(*data, header->data_file ? 0 : header->data_offset, header->line_skip);
   if (!start) return tl::unexpected<Error>(start.error());
   if (*start > data->size()) return fail(in_quotes(data->path()) + " has changed while it was read");
+  using Encoding = NrrdHeader::Encoding;
+  const auto read_data = header->encoding == Encoding::raw ? read_raw_data : header->encoding == Encoding::gzip ? read_gzip_data : read_text_data;
   if (auto read = read_data(*data, *start, *header, volume.bytes); !read) return tl::unexpected<Error>(read.error());
   if (header->big_endian) swap_bytes(volume.bytes, volume.type);
   return volume;

@@ -1,34 +1,15 @@
-#include "server/volume/nrrd_writer.h"
-
+#include <array>
 #include <charconv>
 #include <string>
 
 #include "common/util/atomic_file.h"
+#include "server/volume/nrrd.h"
 
 namespace intervale {
 namespace {
 
-const char* nrrd_type(SampleType type) {
-  switch (type) {
-    case SampleType::u8:
-      return "uint8";
-    case SampleType::i8:
-      return "int8";
-    case SampleType::u16:
-      return "uint16";
-    case SampleType::i16:
-      return "int16";
-    case SampleType::u32:
-      return "uint32";
-    case SampleType::i32:
-      return "int32";
-    case SampleType::f32:
-      return "float";
-    case SampleType::f64:
-      break;
-  }
-  return "double";
-}
+// In SampleType's order.
+constexpr std::array<const char*, 8> kTypeNames{"uint8", "int8", "uint16", "int16", "uint32", "int32", "float", "double"};
 
 std::string shortest(double value) {
   std::array<char, 32> digits;
@@ -40,7 +21,7 @@ std::string shortest(double value) {
 std::string header(const Volume& volume) {
   const auto& [dims, spacing, origin] = volume.grid;
   std::string text = "NRRD0004\n# written by Intervale " INTERVALE_VERSION "\ntype: ";
-  text.append(nrrd_type(volume.type)).append("\ndimension: 3\nspace dimension: 3\nsizes:");
+  text.append(kTypeNames[std::size_t(volume.type)]).append("\ndimension: 3\nspace dimension: 3\nsizes:");
   for (const auto side : dims) text.append(" ").append(std::to_string(side));
   text += "\nspace directions: (" + shortest(spacing[0]) + ",0,0) (0," + shortest(spacing[1]) + ",0) (0,0," + shortest(spacing[2]) + ")";
   text += "\nspace origin: (" + shortest(origin[0]) + "," + shortest(origin[1]) + "," + shortest(origin[2]) + ")";

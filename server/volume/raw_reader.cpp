@@ -12,9 +12,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "volumes are swapped on the ground that the machine is little endian");
 
-constexpr std::array kTypes{SampleType::u8,  SampleType::i8,  SampleType::u16, SampleType::i16,
-                            SampleType::u32, SampleType::i32, SampleType::f32, SampleType::f64};
-
 std::string shape_of(const RawLayout& layout) {
   return std::to_string(layout.dims[0]) + " x " + std::to_string(layout.dims[1]) + " x " + std::to_string(layout.dims[2]) + " samples of " +
          name_of(layout.type);
@@ -23,8 +20,8 @@ std::string shape_of(const RawLayout& layout) {
 }  // namespace
 
 Result<SampleType> parse_sample_type(std::string_view name) {
-  for (const auto type : kTypes)
-    if (name == name_of(type)) return type;
+  for (std::size_t i = 0; i < std::tuple_size_v<SampleTypes>; ++i)
+    if (name == name_of(SampleType(i))) return SampleType(i);
   return misuse("unknown sample type '" + std::string(name) + "': use u8, i8, u16, i16, u32, i32, f32 or f64");
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "server/volume/input_file.h"
-#include "server/volume/nrrd_reader.h"
+#include "server/volume/nrrd.h"
 
 namespace intervale {
 namespace {

@@ -1,45 +1,20 @@
 #include "server/volume/volume.h"
 
+#include <array>
+
 namespace intervale {
+namespace {
 
-std::size_t size_of(SampleType type) {
-  switch (type) {
-    case SampleType::u8:
-    case SampleType::i8:
-      return 1;
-    case SampleType::u16:
-    case SampleType::i16:
-      return 2;
-    case SampleType::u32:
-    case SampleType::i32:
-    case SampleType::f32:
-      return 4;
-    case SampleType::f64:
-      break;
-  }
-  return 8;
-}
+struct Type {
+  const char* name;
+  std::size_t bytes;
+};
+// In SampleType's order.
+constexpr std::array<Type, 8> kTypes{{{"u8", 1}, {"i8", 1}, {"u16", 2}, {"i16", 2}, {"u32", 4}, {"i32", 4}, {"f32", 4}, {"f64", 8}}};
 
-const char* name_of(SampleType type) {
-  switch (type) {
-    case SampleType::u8:
-      return "u8";
-    case SampleType::i8:
-      return "i8";
-    case SampleType::u16:
-      return "u16";
-    case SampleType::i16:
-      return "i16";
-    case SampleType::u32:
-      return "u32";
-    case SampleType::i32:
-      return "i32";
-    case SampleType::f32:
-      return "f32";
-    case SampleType::f64:
-      break;
-  }
-  return "f64";
-}
+}  // namespace
+
+std::size_t size_of(SampleType type) { return kTypes[std::size_t(type)].bytes; }
+const char* name_of(SampleType type) { return kTypes[std::size_t(type)].name; }
 
 }  // namespace intervale

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "server/volume/nrrd_reader.h"
+#include "server/volume/nrrd.h"
 
 // teem's reader loses a small array for some headers that it refuses (_nrrdRead, teem 1.12).
 extern "C" const char* __lsan_default_suppressions() { return "leak:airArrayNew\n"; }

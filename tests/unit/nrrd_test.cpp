@@ -5,8 +5,7 @@
 #include <random>
 #include <string>
 
-#include "server/volume/nrrd_reader.h"
-#include "server/volume/nrrd_writer.h"
+#include "server/volume/nrrd.h"
 #include "tests/support/temp_dir.h"
 
 // teem forgets 88 bytes whenever a header is consistent line by line but not as a whole. Ours are still watched.

@@ -1,4 +1,4 @@
-// Volumes in NRRD files.
+// NRRD files: reads and writes volumes.
 #pragma once
 
 #include <filesystem>
@@ -14,5 +14,9 @@ namespace intervale {
 // before the data is long enough to fill it: for raw by its length, for gzip by deflate's greatest ratio (1032), for
 // text by two characters a sample. Bytes after the samples are ignored.
 Result<Volume> read_nrrd(const std::filesystem::path& path);
+
+// Writes header and samples into one file, raw and little endian: a temporary file that is renamed. read_nrrd returns
+// the same grid, bit by bit.
+Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume);
 
 }  // namespace intervale
