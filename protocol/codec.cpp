@@ -1,71 +1,48 @@
 #include "protocol/codec.h"
 
-#include "common/codec/split_names.h"
-
-#include <cmath>
 #include <cstring>
 #include <string>
-#include <string_view>
 #include <utility>
 
+#include "common/codec/split_names.h"
 #include "protocol/stream_generated.h"
 
 namespace intervale::protocol {
 namespace {
 
-using flatbuffers::FlatBufferBuilder;
+using flatbuffers::FlatBufferBuilder, flatbuffers::Offset, flatbuffers::VectorLength;
 using Bytes = std::span<const std::uint8_t>;
 
 fbs::Vector to_vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 std::array<double, 3> to_array(const fbs::Vector& v) { return {v.x(), v.y(), v.z()}; }
 
-// Between FlatBuffers' optional type and std::optional.
-flatbuffers::Optional<std::uint64_t> to_wire(const std::optional<std::uint64_t>& value) {
-  return value ? flatbuffers::Optional<std::uint64_t>(*value) : flatbuffers::nullopt;
-}
-template <class T>
-std::optional<T> from_wire(const flatbuffers::Optional<T>& value) {
-  return value ? std::optional<T>(*value) : std::nullopt;
-}
+// Encoding: each message to its table.
 
-// Encoding: each message's table, and the tag of the union it goes into.
-
-struct Body {
-  std::uint8_t type;
-  flatbuffers::Offset<void> table;
-};
-
-template <class Tag, class Table>
-Body body(Tag tag, flatbuffers::Offset<Table> table) {
-  return {static_cast<std::uint8_t>(tag), table.Union()};
-}
-
-Body encode_body(FlatBufferBuilder& out, const Open& message) {
+Offset<fbs::Open> encode_body(FlatBufferBuilder& out, const Open& message) {
   const auto dataset = out.CreateString(message.dataset);
   const auto client = out.CreateString(message.client);
-  return body(fbs::ClientBody::Open, fbs::CreateOpen(out, dataset, client, message.credit, to_wire(message.resume)));
+  return fbs::CreateOpen(out, dataset, client, message.credit, message.resume);
 }
 
-Body encode_body(FlatBufferBuilder& out, const View& message) {
+Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
   const Lod& lod = message.lod;
-  const auto percent = lod.error_percent ? flatbuffers::Optional<double>(*lod.error_percent) : flatbuffers::nullopt;
   fbs::Box box;
   if (lod.roi) box = fbs::Box(to_vector(lod.roi->min), to_vector(lod.roi->max));
   fbs::Camera camera;
   if (const auto& c = lod.camera)
     camera = fbs::Camera(to_vector(c->eye), to_vector(c->look_at), to_vector(c->up), c->fov, c->viewport[0], c->viewport[1], c->pixel_error);
-  const auto table = fbs::CreateLod(out, lod.error, percent, lod.roi ? &box : nullptr, to_wire(lod.max_updates), lod.camera ? &camera : nullptr);
+  const auto table = fbs::CreateLod(out, lod.error, lod.error_percent, lod.roi ? &box : nullptr, lod.max_updates, lod.camera ? &camera : nullptr);
   const auto forget = message.forget.empty() ? 0 : out.CreateVector(encode_splits(message.forget));
-  return body(fbs::ClientBody::View, fbs::CreateView(out, message.epoch, table, to_wire(message.room), forget));
+  return fbs::CreateView(out, message.epoch, table, message.room, forget);
 }
 
-Body encode_body(FlatBufferBuilder& out, const Credit& message) { return body(fbs::ClientBody::Credit, fbs::CreateCredit(out, message.bytes)); }
+Offset<fbs::Credit> encode_body(FlatBufferBuilder& out, const Credit& message) { return fbs::CreateCredit(out, message.bytes); }
 
-Body encode_body(FlatBufferBuilder& out, const Have& message) {
-  return body(fbs::ClientBody::Have, fbs::CreateHave(out, out.CreateVector(encode_splits(message.splits))));
+Offset<fbs::Have> encode_body(FlatBufferBuilder& out, const Have& message) {
+  return fbs::CreateHave(out, out.CreateVector(encode_splits(message.splits)));
 }
 
-Body encode_body(FlatBufferBuilder& out, const Opened& message) {
+Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
   const Description& d = message.description;
   const auto name = out.CreateString(d.name);
   const auto root_patch = out.CreateVector(d.root_patch);
@@ -75,23 +52,22 @@ Body encode_body(FlatBufferBuilder& out, const Opened& message) {
   const auto description = fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine),
                                                   d.max_error, d.updates, d.coefficients, d.full.vertices, d.full.tets, d.content_hash, root_patch);
   const SessionLimits& limits = message.limits;
-  return body(fbs::ServerBody::Opened,
-              fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message, message.resumed));
+  return fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message, message.resumed);
 }
 
-Body encode_body(FlatBufferBuilder& out, const Batch& message) {
+Offset<fbs::Batch> encode_body(FlatBufferBuilder& out, const Batch& message) {
   const auto payload = out.CreateVector(message.payload);
-  return body(fbs::ServerBody::Batch, fbs::CreateBatch(out, message.epoch, message.sequence, message.updates, message.remaining_error, payload,
-                                                       message.remaining_pixels, message.updates_to_go));
+  return fbs::CreateBatch(out, message.epoch, message.sequence, message.updates, message.remaining_error, payload, message.remaining_pixels,
+                          message.updates_to_go);
 }
 
-Body encode_body(FlatBufferBuilder& out, const Done& message) {
-  return body(fbs::ServerBody::Done, fbs::CreateDone(out, message.epoch, message.updates_sent, message.full));
+Offset<fbs::Done> encode_body(FlatBufferBuilder& out, const Done& message) {
+  return fbs::CreateDone(out, message.epoch, message.updates_sent, message.full);
 }
 
-Body encode_body(FlatBufferBuilder& out, const Fault& message) {
+Offset<fbs::Fault> encode_body(FlatBufferBuilder& out, const Fault& message) {
   const auto text = out.CreateString(message.text);
-  return body(fbs::ServerBody::Fault, fbs::CreateFault(out, static_cast<std::uint16_t>(message.code), text));
+  return fbs::CreateFault(out, static_cast<std::uint16_t>(message.code), text);
 }
 
 std::vector<std::uint8_t> finished(FlatBufferBuilder& out) { return {out.GetBufferPointer(), out.GetBufferPointer() + out.GetSize()}; }
@@ -100,28 +76,17 @@ std::vector<std::uint8_t> finished(FlatBufferBuilder& out) { return {out.GetBuff
 
 tl::unexpected<Error> malformed(const std::string& what) { return fail("malformed message: " + what); }
 
-// The verifier has checked that a string or array lies within the message; this checks its own limit.
-template <class Container>
-bool longer_than(const Container* container, std::size_t limit) {
-  return container != nullptr && container->size() > limit;
-}
-
-std::string text_of(const flatbuffers::String* text) { return text == nullptr ? std::string() : text->str(); }
+// The verifier has checked that a string or array lies within the message; its own limit is checked here.
 
 Result<ClientMessage> decode_body(const fbs::Open& table) {
-  if (longer_than(table.dataset(), kMaxName)) return malformed("the data set's name is too long");
-  if (longer_than(table.client(), kMaxText)) return malformed("the client's name is too long");
-  return Open{table.dataset()->str(), text_of(table.client()), table.credit(), from_wire(table.resume())};
+  if (VectorLength(table.dataset()) > kMaxName) return malformed("the data set's name is too long");
+  if (VectorLength(table.client()) > kMaxText) return malformed("the client's name is too long");
+  return Open{table.dataset()->str(), flatbuffers::GetString(table.client()), table.credit(), table.resume()};
 }
 
 Result<ClientMessage> decode_body(const fbs::View& table) {
   const fbs::Lod& wire = *table.lod();
-  Lod lod{.error = wire.error(),
-          .error_percent = from_wire(wire.error_percent()),
-          .roi = {},
-          .camera = {},
-          .max_tets = {},
-          .max_updates = from_wire(wire.max_updates())};
+  Lod lod{.error = wire.error(), .error_percent = wire.error_percent(), .roi = {}, .camera = {}, .max_tets = {}, .max_updates = wire.max_updates()};
   if (const auto* roi = wire.roi()) lod.roi = Box{to_array(roi->min()), to_array(roi->max())};
   if (const auto* c = wire.camera()) {
     lod.camera = Camera{.eye = to_array(c->eye()),
@@ -132,7 +97,7 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
                         .pixel_error = c->pixel_error()};
   }
   if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
-  View view{table.epoch(), lod, from_wire(table.room()), {}};
+  View view{table.epoch(), lod, table.room(), {}};
   if (const auto* forget = table.forget()) {
     auto splits = decode_splits({forget->data(), forget->size()}, kMaxHave);
     if (!splits) return malformed(splits.error().message);
@@ -151,8 +116,8 @@ Result<ClientMessage> decode_body(const fbs::Have& table) {
 
 Result<ServerMessage> decode_body(const fbs::Opened& table) {
   const fbs::Description& wire = *table.description();
-  if (longer_than(wire.name(), kMaxName)) return malformed("the data set's name is too long");
-  if (longer_than(wire.base(), kMaxRootPatch)) return malformed("the root patch is too long");
+  if (VectorLength(wire.name()) > kMaxName) return malformed("the data set's name is too long");
+  if (VectorLength(wire.base()) > kMaxRootPatch) return malformed("the root patch is too long");
   if (wire.refine() > std::uint8_t(Refine::uniform)) return malformed("an unknown way to refine");
   Description d;
   d.name = wire.name()->str();
@@ -169,7 +134,7 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
 }
 
 Result<ServerMessage> decode_body(const fbs::Batch& table) {
-  if (longer_than(table.payload(), kMaxBatchPayload)) return malformed("the batch is too large");
+  if (VectorLength(table.payload()) > kMaxBatchPayload) return malformed("the batch is too large");
   if (!(table.remaining_error() >= 0)) return malformed("the remaining error is not a number of at least 0");
   if (!(table.remaining_pixels() >= 0)) return malformed("the remaining pixels are not a number of at least 0");
   Batch batch{.epoch = table.epoch(),
@@ -186,7 +151,7 @@ Result<ServerMessage> decode_body(const fbs::Batch& table) {
 Result<ServerMessage> decode_body(const fbs::Done& table) { return Done{table.epoch(), table.updates_sent(), table.full()}; }
 
 Result<ServerMessage> decode_body(const fbs::Fault& table) {
-  if (longer_than(table.text(), kMaxText)) return malformed("the fault's text is too long");
+  if (VectorLength(table.text()) > kMaxText) return malformed("the fault's text is too long");
   return Fault{CloseCode(table.code()), table.text()->str()};
 }
 
@@ -216,16 +181,20 @@ const Root* verified(Bytes bytes) {
 
 std::vector<std::uint8_t> encode(const ClientMessage& message) {
   FlatBufferBuilder out(256);
-  const Body encoded = std::visit([&](const auto& m) { return encode_body(out, m); }, message);
-  out.Finish(fbs::CreateClientMessage(out, fbs::ClientBody(encoded.type), encoded.table));
+  const auto body = [&out]<class Table>(Offset<Table> table) {
+    return fbs::CreateClientMessage(out, fbs::ClientBodyTraits<Table>::enum_value, table.Union());
+  };
+  out.Finish(std::visit([&](const auto& m) { return body(encode_body(out, m)); }, message));
   return finished(out);
 }
 
 std::vector<std::uint8_t> encode(const ServerMessage& message) {
   const auto* batch = std::get_if<Batch>(&message);
   FlatBufferBuilder out((batch == nullptr ? 0 : batch->payload.size()) + 512);
-  const Body encoded = std::visit([&](const auto& m) { return encode_body(out, m); }, message);
-  out.Finish(fbs::CreateServerMessage(out, fbs::ServerBody(encoded.type), encoded.table));
+  const auto body = [&out]<class Table>(Offset<Table> table) {
+    return fbs::CreateServerMessage(out, fbs::ServerBodyTraits<Table>::enum_value, table.Union());
+  };
+  out.Finish(std::visit([&](const auto& m) { return body(encode_body(out, m)); }, message));
   return finished(out);
 }
 
