@@ -35,7 +35,7 @@ std::optional<AddressCounts::Lease> AddressCounts::try_acquire(const boost::asio
   std::size_t& count = counts_[key];
   if (count >= limit) return {};  // limit is at least 1, so no count of 0 is left behind
   ++count;
-  return Lease(*this, key);
+  return Lease(this, {key});
 }
 
 void AddressCounts::release(const Key& key) {
@@ -60,7 +60,7 @@ WriteBudget::Reservation WriteBudget::reserve(std::weak_ptr<Connection> connecti
     }
     aborted_.splice(aborted_.end(), writes_, writes_.begin());
   }
-  return {*this, added};
+  return Reservation(this, {added});
 }
 
 void WriteBudget::release(Writes::iterator write) {

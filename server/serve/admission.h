@@ -12,7 +12,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <utility>
 
 #include "server/serve/connections.h"
 
@@ -41,26 +40,12 @@ class RateLimit {
 class AddressCounts {
  public:
   using Key = std::array<std::uint8_t, 9>;  // the IP version, and the first 64 bits of the address
-  // Counts one connection while it exists. Movable.
-  class Lease {
-   public:
-    Lease() = default;
-    Lease(AddressCounts& counts, const Key& key) : counts_(&counts), key_(key) {}
-    Lease(Lease&& other) noexcept : counts_(std::exchange(other.counts_, nullptr)), key_(other.key_) {}
-    Lease& operator=(Lease&& other) noexcept {
-      const Lease released(std::move(*this));
-      counts_ = std::exchange(other.counts_, nullptr);
-      key_ = other.key_;
-      return *this;
-    }
-    ~Lease() {
-      if (counts_ != nullptr) counts_->release(key_);
-    }
-
-   private:
-    AddressCounts* counts_ = nullptr;
-    Key key_{};
+  struct Release {
+    Key key{};
+    void operator()(AddressCounts* counts) const { counts->release(key); }
   };
+  // Counts one connection while it exists.
+  using Lease = std::unique_ptr<AddressCounts, Release>;
 
   // nullopt if there are `limit` (at least 1) already.
   std::optional<Lease> try_acquire(const boost::asio::ip::address& address, std::size_t limit);
@@ -74,33 +59,23 @@ class AddressCounts {
 // Bounds the unsent bytes of all sessions. Past the limit, the connections whose writes have been pending the longest
 // are aborted, if that is more than a second.
 class WriteBudget {
- public:
   using Clock = std::chrono::steady_clock;
-  explicit WriteBudget(std::size_t max_bytes) : max_bytes_(max_bytes) {}
-  WriteBudget(const WriteBudget&) = delete;
-  WriteBudget& operator=(const WriteBudget&) = delete;
-
- private:
   struct Write {
     std::weak_ptr<Connection> connection;
     std::size_t bytes = 0;
     Clock::time_point since;
   };
   using Writes = std::list<Write>;
+  struct Release {
+    Writes::iterator write;
+    void operator()(WriteBudget* budget) const { budget->release(write); }
+  };
 
  public:
-  // One pending write. Destroyed when the write has completed or failed.
-  class Reservation {
-   public:
-    Reservation(WriteBudget& budget, Writes::iterator write) : budget_(budget), write_(write) {}
-    Reservation(const Reservation&) = delete;
-    Reservation& operator=(const Reservation&) = delete;
-    ~Reservation() { budget_.release(write_); }
+  explicit WriteBudget(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
-   private:
-    WriteBudget& budget_;
-    Writes::iterator write_;
-  };
+  // One pending write. Destroyed when the write has completed or failed.
+  using Reservation = std::unique_ptr<WriteBudget, Release>;
   [[nodiscard]] Reservation reserve(std::weak_ptr<Connection> connection, std::size_t bytes, Clock::time_point now = Clock::now());
   [[nodiscard]] std::size_t bytes() const;
 
@@ -115,5 +90,7 @@ class WriteBudget {
 
 // The resident memory of the process, from /proc; 0 if it cannot be read. Takes some microseconds.
 [[nodiscard]] std::uint64_t resident_bytes();
+// Whether that is more than a limit, if there is one.
+[[nodiscard]] inline bool exceeds_memory(const std::optional<std::uint64_t>& limit) { return limit && resident_bytes() > *limit; }
 
 }  // namespace intervale

@@ -1,26 +1,15 @@
 #include "server/serve/connections.h"
 
-#include <utility>
 #include <vector>
 
 namespace intervale {
-
-Connections::Registration& Connections::Registration::operator=(Registration&& other) noexcept {
-  std::swap(set_, other.set_);
-  std::swap(id_, other.id_);
-  return *this;
-}
-
-Connections::Registration::~Registration() {
-  if (set_ != nullptr) set_->remove(id_);
-}
 
 Connections::Registration Connections::add(const std::shared_ptr<Connection>& connection) {
   const std::unique_lock lock(mutex_);
   const std::uint64_t id = next_id_++;
   connections_.emplace(id, connection);
   if (draining_) connection->begin_shutdown();  // does not block
-  return {*this, id};
+  return Registration(this, {id});
 }
 
 void Connections::begin_shutdown() {

@@ -8,7 +8,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <utility>
 
 namespace intervale {
 
@@ -23,19 +22,12 @@ class Connection {
 // Any thread.
 class Connections {
  public:
-  // Removes the connection when destroyed.
-  class Registration {
-   public:
-    Registration() = default;
-    Registration(Connections& set, std::uint64_t id) : set_(&set), id_(id) {}
-    Registration(Registration&& other) noexcept : set_(std::exchange(other.set_, nullptr)), id_(other.id_) {}
-    Registration& operator=(Registration&& other) noexcept;
-    ~Registration();
-
-   private:
-    Connections* set_ = nullptr;
-    std::uint64_t id_ = 0;
+  struct Remove {
+    std::uint64_t id = 0;
+    void operator()(Connections* set) const { set->remove(id); }
   };
+  // Removes the connection when destroyed.
+  using Registration = std::unique_ptr<Connections, Remove>;
 
   // A connection that is added while the server drains is shut down at once.
   [[nodiscard]] Registration add(const std::shared_ptr<Connection>& connection);

@@ -204,7 +204,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (fault_ || closed_) return;
     if (!state_.needs_credit()) stalled_since_ = Clock::now();  // this message may change that
     log_message(message);
-    if (std::holds_alternative<protocol::Open>(message) && lacks_memory()) {
+    // Checked again at Open, which is when a session takes memory: many upgrades may have passed the check before.
+    if (std::holds_alternative<protocol::Open>(message) && exceeds_memory(context_.options.max_memory)) {
       context_.metrics.count_refusal(Refusal::memory);
       return close({CloseCode::going_away, "the server has no capacity for another session"});
     }
@@ -212,12 +213,6 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (const auto* view = std::get_if<protocol::View>(&message)) on_view(view->epoch);
     if (state_.view_is_unanswered()) context_.scheduler.promote(flow_);
     writer_wakeup_.cancel();
-  }
-
-  // Checked again at Open, which is when a session takes memory: many upgrades may have passed the check before.
-  [[nodiscard]] bool lacks_memory() const {
-    const auto& max_memory = context_.options.max_memory;
-    return max_memory && resident_bytes() > *max_memory;
   }
 
   void log_message(const protocol::ClientMessage& message) const {
