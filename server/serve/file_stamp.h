@@ -5,10 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <initializer_list>
 #include <optional>
-#include <utility>
-#include <vector>
 
 namespace intervale {
 
@@ -26,23 +23,5 @@ struct FileStamp {
   return FileStamp{status.st_mtim.tv_sec,         status.st_mtim.tv_nsec,       status.st_ctim.tv_sec,       status.st_ctim.tv_nsec,
                    std::uint64_t(status.st_size), std::uint64_t(status.st_dev), std::uint64_t(status.st_ino)};
 }
-
-// A set of files that are read together.
-class FileChanges {
- public:
-  // True if a file has changed since the last call, and in the first call.
-  bool check(std::initializer_list<std::filesystem::path> paths) {
-    std::vector<std::optional<FileStamp>> stamps;
-    for (const std::filesystem::path& path : paths) stamps.push_back(stamp_of(path));
-    if (stamps == stamps_) return false;
-    stamps_ = std::move(stamps);
-    return true;
-  }
-  // Makes the next check() return true.
-  void reset() { stamps_.clear(); }
-
- private:
-  std::vector<std::optional<FileStamp>> stamps_;
-};
 
 }  // namespace intervale

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
+#include <filesystem>
+#include <functional>
+#include <optional>
 #include <sstream>
 #include <thread>
 #include <utility>
@@ -18,47 +21,61 @@ namespace intervale {
 
 namespace asio = boost::asio;
 
+namespace {
+
+// Files that are read together at the start, and again when one of them has changed.
+struct ReloadedFiles {
+  const char* what;  // for the log
+  std::vector<std::filesystem::path> paths;
+  std::function<Result<void>()> read;
+  std::vector<std::optional<FileStamp>> stamps = {};  // when they were read; empty: never
+  std::string last_warning = {};                      // logged, not to be repeated
+
+  // True if the files had changed and were read. The stamps are taken before reading, so that a write during the read
+  // counts as a change. After a failure the next call tries again even if the files stay as they are: a revoked token
+  // must not remain valid because there was no file descriptor.
+  Result<bool> load() {
+    std::vector<std::optional<FileStamp>> now;
+    for (const std::filesystem::path& path : paths) now.push_back(stamp_of(path));
+    if (now == std::exchange(stamps, now)) return false;
+    const auto done = read();
+    if (!done) stamps.clear();
+    return done.map([] { return true; });
+  }
+
+  void reload() {
+    const auto loaded = load();
+    const std::string warning = loaded ? std::string() : loaded.error().message;
+    if (!warning.empty() && warning != last_warning) spdlog::error("{}; the data read before stays in use", warning);
+    if (loaded && *loaded) spdlog::info("reloaded the {}", what);
+    last_warning = warning;
+  }
+};
+
+}  // namespace
+
 // Members are destroyed from last to first: stop() has joined the threads; the io_context destroys the sessions,
 // which use the context.
 struct Server::Running {
-  explicit Running(const ServeOptions& options) : context(options) {}
-  // True if the files had changed and were read.
-  Result<bool> load_tokens();
-  Result<bool> load_certificate();
+  explicit Running(const ServeOptions& options);
   ServerContext context;
   asio::io_context io;
   std::unique_ptr<Listener> listener, metrics_listener;
   std::vector<std::thread> threads;
-  FileChanges tokens_changes, certificate_changes;
-  std::string tokens_warning, certificate_warning;  // last logged, not to be repeated
+  std::vector<ReloadedFiles> files;
   bool stopped = false;
 };
 
-// The stamps are taken before reading, so that a write during the read counts as a change. After a failure the next
-// call tries again even if the files stay as they are: a revoked token must not remain valid because there was no
-// file descriptor.
-Result<bool> Server::Running::load_tokens() {
-  const auto& path = context.options.tokens;
-  if (!path || !tokens_changes.check({*path})) return false;
-  auto tokens = Tokens::load(*path);
-  if (!tokens) {
-    tokens_changes.reset();
-    return tl::unexpected(tokens.error());
-  }
-  context.tokens.store(std::make_shared<const Tokens>(std::move(*tokens)));
-  return true;
-}
-
-Result<bool> Server::Running::load_certificate() {
-  const auto& files = context.options.tls;
-  if (!files || !certificate_changes.check({files->certificate, files->key})) return false;
-  auto tls = TlsContext::server(files->certificate, files->key);
-  if (!tls) {
-    certificate_changes.reset();
-    return tl::unexpected(tls.error());
-  }
-  context.tls.store(std::move(*tls));
-  return true;
+Server::Running::Running(const ServeOptions& options) : context(options) {
+  const auto load_tokens = [this] {
+    return Tokens::load(*context.options.tokens).map([this](const Tokens& tokens) { context.tokens.store(std::make_shared<const Tokens>(tokens)); });
+  };
+  const auto load_certificate = [this] {
+    const TlsFiles& tls = *context.options.tls;
+    return TlsContext::server(tls.certificate, tls.key).map([this](const auto& loaded) { context.tls.store(loaded); });
+  };
+  if (options.tokens) files.push_back({"tokens", {*options.tokens}, load_tokens});
+  if (options.tls) files.push_back({"certificate", {options.tls->certificate, options.tls->key}, load_certificate});
 }
 
 Server::Server(std::unique_ptr<Running> running) : running_(std::move(running)) {}
@@ -74,8 +91,9 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& requested) {
     if (!viewer) return fail("cannot load the viewer: " + viewer.error().message);
     running->context.viewer = std::move(*viewer);
   }
-  if (auto loaded = running->load_tokens(); !loaded) return tl::unexpected(loaded.error());
-  if (auto loaded = running->load_certificate(); !loaded) return tl::unexpected(loaded.error());
+  for (ReloadedFiles& files : running->files) {
+    if (auto loaded = files.load(); !loaded) return tl::unexpected(loaded.error());
+  }
   auto listener = Listener::open(running->io, options.listen, running->context, PortRole::all);
   if (!listener) return tl::unexpected(listener.error());
   running->listener = std::move(*listener);
@@ -101,14 +119,7 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catal
 void Server::offer(Catalogue catalogue) { running_->context.catalogue.store(std::make_shared<const Catalogue>(std::move(catalogue))); }
 
 void Server::reload() {
-  const auto log_result = [](const Result<bool>& loaded, const char* what, std::string& last_warning) {
-    const std::string warning = loaded ? std::string() : loaded.error().message;
-    if (!warning.empty() && warning != last_warning) spdlog::error("{}; the data read before stays in use", warning);
-    if (loaded && *loaded) spdlog::info("reloaded the {}", what);
-    last_warning = warning;
-  };
-  log_result(running_->load_tokens(), "tokens", running_->tokens_warning);
-  log_result(running_->load_certificate(), "certificate", running_->certificate_warning);
+  for (ReloadedFiles& files : running_->files) files.reload();
 }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
