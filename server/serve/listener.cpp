@@ -42,25 +42,17 @@ Result<tcp::endpoint> parse_endpoint(const std::string& text) {
   return tcp::endpoint(address, port);
 }
 
-Listener::Listener(asio::io_context& io, ServerContext& context, PortRole role)
-    : io_(io), acceptor_(asio::make_strand(io)), context_(context), role_(role) {}
+Listener::Listener(asio::io_context& io, const tcp::endpoint& endpoint, ServerContext& context, PortRole role)
+    : io_(io), acceptor_(asio::make_strand(io), endpoint), endpoint_(acceptor_.local_endpoint()), context_(context), role_(role) {}
 
 Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std::string& address, ServerContext& context, PortRole role) {
   const auto endpoint = parse_endpoint(address);
   if (!endpoint) return tl::unexpected(endpoint.error());
-  std::unique_ptr<Listener> listener(new Listener(io, context, role));
-  tcp::acceptor& acceptor = listener->acceptor_;
-  boost::system::error_code error;
-  const auto step = [&](auto&& action) {
-    if (!error) action();
-  };
-  step([&] { acceptor.open(endpoint->protocol(), error); });
-  step([&] { acceptor.set_option(asio::socket_base::reuse_address(true), error); });
-  step([&] { acceptor.bind(*endpoint, error); });
-  step([&] { acceptor.listen(asio::socket_base::max_listen_connections, error); });
-  step([&] { listener->endpoint_ = acceptor.local_endpoint(error); });
-  if (error) return fail("cannot listen on " + address + ": " + error.message());
-  return listener;
+  try {
+    return std::unique_ptr<Listener>(new Listener(io, *endpoint, context, role));
+  } catch (const boost::system::system_error& error) {
+    return fail("cannot listen on " + address + ": " + error.code().message());
+  }
 }
 
 void Listener::start() { asio::co_spawn(acceptor_.get_executor(), accept_all(), asio::detached); }

@@ -26,14 +26,15 @@ class Listener {
   [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
  private:
-  Listener(boost::asio::io_context& io, ServerContext& context, PortRole role);
+  // Throws if the endpoint cannot be bound.
+  Listener(boost::asio::io_context& io, const boost::asio::ip::tcp::endpoint& endpoint, ServerContext& context, PortRole role);
   boost::asio::awaitable<void> accept_all();
   // Nullopt: too many from that address.
   std::optional<AddressCounts::Lease> lease_for(const boost::asio::ip::tcp::socket& socket);
 
   boost::asio::io_context& io_;
   boost::asio::ip::tcp::acceptor acceptor_;  // on a strand of its own
-  boost::asio::ip::tcp::endpoint endpoint_;
+  boost::asio::ip::tcp::endpoint endpoint_;  // with the port that the system chose for 0
   ServerContext& context_;
   PortRole role_;
 };
