@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -16,39 +17,27 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kLevels{"trace", "debug", "info", "warn", "error", "off"};
 
-void append(spdlog::memory_buf_t& line, std::string_view text) { line.append(text.data(), text.data() + text.size()); }
-
-std::string_view payload_of(const spdlog::details::log_msg& message) { return {message.payload.data(), message.payload.size()}; }
-
-class TextMessage : public spdlog::custom_flag_formatter {
+// The session and the message.
+class Message : public spdlog::custom_flag_formatter {
  public:
+  explicit Message(LogFormat format) : format_(format) {}
   void format(const spdlog::details::log_msg& message, const std::tm& /*time*/, spdlog::memory_buf_t& line) override {
-    if (log_detail::session) append(line, "session " + std::to_string(*log_detail::session) + " ");
-    append(line, printable(payload_of(message)));
+    const std::string payload(message.payload.data(), message.payload.size());
+    const auto end = std::back_inserter(line);
+    if (format_ == LogFormat::text) {
+      if (log_detail::session) fmt::format_to(end, "session {} ", *log_detail::session);
+      fmt::format_to(end, "{}", printable(payload));
+    } else {
+      if (log_detail::session) fmt::format_to(end, "\"session\":{},", *log_detail::session);
+      // JSON must be UTF-8; a file name in a message may not be.
+      fmt::format_to(end, "\"message\":{}", nlohmann::json(payload).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    }
   }
-  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<TextMessage>(); }
-};
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<Message>(format_); }
 
-class JsonMessage : public spdlog::custom_flag_formatter {
- public:
-  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/, spdlog::memory_buf_t& line) override {
-    if (log_detail::session) append(line, "\"session\":" + std::to_string(*log_detail::session) + ",");
-    // JSON must be UTF-8; a file name in a message may not be.
-    const nlohmann::json text = std::string(payload_of(message));
-    append(line, "\"message\":" + text.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-  }
-  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<JsonMessage>(); }
+ private:
+  LogFormat format_;
 };
-
-std::unique_ptr<spdlog::formatter> formatter_of(LogFormat format) {
-  auto formatter = std::make_unique<spdlog::pattern_formatter>();
-  if (format == LogFormat::json) {
-    formatter->add_flag<JsonMessage>('*').set_pattern(R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%*})");
-  } else {
-    formatter->add_flag<TextMessage>('*').set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %*");
-  }
-  return formatter;
-}
 
 }  // namespace
 
@@ -63,7 +52,11 @@ void start_log(const LogOptions& options) {
 }
 
 void configure_log(const LogOptions& options) {
-  spdlog::set_formatter(formatter_of(options.format));
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  const bool is_text = options.format == LogFormat::text;
+  formatter->add_flag<Message>('*', options.format)
+      .set_pattern(is_text ? "%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %*" : R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%*})");
+  spdlog::set_formatter(std::move(formatter));
   set_log_level(options.level);
 }
 
