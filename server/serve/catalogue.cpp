@@ -1,6 +1,7 @@
 #include "server/serve/catalogue.h"
 
 #include <algorithm>
+#include <boost/locale/utf.hpp>
 #include <string_view>
 #include <utility>
 
@@ -12,18 +13,8 @@ namespace {
 
 // Well-formed UTF-8 (The Unicode Standard, table 3-7): no overlong forms, no surrogates, nothing above U+10FFFF.
 bool is_utf8(std::string_view text) {
-  while (!text.empty()) {
-    const auto lead = static_cast<unsigned char>(text.front());
-    const std::size_t more = lead < 0x80 ? 0 : lead < 0xe0 ? 1 : lead < 0xf0 ? 2 : 3;
-    if ((lead >= 0x80 && lead < 0xc2) || lead > 0xf4 || text.size() <= more) return false;
-    for (std::size_t i = 1; i <= more; ++i) {
-      const auto c = static_cast<unsigned char>(text[i]);
-      const bool first = i == 1;
-      const unsigned low = first && lead == 0xe0 ? 0xa0 : first && lead == 0xf0 ? 0x90 : 0x80;
-      const unsigned high = first && lead == 0xed ? 0x9f : first && lead == 0xf4 ? 0x8f : 0xbf;
-      if (c < low || c > high) return false;
-    }
-    text.remove_prefix(1 + more);
+  for (auto at = text.begin(); at != text.end();) {
+    if (!boost::locale::utf::is_valid_codepoint(boost::locale::utf::utf_traits<char>::decode(at, text.end()))) return false;
   }
   return true;
 }

@@ -51,19 +51,7 @@ Result<Catalogue> CatalogueWatcher::load(const std::function<bool()>& keep_going
     if (!volume) return tl::unexpected(volume.error());
     files_.emplace_back(input, std::move(*volume));
   }
-  Catalogue catalogue;
-  const auto add = [&catalogue](const fs::path& path, const Catalogue::Volume& volume) -> Result<void> {
-    if (!volume) return {};
-    if (auto added = catalogue.add(volume); !added) return fail(added.error().message + " (" + path.string() + ")");
-    return {};
-  };
-  for (const auto& [path, volume] : files_) {
-    if (auto added = add(path, volume); !added) return tl::unexpected(added.error());
-  }
-  for (const auto& [path, file] : folder_files_) {
-    if (auto added = add(path, file.volume); !added) return tl::unexpected(added.error());
-  }
-  return catalogue;
+  return catalogue(true);
 }
 
 Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const std::function<bool()>& keep_going) {
@@ -85,7 +73,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
   const auto stamp = stamp_of(path);
   const bool is_stable = stamp == std::exchange(file.last_seen, stamp);
   if (!stamp || stamp == file.stamp || !is_stable) return false;
-  if (max_memory_ && resident_bytes() > *max_memory_) {
+  if (exceeds_memory(max_memory_)) {
     if (!std::exchange(memory_warned_, true)) spdlog::warn("{} is not loaded: the process has reached --max-memory", path.string());
     return false;
   }
@@ -153,17 +141,20 @@ std::optional<Catalogue> CatalogueWatcher::poll() {
   }
   folder_files_ = std::move(found);
   if (!changed) return {};
-  return catalogue();
+  return *catalogue(false);
 }
 
-Catalogue CatalogueWatcher::catalogue() const {
+// What was read. A data set that cannot be added is an error at the start, and is skipped later.
+Result<Catalogue> CatalogueWatcher::catalogue(bool is_start) const {
+  auto volumes = files_;
+  for (const auto& [path, file] : folder_files_) volumes.emplace_back(path, file.volume);
   Catalogue catalogue;
-  const auto add = [&catalogue](const fs::path& path, const Catalogue::Volume& volume) {
-    if (!volume) return;
-    if (auto added = catalogue.add(volume); !added) spdlog::warn("skipped: {} ({})", added.error().message, path.string());
-  };
-  for (const auto& [path, volume] : files_) add(path, volume);
-  for (const auto& [path, file] : folder_files_) add(path, file.volume);
+  for (const auto& [path, volume] : volumes) {
+    if (!volume) continue;
+    const auto added = catalogue.add(volume);
+    if (!added && is_start) return fail(added.error().message + " (" + path.string() + ")");
+    if (!added) spdlog::warn("skipped: {} ({})", added.error().message, path.string());
+  }
   return catalogue;
 }
 

@@ -47,7 +47,7 @@ class CatalogueWatcher {
   };
   Result<void> load_folder(const std::filesystem::path& folder, const std::function<bool()>& keep_going);
   bool poll_file(const std::filesystem::path& path, File& file);
-  [[nodiscard]] Catalogue catalogue() const;
+  [[nodiscard]] Result<Catalogue> catalogue(bool is_start) const;
 
   std::vector<std::filesystem::path> inputs_;
   std::optional<std::uint64_t> max_memory_;

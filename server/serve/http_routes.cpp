@@ -1,6 +1,8 @@
 #include "server/serve/http_routes.h"
 
 #include <algorithm>
+#include <array>
+#include <boost/algorithm/string/replace.hpp>
 #include <cctype>
 #include <nlohmann/json.hpp>
 
@@ -13,27 +15,12 @@ constexpr const char* kHtml = "text/html; charset=utf-8";
 constexpr const char* kJson = "application/json";
 constexpr const char* kPrometheus = "text/plain; version=0.0.4; charset=utf-8";
 
-std::string html_escaped(std::string_view text) {
-  std::string html;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        html += "&amp;";
-        break;
-      case '<':
-        html += "&lt;";
-        break;
-      case '>':
-        html += "&gt;";
-        break;
-      case '"':
-        html += "&quot;";
-        break;
-      default:
-        html += c;
-    }
-  }
-  return html;
+std::string html_escaped(std::string text) {
+  boost::replace_all(text, "&", "&amp;");  // first: the others insert it
+  boost::replace_all(text, "<", "&lt;");
+  boost::replace_all(text, ">", "&gt;");
+  boost::replace_all(text, "\"", "&quot;");
+  return text;
 }
 
 std::string datasets_json(const Catalogue& catalogue, const Scope& scope) {
@@ -101,13 +88,6 @@ HttpResponse with_cors(const HttpRequest& request, HttpResponse response) {
   return response;
 }
 
-// An empty list would be wrong: the client has to try again.
-HttpResponse loading() {
-  HttpResponse response = text_response(503, "loading: the data sets are still being read");
-  response.headers.emplace_back("Retry-After", "1");
-  return response;
-}
-
 // A browser's CORS preflight, before it sends a token.
 HttpResponse preflight() {
   return {.status = 204,
@@ -127,17 +107,13 @@ HttpResponse text_response(unsigned status, std::string line) {
   return {.status = status, .body = std::make_shared<const std::string>(std::move(line) + "\n")};
 }
 
-const char* text_of(ServerStatus status) {
-  switch (status) {
-    case ServerStatus::loading:
-      return "loading";
-    case ServerStatus::draining:
-      return "draining";
-    case ServerStatus::ready:
-      break;
-  }
-  return "ok";
+HttpResponse retry_later(std::string line, const char* seconds) {
+  HttpResponse response = text_response(503, std::move(line));
+  response.headers.emplace_back("Retry-After", seconds);
+  return response;
 }
+
+const char* text_of(ServerStatus status) { return std::array{"loading", "ok", "draining"}[std::size_t(status)]; }
 
 HttpResponse unauthorized() {
   HttpResponse response = text_response(401, "a token is required: Authorization: Bearer TOKEN");
@@ -153,7 +129,9 @@ HttpResponse respond(const HttpRequest& request, const HttpState& state) {
   if (*path == "/api/datasets" && request.method == "OPTIONS" && !request.allowed_origin.empty()) return with_cors(request, preflight());
   if (request.method != "GET" && request.method != "HEAD") return text_response(405, "method not allowed: use GET or HEAD");
   if (*path == "/api/datasets") {
-    if (request.scope != nullptr && state.server_status == ServerStatus::loading) return with_cors(request, loading());
+    // An empty list would be wrong.
+    if (request.scope != nullptr && state.server_status == ServerStatus::loading)
+      return with_cors(request, retry_later("loading: the data sets are still being read", "1"));
     return with_cors(request, request.scope != nullptr ? ok(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized());
   }
   if (*path == "/metrics" && state.role == PortRole::all) {

@@ -39,6 +39,8 @@ struct HttpResponse {
 
 // A response of one line of text.
 [[nodiscard]] HttpResponse text_response(unsigned status, std::string line);
+// 503: the client may try again after so many seconds.
+[[nodiscard]] HttpResponse retry_later(std::string line, const char* seconds);
 // 401: the request has no valid token.
 [[nodiscard]] HttpResponse unauthorized();
 

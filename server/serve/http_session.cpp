@@ -207,8 +207,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     if (origin.empty() && scope_for(request) == nullptr) return refused(Refusal::token, unauthorized());
     const auto& max_sessions = context_.options.max_sessions;
     if (max_sessions && context_.metrics.sessions.Value() >= double(*max_sessions)) return refused(Refusal::sessions, full());
-    const auto& max_memory = context_.options.max_memory;
-    if (max_memory && resident_bytes() > *max_memory) return refused(Refusal::memory, full());
+    if (exceeds_memory(context_.options.max_memory)) return refused(Refusal::memory, full());
     return {};
   }
 
@@ -222,11 +221,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     return response;
   }
 
-  static HttpResponse full() {
-    HttpResponse response = text_response(503, "the server has no capacity for another session");
-    response.headers.emplace_back("Retry-After", "5");
-    return response;
-  }
+  static HttpResponse full() { return retry_later("the server has no capacity for another session", "5"); }
 
   // What the request's token grants; nullptr: nothing.
   [[nodiscard]] std::shared_ptr<const Scope> scope_for(const Request& request) const {

@@ -4,26 +4,21 @@
 #include <utility>
 
 namespace intervale {
-namespace {
 
 using protocol::CloseCode;
 using protocol::Fault;
-
-Fault fault(CloseCode code, std::string text) { return {code, std::move(text)}; }
-
-}  // namespace
 
 std::optional<Fault> SessionState::receive(const protocol::ClientMessage& message) {
   return std::visit([this](const auto& m) { return on(m); }, message);
 }
 
 std::optional<Fault> SessionState::on(const protocol::Open& open) {
-  if (opened()) return fault(CloseCode::out_of_order, "a second Open");
+  if (opened()) return Fault{CloseCode::out_of_order, "a second Open"};
   // Before the lookup: the client must not learn whether a data set exists that its token does not grant.
-  if (!scope_ || !scope_->allows(open.dataset)) return fault(CloseCode::forbidden, "the token does not grant this data set");
+  if (!scope_ || !scope_->allows(open.dataset)) return Fault{CloseCode::forbidden, "the token does not grant this data set"};
   const auto catalogue = catalogue_.load();
   if (catalogue) volume_ = catalogue->find(open.dataset);
-  if (!volume_) return fault(CloseCode::no_such_dataset, "no such data set; see /api/datasets");
+  if (!volume_) return Fault{CloseCode::no_such_dataset, "no such data set; see /api/datasets"};
   dataset_ = open.dataset;
   plan_.emplace(volume_);
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
@@ -31,19 +26,19 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
 }
 
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
-  if (!opened() || view_ != ViewState::none) return fault(CloseCode::out_of_order, "Have is allowed between Open and the first View only");
+  if (!opened() || view_ != ViewState::none) return Fault{CloseCode::out_of_order, "Have is allowed between Open and the first View only"};
   if (!resumed_) return {};
   for (const SlotGroup& g : have.splits) {
-    if (!plan_->resume(g.key, g.slots)) return fault(CloseCode::malformed, "Have names updates that the data set does not contain");
+    if (!plan_->resume(g.key, g.slots)) return Fault{CloseCode::malformed, "Have names updates that the data set does not contain"};
   }
   return {};
 }
 
 std::optional<Fault> SessionState::on(const protocol::View& view) {
-  if (!opened()) return fault(CloseCode::out_of_order, "View before Open");
+  if (!opened()) return Fault{CloseCode::out_of_order, "View before Open"};
   if (view_ != ViewState::none && view.epoch <= epoch_)
-    return fault(CloseCode::out_of_order, "the epoch of a View must be greater than the last one");
-  if (!plan_->forget(view.forget)) return fault(CloseCode::malformed, "View forgets updates that the data set does not contain");
+    return Fault{CloseCode::out_of_order, "the epoch of a View must be greater than the last one"};
+  if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
   plan_->set_room(view.room.value_or(UINT64_MAX));
   epoch_ = view.epoch;
   new_lod_ = view.lod;
@@ -53,12 +48,12 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
 }
 
 std::optional<Fault> SessionState::on(const protocol::Credit& credit) {
-  if (!opened()) return fault(CloseCode::out_of_order, "Credit before Open");
+  if (!opened()) return Fault{CloseCode::out_of_order, "Credit before Open"};
   return grant(credit.bytes);
 }
 
 std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
-  if (bytes > protocol::kMaxWindow - credit_) return fault(CloseCode::too_large, "the credit exceeds the largest window");
+  if (bytes > protocol::kMaxWindow - credit_) return Fault{CloseCode::too_large, "the credit exceeds the largest window"};
   credit_ += bytes;
   last_grant_ = bytes;
   return {};

@@ -1,12 +1,12 @@
 #include "server/serve/static_files.h"
 
+#include <fmt/core.h>
 #include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <cstdio>
 #include <fstream>
 #include <system_error>
 #include <utility>
@@ -98,9 +98,8 @@ Result<std::string> read_file(const fs::path& path, std::size_t room) {
 }
 
 StaticContent content_of(std::string bytes) {
-  std::array<char, 24> tag{};
-  std::snprintf(tag.data(), tag.size(), "\"%016llx\"", static_cast<unsigned long long>(XXH3_64bits(bytes.data(), bytes.size())));
-  return {std::make_shared<const std::string>(std::move(bytes)), tag.data()};
+  std::string tag = fmt::format("\"{:016x}\"", XXH3_64bits(bytes.data(), bytes.size()));
+  return {std::make_shared<const std::string>(std::move(bytes)), std::move(tag)};
 }
 
 // parameters: those of "gzip;q=0.5". A malformed weight counts as 0.
@@ -113,13 +112,6 @@ bool has_weight(std::string_view parameters) {
     return failure == std::errc() && stop == parameter.data() + parameter.size() && weight > 0 && weight <= 1;
   }
   return true;
-}
-
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
 }
 
 }  // namespace
@@ -162,8 +154,9 @@ std::optional<std::string> decode_path(std::string_view target) {
     char c = rest.front();
     rest.remove_prefix(1);
     if (c == '%') {
-      if (rest.size() < 2 || hex_digit(rest[0]) < 0 || hex_digit(rest[1]) < 0) return {};
-      c = static_cast<char>(16 * hex_digit(rest[0]) + hex_digit(rest[1]));
+      unsigned char byte = 0;
+      if (rest.size() < 2 || std::from_chars(rest.data(), rest.data() + 2, byte, 16).ptr != rest.data() + 2) return {};
+      c = static_cast<char>(byte);
       rest.remove_prefix(2);
     }
     if (c == '\0') return {};

@@ -42,7 +42,6 @@ class StaticFiles {
 
   // path: from decode_path(); "/" is index.html. nullptr if there is no such file.
   [[nodiscard]] const StaticFile* find(std::string_view path) const;
-  [[nodiscard]] bool empty() const { return files_.empty(); }
 
  private:
   std::map<std::string, StaticFile, std::less<>> files_;  // by path in the folder, with a leading slash
