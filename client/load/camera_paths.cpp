@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <numbers>
 
+#include "common/util/vec3.h"
+
 namespace intervale {
 namespace {
-
-using Vector = std::array<double, 3>;
 
 constexpr double kTurnSeconds = 20;
 constexpr double kZoomSeconds = 10;    // there and back
@@ -17,13 +17,9 @@ constexpr double kSteepest = 1.0;      // greatest elevation of an orbit, in rad
 constexpr double kMargin = 1.05;       // around a box that is in the picture as a whole
 constexpr std::uint64_t kPerView = 8;  // random numbers that a view may take
 
-Vector along(const Vector& from, const Vector& direction, double distance) {
-  return {from[0] + distance * direction[0], from[1] + distance * direction[1], from[2] + distance * direction[2]};
-}
-
 // Centre and radius of the sphere around the box.
 struct Ball {
-  Vector centre{};
+  Vec3 centre{};
   double radius = 0;
   explicit Ball(const Box& box) {
     for (std::size_t i = 0; i < 3; ++i) centre[i] = (box.min[i] + box.max[i]) / 2;
@@ -38,49 +34,46 @@ double distance_to_see_all(const Camera& camera) {
   return kMargin / std::sin(std::min(up, aside));
 }
 
-// Any direction that is not close to the line of sight works: the vertical one if possible.
-Vector up_for(const Vector& direction) { return std::abs(direction[1]) < 0.9 ? Vector{0, 1, 0} : Vector{0, 0, 1}; }
-
 // A direction, spread evenly over the sphere for height and turn in [0, 1].
-Vector direction_of(double height, double turn) {
+Vec3 direction_of(double height, double turn) {
   const double y = 2 * height - 1;
   const double angle = 2 * std::numbers::pi * turn;
   const double across = std::sqrt(std::max(0.0, 1 - y * y));
   return {across * std::cos(angle), y, across * std::sin(angle)};
 }
 
-void look(Camera& camera, const Vector& at, const Vector& from, double distance) {
+void look(Camera& camera, const Vec3& at, const Vec3& from, double distance) {
   camera.look_at = at;
-  camera.eye = along(at, from, distance);
-  camera.up = up_for(from);
+  for (std::size_t i = 0; i < 3; ++i) camera.eye[i] = at[i] + distance * from[i];
+  // Any direction that is not close to the line of sight works: the vertical one if possible.
+  camera.up = std::abs(from[1]) < 0.9 ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
 }
 
 void orbit(Camera& camera, const CameraPath& path, const Ball& ball, double seconds) {
   const double tilt = kSteepest * (2 * random_fraction(path.seed, 0) - 1);
   const double angle = 2 * std::numbers::pi * (random_fraction(path.seed, 1) + seconds / kTurnSeconds);
-  const Vector from{std::cos(tilt) * std::cos(angle), std::sin(tilt), std::cos(tilt) * std::sin(angle)};
+  const Vec3 from{std::cos(tilt) * std::cos(angle), std::sin(tilt), std::cos(tilt) * std::sin(angle)};
   look(camera, ball.centre, from, ball.radius * distance_to_see_all(camera));
 }
 
 void zoom(Camera& camera, const CameraPath& path, const Ball& ball, double seconds) {
   // A point on one of the six sides, approached from outside. The distance shrinks by equal ratios, so that each step
   // changes the picture equally.
-  Vector point{};
+  Vec3 point{};
   for (std::size_t i = 0; i < 3; ++i) point[i] = std::lerp(path.box.min[i], path.box.max[i], random_fraction(path.seed, i));
   const auto side = std::size_t(6 * random_fraction(path.seed, 3));
   point[side / 2] = side % 2 == 0 ? path.box.min[side / 2] : path.box.max[side / 2];
-  Vector from{};
+  Vec3 from{};
   for (std::size_t i = 0; i < 3; ++i) from[i] = (point[i] - ball.centre[i]) / ball.radius;
-  double length = std::hypot(from[0], from[1], from[2]);
-  if (!(length > 0)) from[side / 2] = length = 1;  // the middle of a box without thickness
-  for (double& x : from) x /= length;
+  if (from == Vec3{}) from[side / 2] = 1;  // the middle of a box without thickness
+  from = normalized(from);
   const double closeness = (1 - std::cos(2 * std::numbers::pi * seconds / kZoomSeconds)) / 2;
   look(camera, point, from, ball.radius * std::pow(distance_to_see_all(camera), 1 - closeness) * std::pow(kNearest, closeness));
 }
 
 void jump(Camera& camera, const CameraPath& path, const Ball& ball, std::uint64_t number) {
   const auto random = [&](std::uint64_t i) { return random_fraction(path.seed, number * kPerView + i); };
-  Vector at{};
+  Vec3 at{};
   for (std::size_t i = 0; i < 3; ++i) at[i] = std::lerp(path.box.min[i], path.box.max[i], random(i));
   const double closeness = random(3);
   look(camera, at, direction_of(random(4), random(5)),
@@ -104,19 +97,9 @@ Lod view_of(const CameraPath& path, std::uint64_t number) {
   Camera camera;
   camera.viewport = path.viewport;
   camera.pixel_error = path.pixel_error;
-  switch (path.scenario) {
-    case Scenario::full:
-      break;
-    case Scenario::orbit:
-      orbit(camera, path, ball, seconds);
-      break;
-    case Scenario::zoom:
-      zoom(camera, path, ball, seconds);
-      break;
-    case Scenario::jump:
-      jump(camera, path, ball, number);
-      break;
-  }
+  if (path.scenario == Scenario::orbit) orbit(camera, path, ball, seconds);
+  if (path.scenario == Scenario::zoom) zoom(camera, path, ball, seconds);
+  if (path.scenario == Scenario::jump) jump(camera, path, ball, number);
   Lod lod;
   lod.camera = camera;
   return lod;

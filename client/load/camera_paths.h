@@ -16,6 +16,9 @@ enum class Scenario : std::uint8_t {
   jump,   // with each view to a random place outside, far or near, looking at a random point of the box
 };
 
+// Their names, in the same order.
+inline constexpr std::array<std::string_view, 4> kScenarios{"full", "orbit", "zoom", "jump"};
+
 struct CameraPath {
   Scenario scenario = Scenario::orbit;
   Box box;  // not a single point

@@ -21,24 +21,32 @@ using LoadClock = std::chrono::steady_clock;
 inline constexpr std::chrono::milliseconds kLate{5};  // a view sent so much after it was due counts as late
 inline constexpr std::chrono::seconds kGrace{2};      // to wait for answers after the duration
 
-struct LoadPlan {
-  ServerUrl url;
-  std::shared_ptr<const TlsContext> tls;  // with wss://
-  Description description;                // of the data set; each client must receive the same
-  CameraPath path;                        // with the seed of the run, which the seeds of the clients derive from
-  unsigned clients = 1;
-  LoadClock::time_point start;  // of the first client
+struct LoadOptions {
+  unsigned clients = 0;  // at least 1
   LoadClock::duration duration{};
-  LoadClock::duration ramp{};           // the starts of the clients are spread evenly over it
+  LoadClock::duration ramp = std::chrono::seconds(1);  // the starts of the clients are spread evenly over it, at most over the duration
+  Scenario scenario = Scenario::orbit;
+  double views_per_second = 5;
+  double pixel_error = 2;
+  std::uint64_t seed = 1;               // of the run; the seeds of the clients derive from it
   std::optional<std::uint64_t> rate;    // bytes a second that a client reads, at least 1024; off: no limit
-  std::optional<std::uint64_t> window;  // the most outstanding credit of a client; see CreditWindow
+  std::optional<std::uint64_t> window;  // the most outstanding credit of a client; off: adapts to the connection
   // The longest time to connect, to do the WebSocket handshake, and to close: each.
-  LoadClock::duration patience{};
-  bool verify = false;  // apply the batches
-  Budget budget;        // of each client, with verify
+  LoadClock::duration patience = std::chrono::seconds(10);
+  unsigned threads = 1;
+  // Keep a mesh for each client, and compare them at the end: see verify_meshes.
+  bool verify = false;
+  Budget budget;  // of each of these meshes
   // How long a client tries to reach a lost server again; off: the client has failed. Requires verify: without a mesh
   // there is nothing to resume with.
   std::optional<LoadClock::duration> reconnect;
+};
+
+struct LoadPlan : LoadOptions {
+  ServerUrl url;
+  std::shared_ptr<const TlsContext> tls;  // with wss://
+  Description description;                // of the data set; each client must receive the same
+  LoadClock::time_point start;            // of the first client
   [[nodiscard]] LoadClock::time_point end() const { return start + duration; }
 };
 

@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
-#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -27,20 +26,6 @@ namespace {
 
 constexpr rlim_t kOtherFiles = 64;                   // besides the clients' sockets
 constexpr std::chrono::milliseconds kStartTime{20};  // for threads and clients to start before the first client is due
-
-const char* name_of(Scenario scenario) {
-  switch (scenario) {
-    case Scenario::full:
-      return "full";
-    case Scenario::orbit:
-      return "orbit";
-    case Scenario::zoom:
-      return "zoom";
-    case Scenario::jump:
-      return "jump";
-  }
-  return "";
-}
 
 // Raises the limit of open files as far as allowed: each client has a socket.
 Result<void> allow_files(unsigned clients) {
@@ -71,30 +56,6 @@ Result<Description> describe(const ServerUrl& url) {
   if (const auto opened = connection->receive(session); !opened) return tl::unexpected(opened.error());
   connection->close();
   return *session.description();
-}
-
-LoadClock::duration ticks(std::chrono::duration<double> time) { return std::chrono::duration_cast<LoadClock::duration>(time); }
-
-LoadPlan plan_of(const ServerUrl& url, const LoadOptions& options, const Description& description) {
-  LoadPlan plan;
-  plan.url = url;
-  plan.description = description;
-  plan.path.scenario = options.scenario;
-  plan.path.box = box_of(description.grid);
-  plan.path.pixel_error = options.pixel_error;
-  plan.path.views_per_second = options.views_per_second;
-  plan.path.seed = options.seed;
-  plan.clients = options.clients;
-  plan.duration = ticks(options.duration);
-  plan.ramp = ticks(std::min(options.ramp, options.duration));
-  plan.rate = options.rate;
-  plan.window = options.window;
-  plan.patience = ticks(options.patience);
-  plan.verify = options.verify;
-  plan.budget = options.budget;
-  if (options.reconnect) plan.reconnect = ticks(*options.reconnect);
-  plan.start = LoadClock::now() + kStartTime;
-  return plan;
 }
 
 double cpu_seconds(int whose) {
@@ -180,19 +141,19 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   }
 
   LoadReport report;
-  report.scenario = name_of(options.scenario);
+  report.scenario = kScenarios[std::size_t(options.scenario)];
   report.clients = options.clients;
   report.threads = std::min(options.threads, options.clients);
   auto tls = tls_for(url);
   if (!tls) return tl::unexpected(tls.error());
   const double cpu_before = cpu_seconds(RUSAGE_SELF);
-  LoadPlan plan = plan_of(url, options, *description);
-  plan.tls = std::move(*tls);
+  LoadPlan plan{options, url, std::move(*tls), *description, LoadClock::now() + kStartTime};
+  plan.ramp = std::min(plan.ramp, plan.duration);
   ThreadPool threads(plan, report.threads);
   threads.watch(plan);
   report.stats = threads.stats();
   const std::chrono::duration<double> wall = LoadClock::now() - plan.start;
-  report.seconds = std::min(wall, options.duration).count();
+  report.seconds = std::min<std::chrono::duration<double>>(wall, options.duration).count();
   report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));
   report.busiest_thread = threads.busiest_thread() / wall.count();
   if (reference) {

@@ -46,7 +46,6 @@ class LoadViews {
   void note_mesh(std::uint64_t bytes, Time now);
 
   void lose(Time now);  // the server is lost, until the next view is answered
-  [[nodiscard]] bool is_lost() const { return lost_at_.has_value(); }
 
   // No view is due or unanswered.
   [[nodiscard]] bool are_over() const { return over_ && pending_.empty() && has_mesh_; }

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <numeric>
 #include <random>
-#include <tuple>
 #include <utility>
 #include <vector>
 
