@@ -23,36 +23,22 @@ void add_count(CLI::App& app, const std::string& name, std::optional<std::uint64
       ->group("Level of detail");
 }
 
-using Vector = std::array<double, 3>;
-
 // --eye, and the options that need it.
 void add_camera_options(CLI::App& app, std::optional<Camera>& camera) {
-  const auto set = [&camera](auto member) {
-    return [&camera, member](const auto& value) {
+  const auto add = [&]<class T>(const char* name, T Camera::*member, const char* type, const char* description) {
+    const auto set = [&camera, member](const T& value) {
       if (!camera) camera.emplace();
       (*camera).*member = value;
     };
+    return app.add_option_function<T>(name, set, description)->type_name(type)->group("View");
   };
-  const auto group = "View";
-  CLI::Option* eye =
-      app.add_option_function<Vector>("--eye", set(&Camera::eye), "Camera position in world coordinates: refines what the camera sees");
-  eye->type_name("X Y Z")->group(group);
-  CLI::Option* at = app.add_option_function<Vector>("--look-at", set(&Camera::look_at), "World point at the centre of the picture");
-  at->type_name("X Y Z")->group(group)->needs(eye);
+  CLI::Option* eye = add("--eye", &Camera::eye, "X Y Z", "Camera position in world coordinates: refines what the camera sees");
+  CLI::Option* at = add("--look-at", &Camera::look_at, "X Y Z", "World point at the centre of the picture")->needs(eye);
   eye->needs(at);
-  app.add_option_function<Vector>("--up", set(&Camera::up), "Up direction of the camera (default 0 1 0)")
-      ->type_name("X Y Z")
-      ->group(group)
-      ->needs(eye);
-  app.add_option_function<double>("--fov", set(&Camera::fov), "Vertical field of view (default 45)")->type_name("DEGREES")->group(group)->needs(eye);
-  app.add_option_function<std::array<int, 2>>("--viewport", set(&Camera::viewport), "Size of the picture in pixels (default 1920 1080)")
-      ->type_name("W H")
-      ->group(group)
-      ->needs(eye);
-  app.add_option_function<double>("--pixel-error", set(&Camera::pixel_error), "Largest screen-space error of the surfaces (default 1)")
-      ->type_name("PX")
-      ->group(group)
-      ->needs(eye);
+  add("--up", &Camera::up, "X Y Z", "Up direction of the camera (default 0 1 0)")->needs(eye);
+  add("--fov", &Camera::fov, "DEGREES", "Vertical field of view (default 45)")->needs(eye);
+  add("--viewport", &Camera::viewport, "W H", "Size of the picture in pixels (default 1920 1080)")->needs(eye);
+  add("--pixel-error", &Camera::pixel_error, "PX", "Largest screen-space error of the surfaces (default 1)")->needs(eye);
 }
 
 Box box_of(const std::array<double, 6>& corners) {

@@ -75,12 +75,9 @@ bool may_be_origin(const std::string& text) {
          (scheme != 0 && scheme != std::string::npos && scheme + 3 < text.size() && text.find_first_of("/ \t?#@", scheme + 3) == std::string::npos);
 }
 
-CLI::Validator at_least_one() {
-  return {[](const std::string& text) {
-            double value = 0;
-            return std::string(CLI::detail::lexical_cast(text, value) && value >= 1 && value <= 1e15 ? "" : "must be 1 or more");
-          },
-          "", ""};
+std::string check_at_least_one(const std::string& text) {
+  double value = 0;
+  return CLI::detail::lexical_cast(text, value) && value >= 1 && value <= 1e15 ? "" : "must be 1 or more";
 }
 
 void add_milliseconds(CLI::App& command, const std::string& name, std::chrono::milliseconds& time, double least, const std::string& description) {
@@ -98,51 +95,31 @@ void add_milliseconds(CLI::App& command, const std::string& name, std::chrono::m
       ->group("Limits");
 }
 
-template <class Number>
-CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optional<Number>& limit, const std::string& description) {
-  return command.add_option_function<Number>(
-      name, [&limit](Number number) { limit = number; }, description);
+template <class Limit>
+CLI::Option* add_limit(CLI::App& command, const std::string& name, Limit& limit, const std::string& description) {
+  return command.add_option(name, limit, description)->check(check_at_least_one)->group("Limits");
 }
 
 void add_limits(CLI::App& command, ServeOptions& serve) {
-  const auto group = "Limits";
-  command.add_option("--max-connections", serve.max_connections, "Connections at a time; further ones are closed at once")
-      ->check(at_least_one())
-      ->capture_default_str()
-      ->group(group);
-  add_optional(command, "--max-connections-per-address", serve.max_connections_per_address,
-               "The same for each address (IPv6: for each /64); not behind a proxy, which is one address. Default: no limit")
-      ->check(at_least_one())
-      ->type_name("N")
-      ->group(group);
-  add_optional(command, "--max-sessions", serve.max_sessions, "Sessions at a time; further ones are answered 503. Default: no limit")
-      ->check(at_least_one())
-      ->type_name("N")
-      ->group(group);
+  add_limit(command, "--max-connections", serve.max_connections, "Connections at a time; further ones are closed at once")->capture_default_str();
+  add_limit(command, "--max-connections-per-address", serve.max_connections_per_address,
+            "The same for each address (IPv6: for each /64); not behind a proxy, which is one address. Default: no limit")
+      ->type_name("N");
+  add_limit(command, "--max-sessions", serve.max_sessions, "Sessions at a time; further ones are answered 503. Default: no limit")->type_name("N");
   const auto bytes = CLI::AsSizeValue(true);
-  add_optional(command, "--max-memory", serve.max_memory,
-               "Resident memory above which new sessions are answered 503, such as 2GiB or 500MB. Default: no limit")
+  add_limit(command, "--max-memory", serve.max_memory,
+            "Resident memory above which new sessions are answered 503, such as 2GiB or 500MB. Default: no limit")
       ->transform(bytes)
-      ->check(at_least_one())
-      ->type_name("BYTES")
-      ->group(group);
-  command
-      .add_option("--max-queued-bytes", serve.max_queued_bytes,
-                  "Unsent bytes of all sessions; above, the slowest readers are disconnected, if their message has been waiting for more "
-                  "than 1 s. Default: 512MiB")
+      ->type_name("BYTES");
+  add_limit(command, "--max-queued-bytes", serve.max_queued_bytes,
+            "Unsent bytes of all sessions; above, the slowest readers are disconnected, if their message has been waiting for more "
+            "than 1 s. Default: 512MiB")
       ->transform(bytes)
-      ->check(at_least_one())
-      ->type_name("BYTES")
-      ->group(group);
-  command
-      .add_option("--max-messages-per-second", serve.messages_per_second, "Messages of each session; a session that sends more is read more slowly")
-      ->check(at_least_one())
-      ->capture_default_str()
-      ->group(group);
-  command.add_option("--max-views-per-second", serve.views_per_second, "Views among those messages; likewise")
-      ->check(at_least_one())
-      ->capture_default_str()
-      ->group(group);
+      ->type_name("BYTES");
+  add_limit(command, "--max-messages-per-second", serve.messages_per_second,
+            "Messages of each session; a session that sends more is read more slowly")
+      ->capture_default_str();
+  add_limit(command, "--max-views-per-second", serve.views_per_second, "Views among those messages; likewise")->capture_default_str();
   add_milliseconds(command, "--handshake-time", serve.handshake_time, 0.1,
                    "Longest time for a request to arrive, and from a WebSocket's start to its Open. Default: 10");
   add_milliseconds(command, "--drain-time", serve.drain_time, 0,
