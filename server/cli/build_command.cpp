@@ -115,19 +115,16 @@ Result<void> run(const BuildCommand& options) {
   if (!made) return tl::unexpected(made.error());
   volume->bytes = std::vector<std::byte>();  // frees memory for the compression, which runs on several threads
   if (auto saved = save_ivm(options.output, *made, on_all_cores); !saved) return saved;
-  std::error_code code;
-  const auto size = std::filesystem::file_size(options.output, code);
-  const std::uint64_t file_bytes = code ? 0 : size;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
     fmt::print(stderr, "intervale: warning: no part of the volume lies in the range; its values are {}\n", values);
   }
   if (options.json) {
-    auto stats = stats_of(*made, file_bytes);
+    auto stats = stats_of(*made, options.output);
     stats["seconds"] = seconds;
     return print_json(stats);
   }
-  return print(text_of(*made, file_bytes) + fmt::format("values {}\nwrote {} in {:.2f} s\n", values, options.output, seconds));
+  return print(text_of(*made, options.output) + fmt::format("values {}\nwrote {} in {:.2f} s\n", values, options.output, seconds));
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
-// The statistics that build and info print, as JSON and as text.
+// The statistics of an interval volume in a file, which build and info print, as JSON and as text.
 #pragma once
 
-#include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -9,7 +9,7 @@
 
 namespace intervale {
 
-[[nodiscard]] nlohmann::ordered_json stats_of(const IntervalVolume& volume, std::uint64_t file_bytes);
-[[nodiscard]] std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes);
+[[nodiscard]] nlohmann::ordered_json stats_of(const IntervalVolume& volume, const std::filesystem::path& file);
+[[nodiscard]] std::string text_of(const IntervalVolume& volume, const std::filesystem::path& file);
 
 }  // namespace intervale

@@ -1,4 +1,3 @@
-#include <filesystem>
 #include <memory>
 
 #include "common/ivm/ivm_file.h"
@@ -15,17 +14,11 @@ struct InfoCommand {
   bool json = false;
 };
 
-std::uint64_t file_size(const std::string& path) {
-  std::error_code code;
-  const auto size = std::filesystem::file_size(path, code);
-  return code ? 0 : size;
-}
-
 Result<void> info(const InfoCommand& options) {
   const auto volume = load_ivm(options.file);
   if (!volume) return tl::unexpected(volume.error());
-  if (options.json) return print_json(stats_of(**volume, file_size(options.file)));
-  return print(text_of(**volume, file_size(options.file)));
+  if (options.json) return print_json(stats_of(**volume, options.file));
+  return print(text_of(**volume, options.file));
 }
 
 Result<void> verify(const InfoCommand& options) {
