@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "common/picture/gl.h"
 #include "common/picture/shaders.h"
 
 namespace intervale {
@@ -72,82 +71,71 @@ Result<GLuint> framebuffer(const Gl& gl, const std::array<int, 2>& size, bool is
 
 }  // namespace
 
-struct Canvas::State {
-  GlContext context;
-  std::array<int, 2> size;
-  GLuint drawn = 0;  // framebuffer
+Result<void> Canvas::begin(const Viewpoint& viewpoint) {
+  const Gl& gl = context_.gl();
+  GLint longest = 0;
+  gl.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &longest);
+  if (std::max(size_[0], size_[1]) > longest)
+    return misuse(fmt::format("a picture has at most {} pixels each way on this machine, not {} x {}", longest, size_[0], size_[1]));
+  const auto buffer = framebuffer(gl, size_, true);
+  if (!buffer) return tl::unexpected(buffer.error());
+  drawn_ = *buffer;
+  gl.Viewport(0, 0, size_[0], size_[1]);
+  gl.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  if (auto done = draw_background(); !done) return done;
+  return prepare(viewpoint);
+}
 
-  explicit State(GlContext made, const std::array<int, 2>& wanted) : context(std::move(made)), size(wanted) {}
+Result<void> Canvas::draw_background() const {
+  const Gl& gl = context_.gl();
+  const auto program = linked(gl, kBackgroundVertexShader, kBackgroundFragmentShader);
+  if (!program) return tl::unexpected(program.error());
+  GLuint no_attributes = 0;
+  gl.GenVertexArrays(1, &no_attributes);
+  gl.BindVertexArray(no_attributes);
+  gl.UseProgram(*program);
+  gl.Uniform1f(gl.GetUniformLocation(*program, "height"), GLfloat(size_[1]));
+  gl.DrawArrays(GL_TRIANGLES, 0, 3);
+  return {};
+}
 
-  [[nodiscard]] Result<void> begin(const Viewpoint& viewpoint) {
-    const Gl& gl = context.gl();
-    GLint longest = 0;
-    gl.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &longest);
-    if (std::max(size[0], size[1]) > longest)
-      return misuse(fmt::format("a picture has at most {} pixels each way on this machine, not {} x {}", longest, size[0], size[1]));
-    const auto buffer = framebuffer(gl, size, true);
-    if (!buffer) return tl::unexpected(buffer.error());
-    drawn = *buffer;
-    gl.Viewport(0, 0, size[0], size[1]);
-    gl.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    if (auto done = background(gl); !done) return done;
-    return prepare(gl, viewpoint);
-  }
-
-  [[nodiscard]] Result<void> background(const Gl& gl) const {
-    const auto program = linked(gl, kBackgroundVertexShader, kBackgroundFragmentShader);
-    if (!program) return tl::unexpected(program.error());
-    GLuint no_attributes = 0;
-    gl.GenVertexArrays(1, &no_attributes);
-    gl.BindVertexArray(no_attributes);
-    gl.UseProgram(*program);
-    gl.Uniform1f(gl.GetUniformLocation(*program, "height"), GLfloat(size[1]));
-    gl.DrawArrays(GL_TRIANGLES, 0, 3);
-    return {};
-  }
-
-  // Everything as draw() needs it.
-  [[nodiscard]] Result<void> prepare(const Gl& gl, const Viewpoint& viewpoint) const {
-    const auto program = linked(gl, kMeshVertexShader, kMeshFragmentShader);
-    if (!program) return tl::unexpected(program.error());
-    gl.UseProgram(*program);
-    const auto at = [&](const char* name) { return gl.GetUniformLocation(*program, name); };
-    gl.UniformMatrix4fv(at("projection"), 1, GL_FALSE, viewpoint.projection.data());
-    gl.UniformMatrix3fv(at("rotation"), 1, GL_FALSE, viewpoint.rotation.data());
-    gl.Uniform3fv(at("eye"), 1, viewpoint.eye.data());
-    gl.Uniform2fv(at("nearest_to_far"), 1, viewpoint.nearest_to_far.data());
-    gl.Uniform1f(at("height"), GLfloat(size[1]));
-    GLuint array = 0, buffer = 0;
-    gl.GenVertexArrays(1, &array);
-    gl.BindVertexArray(array);
-    gl.GenBuffers(1, &buffer);
-    gl.BindBuffer(GL_ARRAY_BUFFER, buffer);
-    const auto offset = [](std::size_t bytes) { return reinterpret_cast<const void*>(bytes); };
-    gl.VertexAttribPointer(kPositionAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, position)));
-    gl.VertexAttribPointer(kNormalAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, normal)));
-    gl.VertexAttribIPointer(kLookAttribute, 1, GL_UNSIGNED_INT, sizeof(Corner), offset(offsetof(Corner, look)));
-    for (const GLuint attribute : {kPositionAttribute, kNormalAttribute, kLookAttribute}) gl.EnableVertexAttribArray(attribute);
-    gl.Enable(GL_DEPTH_TEST);
-    gl.Enable(GL_CULL_FACE);
-    gl.PolygonOffset(kBackFaceOffset, kBackFaceOffset);
-    return {};
-  }
-};
-
-Canvas::Canvas(std::unique_ptr<State> state) : state_(std::move(state)) {}
-Canvas::Canvas(Canvas&&) noexcept = default;
-Canvas::~Canvas() = default;
+Result<void> Canvas::prepare(const Viewpoint& viewpoint) const {
+  const Gl& gl = context_.gl();
+  const auto program = linked(gl, kMeshVertexShader, kMeshFragmentShader);
+  if (!program) return tl::unexpected(program.error());
+  gl.UseProgram(*program);
+  const auto at = [&](const char* name) { return gl.GetUniformLocation(*program, name); };
+  gl.UniformMatrix4fv(at("projection"), 1, GL_FALSE, viewpoint.projection.data());
+  gl.UniformMatrix3fv(at("rotation"), 1, GL_FALSE, viewpoint.rotation.data());
+  gl.Uniform3fv(at("eye"), 1, viewpoint.eye.data());
+  gl.Uniform2fv(at("nearest_to_far"), 1, viewpoint.nearest_to_far.data());
+  gl.Uniform1f(at("height"), GLfloat(size_[1]));
+  GLuint array = 0, buffer = 0;
+  gl.GenVertexArrays(1, &array);
+  gl.BindVertexArray(array);
+  gl.GenBuffers(1, &buffer);
+  gl.BindBuffer(GL_ARRAY_BUFFER, buffer);
+  const auto offset = [](std::size_t bytes) { return reinterpret_cast<const void*>(bytes); };
+  gl.VertexAttribPointer(kPositionAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, position)));
+  gl.VertexAttribPointer(kNormalAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, normal)));
+  gl.VertexAttribIPointer(kLookAttribute, 1, GL_UNSIGNED_INT, sizeof(Corner), offset(offsetof(Corner, look)));
+  for (const GLenum attribute : {kPositionAttribute, kNormalAttribute, kLookAttribute}) gl.EnableVertexAttribArray(attribute);
+  gl.Enable(GL_DEPTH_TEST);
+  gl.Enable(GL_CULL_FACE);
+  gl.PolygonOffset(kBackFaceOffset, kBackFaceOffset);
+  return {};
+}
 
 Result<Canvas> Canvas::create(const std::array<int, 2>& size, const Viewpoint& viewpoint) {
   auto context = GlContext::create();
   if (!context) return tl::unexpected(context.error());
-  auto state = std::make_unique<State>(std::move(*context), size);
-  if (auto begun = state->begin(viewpoint); !begun) return tl::unexpected(begun.error());
-  return Canvas(std::move(state));
+  Canvas canvas(std::move(*context), size);
+  if (auto begun = canvas.begin(viewpoint); !begun) return tl::unexpected(begun.error());
+  return canvas;
 }
 
 void Canvas::draw(std::span<const Corner> corners) {
-  const Gl& gl = state_->context.gl();
+  const Gl& gl = context_.gl();
   gl.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(corners.size_bytes()), corners.data(), GL_STREAM_DRAW);
   for (const GLenum hidden : {GL_BACK, GL_FRONT}) {
     gl.CullFace(hidden);
@@ -158,11 +146,11 @@ void Canvas::draw(std::span<const Corner> corners) {
 }
 
 Result<Pixels> Canvas::finish() {
-  const Gl& gl = state_->context.gl();
-  const int width = state_->size[0], height = state_->size[1];
-  const auto resolved = framebuffer(gl, state_->size, false);
+  const Gl& gl = context_.gl();
+  const int width = size_[0], height = size_[1];
+  const auto resolved = framebuffer(gl, size_, false);
   if (!resolved) return tl::unexpected(resolved.error());
-  gl.BindFramebuffer(GL_READ_FRAMEBUFFER, state_->drawn);
+  gl.BindFramebuffer(GL_READ_FRAMEBUFFER, drawn_);
   gl.BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
   gl.BindFramebuffer(GL_READ_FRAMEBUFFER, *resolved);
   std::vector<std::uint8_t> rgba(std::size_t(width) * std::size_t(height) * 4);

@@ -3,10 +3,11 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "common/picture/gl.h"
 #include "common/picture/triangles.h"
 #include "common/picture/viewpoint.h"
 #include "common/util/result.h"
@@ -25,9 +26,6 @@ class Canvas {
   // Draws the background. size: width and height, at least 1. Fails where OpenGL ES is missing, or the size is too
   // large for it.
   static Result<Canvas> create(const std::array<int, 2>& size, const Viewpoint& viewpoint);
-  Canvas(Canvas&&) noexcept;
-  Canvas& operator=(Canvas&&) = delete;
-  ~Canvas();
 
   // Three corners a triangle, counterclockwise seen from outside; both sides are visible. Where two triangles coincide,
   // the one that faces the eye wins.
@@ -37,9 +35,13 @@ class Canvas {
   [[nodiscard]] Result<Pixels> finish();
 
  private:
-  struct State;
-  explicit Canvas(std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  Canvas(GlContext context, const std::array<int, 2>& size) : context_(std::move(context)), size_(size) {}
+  [[nodiscard]] Result<void> begin(const Viewpoint& viewpoint);
+  [[nodiscard]] Result<void> draw_background() const;
+  [[nodiscard]] Result<void> prepare(const Viewpoint& viewpoint) const;  // for draw()
+  GlContext context_;
+  std::array<int, 2> size_;
+  GLuint drawn_ = 0;  // framebuffer
 };
 
 }  // namespace intervale

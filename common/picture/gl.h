@@ -15,7 +15,7 @@ namespace intervale {
 #define INTERVALE_GL_FUNCTIONS(F) \
   F(AttachShader) F(BindBuffer) F(BindFramebuffer) F(BindRenderbuffer) F(BindVertexArray) F(BlitFramebuffer) \
   F(BufferData) F(CheckFramebufferStatus) F(Clear) F(CompileShader) F(CreateProgram) F(CreateShader) F(CullFace) \
-  F(DepthMask) F(Disable) F(DrawArrays) F(Enable) F(EnableVertexAttribArray) F(FramebufferRenderbuffer) \
+  F(Disable) F(DrawArrays) F(Enable) F(EnableVertexAttribArray) F(FramebufferRenderbuffer) \
   F(GenBuffers) F(GenFramebuffers) F(GenRenderbuffers) F(GenVertexArrays) F(GetError) F(GetIntegerv) \
   F(GetProgramiv) F(GetShaderInfoLog) F(GetShaderiv) F(GetUniformLocation) F(LinkProgram) F(PolygonOffset) \
   F(ReadPixels) F(RenderbufferStorageMultisample) F(ShaderSource) F(Uniform1f) F(Uniform2fv) F(Uniform3fv) \

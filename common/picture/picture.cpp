@@ -1,20 +1,38 @@
 #include "common/picture/picture.h"
 
 #include <fmt/core.h>
+#include <png.h>
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/picture/canvas.h"
-#include "common/picture/png_file.h"
 #include "common/picture/triangles.h"
 #include "common/picture/viewpoint.h"
+#include "common/util/atomic_file.h"
 
 namespace intervale {
 namespace {
 
 // Four samples a pixel, with depth, take 32 bytes: about a gigabyte. 8K screens have slightly fewer pixels.
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 25;
+
+Result<void> write_png(const std::filesystem::path& path, const Pixels& pixels) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = png_uint_32(pixels.width);
+  image.height = png_uint_32(pixels.height);
+  image.format = PNG_FORMAT_RGB;
+  std::vector<std::byte> bytes(PNG_IMAGE_PNG_SIZE_MAX(image));
+  png_alloc_size_t size = bytes.size();
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels.rgb.data(), 0, nullptr) == 0)
+    return fail("cannot write '" + path.string() + "': " + std::begin(image.message));
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (auto written = file->write(std::span(bytes).first(size)); !written) return written;
+  return file->commit();
+}
 
 }  // namespace
 
