@@ -1,12 +1,12 @@
 #include "client/core/budget.h"
 
 #include <algorithm>
-#include <bit>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cmath>
 #include <utility>
 #include <vector>
 
+#include "common/util/bits.h"
 #include "common/view/screen_error.h"
 
 namespace intervale {
@@ -76,9 +76,9 @@ class Balance {
   void show_what_fits() {
     for (std::size_t g = 0; g < end_ && front_.shown_count() < front_.split_count(); ++g) {
       const std::uint64_t hidden = groups_[g].slots & ~front_.shown_slots(groups_[g].key);
-      for (std::uint64_t left = hidden; left != 0; left &= left - 1) {
+      for (const Slot slot : set_bits<Slot>(hidden)) {
         wanted_.clear();
-        if (!show({groups_[g].key, Slot(std::countr_zero(left))}, groups_[g].importance / kHysteresis)) return;
+        if (!show({groups_[g].key, slot}, groups_[g].importance / kHysteresis)) return;
       }
     }
   }
@@ -115,9 +115,7 @@ class Balance {
       const SupercubeKey key = groups_[end_ - 1].key;
       bool hidden = false;
       for (int cls = 2; cls >= 0; --cls) {
-        for (std::uint64_t left = front_.shown_slots(key) & kSlotsOfClass[cls]; left != 0; left &= left - 1) {
-          hidden = hide({key, Slot(std::countr_zero(left))}) || hidden;
-        }
+        for (const Slot slot : set_bits<Slot>(front_.shown_slots(key) & kSlotsOfClass[cls])) hidden = hide({key, slot}) || hidden;
       }
       if (hidden) return true;
     }
@@ -179,8 +177,7 @@ std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, 
   };
   while (now-- > 0 && count > 0) {
     for (const std::uint64_t cls : {kSlotsOfClass[2], kSlotsOfClass[1], kSlotsOfClass[0]}) {
-      for (std::uint64_t slots = groups[now].slots & cls; slots != 0; slots &= slots - 1)
-        choose(choose, {groups[now].key, Slot(std::countr_zero(slots))});
+      for (const Slot slot : set_bits<Slot>(groups[now].slots & cls)) choose(choose, {groups[now].key, slot});
     }
   }
   std::vector<SlotGroup> result;

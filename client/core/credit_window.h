@@ -40,7 +40,23 @@ class CreditWindow {
 
   // Measurements of the connection. Of the round trips of a session the least counts.
   void note_round_trip(Clock::duration time) { round_trip_ = std::min(round_trip_, time); }
-  void note_batch(std::uint64_t cost, Clock::time_point now);
+  void note_batch(std::uint64_t cost, Clock::time_point now) {
+    if (is_fixed_) return;
+    if (!measured_since_) {  // it is not known how long the first batch took
+      measured_since_ = now;
+      bytes_ = 0;
+      return;
+    }
+    bytes_ += cost;
+    const Clock::duration time = now - *measured_since_;
+    if (time < std::max(round_trip_, kMinMeasurement)) return;
+    const double seconds = std::chrono::duration<double>(time).count(), rate = double(bytes_) / seconds;
+    rate_ = rate > rate_ ? rate : rate_ + (rate - rate_) / 4;
+    const double window = 2 * rate_ * std::chrono::duration<double>(round_trip_ + kSlack).count();
+    window_ = std::uint64_t(std::clamp(window, double(kMinWindow), double(kMaxWindow)));
+    measured_since_ = now;
+    bytes_ = 0;
+  }
   // Nothing more is on its way: the time until the next batch does not count.
   void note_pause() { measured_since_.reset(); }
 

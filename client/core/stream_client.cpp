@@ -8,16 +8,12 @@
 
 namespace intervale {
 
-StreamClient::StreamClient(Description description, Front front) : description_(std::move(description)), front_(std::move(front)) {}
-
 Result<StreamClient> StreamClient::start(Description description, const Budget& budget) {
   if (auto ok = check_description(description); !ok) return tl::unexpected(ok.error());
   const auto root_patch = decode_root_patch(description.root_patch, Domain(description.grid.dims));
   if (!root_patch) return tl::unexpected(root_patch.error());
   Front front(description.grid, *root_patch);
-  StreamClient client(std::move(description), std::move(front));
-  client.budget_ = budget;
-  return client;
+  return StreamClient(std::move(description), std::move(front), budget);
 }
 
 Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch) {
@@ -77,13 +73,5 @@ bool StreamClient::forget(std::uint64_t epoch) {
   front_.forget(std::exchange(forget_, {}));
   return true;
 }
-
-bool StreamClient::over_budget() const { return front_.shown_count() < front_.split_count() || front_.tet_count() > budget_.max_tets; }
-std::uint64_t StreamClient::updates() const { return front_.split_count(); }
-std::uint64_t StreamClient::updates_in_mesh() const { return front_.shown_count(); }
-std::uint64_t StreamClient::tet_count() const { return front_.tet_count(); }
-const Description& StreamClient::description() const { return description_; }
-const Front& StreamClient::front() const { return front_; }
-Mesh StreamClient::mesh() const { return front_.mesh(); }
 
 }  // namespace intervale

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "client/core/budget.h"
@@ -50,21 +50,22 @@ class StreamClient {
   void arrived(std::uint64_t epoch);
 
   // Some updates are hidden, or the patch of the root alone exceeds max_tets.
-  [[nodiscard]] bool over_budget() const;
-  [[nodiscard]] std::uint64_t updates() const;  // in the mesh or hidden
-  [[nodiscard]] std::uint64_t updates_in_mesh() const;
-  [[nodiscard]] std::uint64_t tet_count() const;  // O(1)
-  [[nodiscard]] const Description& description() const;
+  [[nodiscard]] bool over_budget() const { return front_.shown_count() < front_.split_count() || front_.tet_count() > budget_.max_tets; }
+  [[nodiscard]] std::uint64_t updates() const { return front_.split_count(); }  // in the mesh or hidden
+  [[nodiscard]] std::uint64_t updates_in_mesh() const { return front_.shown_count(); }
+  [[nodiscard]] std::uint64_t tet_count() const { return front_.tet_count(); }  // O(1)
+  [[nodiscard]] const Description& description() const { return description_; }
   // The updates that another session resumes with; see Front::splits. None of them is given up any more.
   [[nodiscard]] std::vector<SlotGroup> resume() {
     forget_.clear();
     return front_.splits();
   }
-  [[nodiscard]] const Front& front() const;
-  [[nodiscard]] Mesh mesh() const;  // linear in the size of the mesh
+  [[nodiscard]] const Front& front() const { return front_; }
+  [[nodiscard]] Mesh mesh() const { return front_.mesh(); }  // linear in the size of the mesh
 
  private:
-  explicit StreamClient(Description description, Front front);
+  StreamClient(Description description, Front front, const Budget& budget)
+      : description_(std::move(description)), front_(std::move(front)), budget_(budget) {}
   void rebalance();
   bool forget(std::uint64_t epoch);
   void keep_to_budget(std::uint64_t epoch);

@@ -16,14 +16,74 @@ using Clock = ClientSession::Clock;
 
 class Fetch {
  public:
-  Fetch(const ServerUrl& url, const FetchOptions& options, const FetchEvents& events);
-  Result<void> run();
-  Fetched finish() &&;
+  Fetch(const ServerUrl& url, const FetchOptions& options, const FetchEvents& events)
+      : url_(url),
+        options_(options),
+        events_(events),
+        session_({.dataset = url.name,
+                  .client = "intervale-client " INTERVALE_VERSION,
+                  .server = "the server at " + url.authority(),
+                  .max_bytes = options.max_bytes}) {
+    session_.look({options.lod, {}, {.max_tets = options.lod.max_tets.value_or(UINT64_MAX)}});
+  }
+
+  Result<void> run() {
+    auto done = stream();
+    while (!done && is_lost() && options_.reconnect.count() > 0) done = reconnect(done.error());
+    return done;
+  }
+
+  Fetched finish() && {
+    stats_.session = session_.stats();
+    stats_.is_complete = is_complete();
+    stats_.seconds = elapsed();
+    connection_->close();
+    return {*std::move(session_).take_mesh(), stats_};
+  }
 
  private:
-  Result<void> stream();
-  Result<void> receive();
-  Result<void> reconnect(const Error& why);
+  // Over one connection. If there is none, connection_ stays empty.
+  Result<void> stream() {
+    auto connection = StreamConnection::open(url_);
+    if (!connection) return tl::unexpected(connection.error());
+    connection_ = std::move(*connection);
+    session_.connected(Clock::now());
+    if (auto sent = connection_->send(session_); !sent) return sent;
+    while (!has_enough()) {
+      if (auto received = receive(); !received) return received;
+    }
+    return {};
+  }
+
+  Result<void> receive() {
+    const bool had_mesh = session_.mesh() != nullptr;
+    const auto event = connection_->receive(session_);
+    if (!event) return tl::unexpected(event.error());
+    if (event->is_new_mesh && had_mesh) notice("the data at " + url_.authority() + " changed meanwhile; starting again");
+    const StreamClient& client = *session_.mesh();
+    if (stats_.seconds_first_mesh == 0 && client.tet_count() > 0) stats_.seconds_first_mesh = elapsed();
+    stats_.session = session_.stats();
+    if (event->kind == ClientSession::Event::Kind::batch && events_.on_batch) events_.on_batch(client, stats_);
+    return {};
+  }
+
+  // Fails with `why` once the time for it is over, or as stream() does.
+  Result<void> reconnect(const Error& why) {
+    notice(why.message + "; connecting again");
+    const auto deadline = Clock::now() + options_.reconnect;
+    Backoff backoff(std::random_device{}());
+    session_.disconnected();
+    connection_.reset();
+    Result<void> done;
+    while (!connection_) {
+      const auto wait = backoff.next();
+      if (Clock::now() + wait > deadline) return tl::unexpected(why);
+      std::this_thread::sleep_for(wait);
+      done = stream();
+    }
+    return done;
+  }
+
   void notice(const std::string& text) const {
     if (events_.on_notice) events_.on_notice(text);
   }
@@ -40,73 +100,6 @@ class Fetch {
   ClientSession session_;
   FetchStats stats_;
 };
-
-Fetch::Fetch(const ServerUrl& url, const FetchOptions& options, const FetchEvents& events)
-    : url_(url),
-      options_(options),
-      events_(events),
-      session_({.dataset = url.name,
-                .client = "intervale-client " INTERVALE_VERSION,
-                .server = "the server at " + url.authority(),
-                .max_bytes = options.max_bytes}) {
-  session_.look({options.lod, {}, {.max_tets = options.lod.max_tets.value_or(UINT64_MAX)}});
-}
-
-Result<void> Fetch::run() {
-  auto done = stream();
-  while (!done && is_lost() && options_.reconnect.count() > 0) done = reconnect(done.error());
-  return done;
-}
-
-// Fails with `why` once the time for it is over, or as stream() does.
-Result<void> Fetch::reconnect(const Error& why) {
-  notice(why.message + "; connecting again");
-  const auto deadline = Clock::now() + options_.reconnect;
-  Backoff backoff(std::random_device{}());
-  session_.disconnected();
-  connection_.reset();
-  Result<void> done;
-  while (!connection_) {
-    const auto wait = backoff.next();
-    if (Clock::now() + wait > deadline) return tl::unexpected(why);
-    std::this_thread::sleep_for(wait);
-    done = stream();
-  }
-  return done;
-}
-
-// Over one connection. If there is none, connection_ stays empty.
-Result<void> Fetch::stream() {
-  auto connection = StreamConnection::open(url_);
-  if (!connection) return tl::unexpected(connection.error());
-  connection_ = std::move(*connection);
-  session_.connected(Clock::now());
-  if (auto sent = connection_->send(session_); !sent) return sent;
-  while (!has_enough()) {
-    if (auto received = receive(); !received) return received;
-  }
-  return {};
-}
-
-Result<void> Fetch::receive() {
-  const bool had_mesh = session_.mesh() != nullptr;
-  const auto event = connection_->receive(session_);
-  if (!event) return tl::unexpected(event.error());
-  if (event->is_new_mesh && had_mesh) notice("the data at " + url_.authority() + " changed meanwhile; starting again");
-  const StreamClient& client = *session_.mesh();
-  if (stats_.seconds_first_mesh == 0 && client.tet_count() > 0) stats_.seconds_first_mesh = elapsed();
-  stats_.session = session_.stats();
-  if (event->kind == ClientSession::Event::Kind::batch && events_.on_batch) events_.on_batch(client, stats_);
-  return {};
-}
-
-Fetched Fetch::finish() && {
-  stats_.session = session_.stats();
-  stats_.is_complete = is_complete();
-  stats_.seconds = elapsed();
-  connection_->close();
-  return {*std::move(session_).take_mesh(), stats_};
-}
 
 }  // namespace
 

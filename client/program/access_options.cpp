@@ -3,23 +3,16 @@
 #include <algorithm>
 
 namespace intervale {
-namespace {
-
-// The token is sent in a header: nothing in it may end the header.
-std::string complaint_about(const std::string& text) {
-  const bool plain = !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return c > 0x20 && c < 0x7f; });
-  return plain ? "" : "must be of visible ASCII characters";
-}
-
-}  // namespace
 
 void add_access_options(CLI::App& app, Access& access) {
   const auto group = "Access";
-  // Not a check of the parser, whose error would show the token.
+  // Not a check of the parser, whose error would show the token. The token is sent in a header: nothing in it may end
+  // the header.
   app.add_option_function<std::string>(
          "--token",
          [&access](const std::string& token) {
-           if (const std::string complaint = complaint_about(token); !complaint.empty()) throw CLI::ValidationError("--token", complaint);
+           const bool is_visible = std::all_of(token.begin(), token.end(), [](unsigned char c) { return c > 0x20 && c < 0x7f; });
+           if (token.empty() || !is_visible) throw CLI::ValidationError("--token", "must be of visible ASCII characters");
            access.token = token;
          },
          "Identifies you to a server that requires tokens. Better given as INTERVALE_TOKEN: other users can see arguments")
