@@ -7,7 +7,6 @@
 #include <chrono>
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "client/net/url.h"
 #include "common/util/result.h"

@@ -12,7 +12,6 @@
 #include <exception>
 #include <new>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "common/util/printable.h"
 

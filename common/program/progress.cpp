@@ -23,19 +23,15 @@ void Progress::text(const std::string& state) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
-  show_locked(state);
+  fmt::print(stderr, "\r{}: {}\x1b[K", what_, state);
+  std::fflush(stderr);
+  shown_ = true;
 }
 
 void Progress::note(const std::string& line) {
   const std::lock_guard lock(mutex_);
   fmt::print(stderr, "{}{}\n", shown_ ? "\r\x1b[K" : "", line);
   shown_ = false;
-}
-
-void Progress::show_locked(const std::string& state) {
-  fmt::print(stderr, "\r{}: {}\x1b[K", what_, state);
-  std::fflush(stderr);
-  shown_ = true;
 }
 
 }  // namespace intervale

@@ -21,7 +21,6 @@ class Progress {
   [[nodiscard]] bool is_seen() const { return terminal_; }
 
  private:
-  void show_locked(const std::string& state);
   std::string what_;
   bool terminal_;
   std::mutex mutex_;

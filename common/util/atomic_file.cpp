@@ -8,7 +8,6 @@
 #include <cassert>
 #include <cerrno>
 #include <cstdint>
-#include <cstring>
 #include <random>
 #include <string>
 #include <system_error>

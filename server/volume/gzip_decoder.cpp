@@ -6,7 +6,6 @@
 #include <array>
 #include <limits>
 #include <string>
-#include <utility>
 
 namespace intervale {
 namespace {

@@ -1,11 +1,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cstring>
-#include <limits>
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "server/volume/gzip_decoder.h"
 #include "server/volume/nrrd.h"

@@ -3,7 +3,6 @@
 #include <bit>
 #include <limits>
 #include <string>
-#include <utility>
 
 #include "server/volume/input_file.h"
 

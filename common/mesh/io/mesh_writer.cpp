@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "common/mesh/io/mesh_output.h"
 #include "common/util/atomic_file.h"

@@ -1,7 +1,6 @@
 // The surface formats of the world outside VTK: PLY 1.0, STL and OBJ. See mesh_writer_glb.cpp for glTF.
 #include <cstring>
 #include <limits>
-#include <string>
 
 #include "common/mesh/io/mesh_output.h"
 
