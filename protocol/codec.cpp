@@ -72,11 +72,10 @@ Offset<fbs::Fault> encode_body(FlatBufferBuilder& out, const Fault& message) {
 
 std::vector<std::uint8_t> finished(FlatBufferBuilder& out) { return {out.GetBufferPointer(), out.GetBufferPointer() + out.GetSize()}; }
 
-// Decoding: each verified table to its message.
+// Decoding: each verified table to its message. The verifier has checked that a string or array lies within the message;
+// its own limit is checked here.
 
 tl::unexpected<Error> malformed(const std::string& what) { return fail("malformed message: " + what); }
-
-// The verifier has checked that a string or array lies within the message; its own limit is checked here.
 
 Result<ClientMessage> decode_body(const fbs::Open& table) {
   if (VectorLength(table.dataset()) > kMaxName) return malformed("the data set's name is too long");
