@@ -110,12 +110,6 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& requested) {
   return std::unique_ptr<Server>(new Server(std::move(running)));
 }
 
-Result<std::unique_ptr<Server>> Server::start(const ServeOptions& options, Catalogue catalogue) {
-  auto server = start(options);
-  if (server) (*server)->offer(std::move(catalogue));
-  return server;
-}
-
 void Server::offer(Catalogue catalogue) { running_->context.catalogue.store(std::make_shared<const Catalogue>(std::move(catalogue))); }
 
 void Server::reload() {

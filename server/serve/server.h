@@ -16,7 +16,6 @@ class Server {
   // Listens, and serves on its own threads. Not ready (503) until offer() is called. Failures: an address that is
   // malformed or cannot be bound; a viewer, tokens or a certificate that cannot be read.
   static Result<std::unique_ptr<Server>> start(const ServeOptions& options);
-  static Result<std::unique_ptr<Server>> start(const ServeOptions& options, Catalogue catalogue);  // and offers it
 
   void offer(Catalogue catalogue);  // for new sessions; running sessions keep the data set they opened. Any thread.
   ~Server();                        // calls stop()

@@ -64,7 +64,7 @@ TEST(Http, AViewerThatIsNotThereIsAnError) {
   ServeOptions options;
   options.listen = "127.0.0.1:0";
   options.viewer = "/nonexistent";
-  const auto server = Server::start(options, {});
+  const auto server = Server::start(options);
   ASSERT_FALSE(server);
   EXPECT_THAT(server.error().message, HasSubstr("/nonexistent"));
 }

@@ -25,7 +25,7 @@ TEST(Server, AnAddressThatCannotBeHadIsAnError) {
   for (const std::string& listen : {"127.0.0.1:" + std::to_string(server->port()), std::string("192.0.2.1:1")}) {
     ServeOptions options;
     options.listen = listen;
-    const auto second = Server::start(options, {});
+    const auto second = Server::start(options);
     ASSERT_FALSE(second);
     EXPECT_FALSE(second.error().usage);
     EXPECT_THAT(second.error().message, HasSubstr(listen));
@@ -34,7 +34,7 @@ TEST(Server, AnAddressThatCannotBeHadIsAnError) {
        {"", "8080", ":8080", "localhost:8080", "127.0.0.1", "127.0.0.1:", "127.0.0.1:65536", "::1:80", "[127.0.0.1]:80", "1.2.3.4:-1"}) {
     ServeOptions options;
     options.listen = listen;
-    const auto wrong = Server::start(options, {});
+    const auto wrong = Server::start(options);
     ASSERT_FALSE(wrong) << listen;
     EXPECT_TRUE(wrong.error().usage) << listen;
   }
@@ -43,7 +43,7 @@ TEST(Server, AnAddressThatCannotBeHadIsAnError) {
 TEST(Server, ListensOnVersion6) {
   ServeOptions options;
   options.listen = "[::1]:0";
-  const auto server = Server::start(options, {});
+  const auto server = Server::start(options);
   if (!server) GTEST_SKIP() << server.error().message;  // a machine without IPv6
   EXPECT_THAT((*server)->url(), StartsWith("http://[::1]:"));
 }

@@ -32,7 +32,8 @@ struct Secured {
     options.listen = "127.0.0.1:0";
     options.threads = 2;
     options.tls = TlsFiles{files.certificate, files.key};
-    server = Server::start(options, CatalogueWatcher({buckyball()}).load().value()).value();
+    server = Server::start(options).value();
+    server->offer(CatalogueWatcher({buckyball()}).load().value());
   }
   [[nodiscard]] ServerUrl url(const std::string& host = "127.0.0.1") const {
     ServerUrl url = parse_url("wss://" + host + ":" + std::to_string(server->port()) + "/buckyball").value();
@@ -53,7 +54,8 @@ TEST(Tls, CarriesTheSameStream) {
   EXPECT_THAT(secured.server->url(), testing::StartsWith("https://"));
   ServeOptions plain;
   plain.listen = "127.0.0.1:0";
-  const auto server = Server::start(plain, CatalogueWatcher({buckyball()}).load().value()).value();
+  const auto server = Server::start(plain).value();
+  server->offer(CatalogueWatcher({buckyball()}).load().value());
   const auto over_tcp = fetch(parse_url("ws://127.0.0.1:" + std::to_string(server->port()) + "/buckyball").value(), {}, {});
   for (const char* host : {"127.0.0.1", "localhost"}) {
     const auto over_tls = fetch(secured.url(host), {}, {});
@@ -143,7 +145,7 @@ TEST(Tls, FilesThatDoNotDoAreAnError) {
     ServeOptions options;
     options.listen = "127.0.0.1:0";
     options.tls = files;
-    EXPECT_FALSE(Server::start(options, {}));
+    EXPECT_FALSE(Server::start(options));
   }
 }
 

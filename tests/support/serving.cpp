@@ -15,8 +15,9 @@ std::unique_ptr<Server> start(const ServeOptions& wanted, const std::filesystem:
   ServeOptions options = wanted;
   options.listen = "127.0.0.1:0";
   options.threads = 2;
-  auto server = Server::start(options, CatalogueWatcher({input}).load().value());
+  auto server = Server::start(options);
   if (!server) throw std::runtime_error(server.error().message);
+  (*server)->offer(CatalogueWatcher({input}).load().value());
   return std::move(*server);
 }
 
