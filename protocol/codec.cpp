@@ -117,7 +117,7 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
   const fbs::Description& wire = *table.description();
   if (VectorLength(wire.name()) > kMaxName) return malformed("the data set's name is too long");
   if (VectorLength(wire.base()) > kMaxRootPatch) return malformed("the root patch is too long");
-  if (wire.refine() > std::uint8_t(Refine::uniform)) return malformed("an unknown way to refine");
+  if (wire.refine() > std::uint8_t(Refine::uniform)) return malformed("an unknown refinement (neither boundary nor uniform)");
   Description d;
   d.name = wire.name()->str();
   d.grid = {{wire.dims()->x(), wire.dims()->y(), wire.dims()->z()}, to_array(*wire.spacing()), to_array(*wire.origin())};

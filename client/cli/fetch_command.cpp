@@ -119,7 +119,7 @@ Result<void> run(const FetchCommand& options) {
 
 void add_fetch_command(Program& program) {
   const auto options = std::make_shared<FetchCommand>();
-  CLI::App& command = program.add_command("fetch", "Receives a mesh, and writes or draws it", [options] { return run(*options); });
+  CLI::App& command = program.add_command("fetch", "Receive a mesh, and write or draw it", [options] { return run(*options); });
   command.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
   command
       .add_option_function<std::string>(

@@ -58,7 +58,7 @@ Result<void> list(const ListOptions& options) {
 
 void add_list_command(Program& program) {
   const auto options = std::make_shared<ListOptions>();
-  CLI::App& command = program.add_command("list", "Lists the data sets of a server", [options] { return list(*options); });
+  CLI::App& command = program.add_command("list", "List the data sets of a server", [options] { return list(*options); });
   command.add_option("URL", options->url, "ws://host:port, or wss://")->required();
   add_access_options(command, options->access);
   add_json_flag(command, options->json);

@@ -9,14 +9,14 @@ void add_picture_options(CLI::App& app, std::optional<PictureOptions>& picture) 
   const auto given = [&picture]() -> PictureOptions& { return picture ? *picture : picture.emplace(); };
   const auto group = "Picture";
   CLI::Option* image = app.add_option_function<std::string>(
-      "--image", [given](const std::string& path) { given().file = path; }, "Picture to draw, from --eye or from where the whole box is seen");
+      "--image", [given](const std::string& path) { given().file = path; }, "Draw a picture, seen from --eye; without it, of the whole box");
   image->type_name("PNG")->group(group);
   app.add_option_function<std::array<double, 6>>(
          "--clip",
          [given](const std::array<double, 6>& v) {
            given().clip = Plane{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
          },
-         "Cut it open through a world point: what lies on the normal's side is taken away")
+         "Clip plane, by a world point and a normal: the side to which the normal points is removed")
       ->type_name("X Y Z NX NY NZ")
       ->group(group)
       ->needs(image);

@@ -34,7 +34,7 @@ void add_sample_command(Program& program) {
   CLI::App& command = program.add_command("sample", "Write a synthetic volume, for tests and demonstrations", [options] { return run(*options); });
   command.add_option("NAME", options->name, fmt::format("{}", fmt::join(sample_names(), ", ")))->required();
   command.add_option("-o,--output", options->output, "Volume to write (.nrrd)")->required()->type_name("FILE");
-  command.add_option("--size", options->size, "Number of samples on each side")->capture_default_str();
+  command.add_option("--size", options->size, "Number of samples along each axis")->capture_default_str();
   add_json_flag(command, options->json);
 }
 

@@ -103,7 +103,8 @@ CLI::Option* add_limit(CLI::App& command, const std::string& name, Limit& limit,
 void add_limits(CLI::App& command, ServeOptions& serve) {
   add_limit(command, "--max-connections", serve.max_connections, "Connections at a time; further ones are closed at once")->capture_default_str();
   add_limit(command, "--max-connections-per-address", serve.max_connections_per_address,
-            "The same for each address (IPv6: for each /64); not behind a proxy, which is one address. Default: no limit")
+            "Connections of one address (IPv6: of one /64) at a time. Do not use it behind a proxy: all its clients share one address. "
+            "Default: no limit")
       ->type_name("N");
   add_limit(command, "--max-sessions", serve.max_sessions, "Sessions at a time; further ones are answered 503. Default: no limit")->type_name("N");
   const auto bytes = CLI::AsSizeValue(true);
@@ -119,7 +120,8 @@ void add_limits(CLI::App& command, ServeOptions& serve) {
   add_limit(command, "--max-messages-per-second", serve.messages_per_second,
             "Messages of each session; a session that sends more is read more slowly")
       ->capture_default_str();
-  add_limit(command, "--max-views-per-second", serve.views_per_second, "Views among those messages; likewise")->capture_default_str();
+  add_limit(command, "--max-views-per-second", serve.views_per_second, "Views of each session; a session that sends more is read more slowly")
+      ->capture_default_str();
   add_milliseconds(command, "--handshake-time", serve.handshake_time, 0.1,
                    "Longest time for a request to arrive, and from a WebSocket's start to its Open. Default: 10");
   add_milliseconds(command, "--drain-time", serve.drain_time, 0,
@@ -176,7 +178,7 @@ void add_serve_command(Program& program) {
   command
       .add_option_function<std::string>(
           "--viewer", [options](const std::string& folder) { options->serve.viewer = folder; },
-          "Folder of the browser viewer; default: ../share/intervale/viewer, seen from the program's folder, if it exists")
+          "Folder of the browser viewer. Default: ../share/intervale/viewer, relative to the program's folder, if it exists")
       ->type_name("FOLDER");
   command.add_option("--threads", options->serve.threads, "Number of threads; 0: one for each core")
       ->check(CLI::Range(0, 1024))

@@ -14,7 +14,7 @@ namespace intervale {
 // changes in the folders. Blocks until SIGTERM or SIGINT, then drains and returns. Logs to stderr. SIGHUP sets the
 // log level that the configuration file has now; if it has none, SIGHUP switches between debug and the level of the
 // start. Failures: an address that is malformed or cannot be bound, a file that cannot be served. If the options name
-// no viewer, the server uses ../share/intervale/viewer, seen from the program's folder, if that exists.
+// no viewer, the server uses ../share/intervale/viewer, relative to the program's folder, if that exists.
 Result<void> serve(const ServeOptions& options, const LogOptions& log, const std::vector<std::filesystem::path>& inputs);
 
 }  // namespace intervale
