@@ -270,8 +270,7 @@ struct TetPlan {
 // By type and tetrahedron.
 [[nodiscard]] const std::array<std::array<TetPlan, kMaxTets>, 64>& tet_plans();
 
-// Errors of the diamonds of one scale: error(delta) of the paper, section 4, the largest difference over the samples of
-// all their tetrahedra.
+// Errors of the diamonds of one scale: error(delta) of the paper, section 4, over the samples of all their tetrahedra.
 template <class T>
 class DiamondErrors {
  public:
@@ -359,8 +358,7 @@ class DiamondErrors {
     return worst;
   }
 
-  // One tetrahedron with all its vertices in the box. interior: all others of the diamond are too, so each face belongs
-  // to one of them.
+  // One tetrahedron with all its vertices in the box. interior: so are all others; each face belongs to one of them.
   [[nodiscard]] Real unmoved(const Diamond& d, int tet, bool interior) const {
     const T* const origin = field_.samples.data() + field_.index(d.centre);
     const TetPlan& plan = plans_[d.type][tet];

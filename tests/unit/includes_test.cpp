@@ -1,4 +1,4 @@
-// The layers of the code: a folder includes only itself and folders of lower layers. kFloors is the only list of them.
+// The layers of the code: a folder includes only itself and folders of lower layers. kLayers is the only list of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::map<std::string, int> kFloors{
+const std::map<std::string, int> kLayers{
     {"common/util", 1},    {"common/diamond", 2},                                                       //
     {"common/patch", 3},   {"common/view", 3},        {"common/mesh", 3},      {"common/mesh/io", 4},   //
     {"common/codec", 5},   {"common/picture", 5},     {"common/program", 5},                            //
@@ -26,7 +26,7 @@ const std::map<std::string, int> kFloors{
 // The folder of the table that a file lies in: the longest that is a prefix of its path. Empty if there is none.
 std::string folder_of(const std::string& path) {
   std::string folder = fs::path(path).parent_path().generic_string();
-  while (!folder.empty() && !kFloors.contains(folder)) folder = fs::path(folder).parent_path().generic_string();
+  while (!folder.empty() && !kLayers.contains(folder)) folder = fs::path(folder).parent_path().generic_string();
   return folder;
 }
 
@@ -34,7 +34,7 @@ std::string folder_of(const std::string& path) {
 bool may_include(const std::string& from, const std::string& to) {
   if (from == to) return true;
   const bool crosses = (from.starts_with("client/") && to.starts_with("server/")) || (from.starts_with("server/") && to.starts_with("client/"));
-  return !crosses && kFloors.at(to) < kFloors.at(from);
+  return !crosses && kLayers.at(to) < kLayers.at(from);
 }
 
 }  // namespace
@@ -64,6 +64,6 @@ TEST(Includes, GoDownOnly) {
       }
     }
   }
-  for (const auto& [folder, floor] : kFloors) EXPECT_TRUE(seen.contains(folder)) << folder << " is in the table, but holds no C++";
+  for (const auto& [folder, layer] : kLayers) EXPECT_TRUE(seen.contains(folder)) << folder << " is in the table, but holds no C++";
   EXPECT_GT(includes, 500);
 }
