@@ -144,6 +144,10 @@ export async function digestOf(page) {
   });
 }
 
+// The same of the native client's mesh, as `intervale-client fetch --json` prints it.
+export const fetched = (server, name, ...options) =>
+  JSON.parse(program('intervale-client', 'fetch', `ws://${server.address}/${name}`, '--json', '--digest', ...options));
+
 // Changes the view as the controls do, and waits until it is refined.
 export async function set(page, change) {
   await page.evaluate((change) => {

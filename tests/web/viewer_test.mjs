@@ -8,6 +8,7 @@ import {
   difference,
   digestOf,
   drawn,
+  fetched,
   kBlock,
   kBuckyball,
   kGyroid,
@@ -17,20 +18,16 @@ import {
   matches,
   open,
   pixels,
-  program,
   progressOf,
   serve,
   set,
   settled,
   surfaceShares,
-  throttledProxy,
   vtkArray,
 } from './support.mjs';
 
 const kEverything = { min: [-100, -100, -100], max: [100, 100, 100] };
 const kCamera = 'eye=2.6,-3.2,2.2&at=0,0,0&up=0,0,1';
-const fetched = (server, name, ...options) =>
-  JSON.parse(program('intervale-client', 'fetch', `ws://${server.address}/${name}`, '--json', '--digest', ...options));
 
 let data;
 let server;
@@ -352,70 +349,6 @@ describe('Controls', () => {
       const glb = await save('glb');
       assert.equal(glb.bytes.subarray(0, 4).toString(), 'glTF');
     }));
-});
-
-describe('After the server is lost', () => {
-  test('the page reconnects and resumes the stream without repeated updates', async () => {
-    const first = await serve(data);
-    const port = await throttledProxy(first.port, 40_000);
-    const { page, close } = await open(browser, `http://127.0.0.1:${port}/#data=buckyball&roi=-100,-100,-100,100,100,100`);
-    await page.waitForFunction(() => window.intervale.progress?.updates > 3000);
-    await first.kill();
-    await page.waitForFunction(() => window.intervale.live.connection.state === 'waiting');
-    assert.ok(await page.isVisible('#banner'));
-    const before = await progressOf(page);
-    assert.ok(!before.done);
-    const second = await serve(data, first.port);
-    await settled(page);
-    const progress = await progressOf(page);
-    assert.ok(await page.evaluate(() => window.intervale.live.opened.resumed));
-    assert.equal(progress.updates, await page.evaluate(() => window.intervale.live.dataset.updates));
-    assert.equal(progress.repeated, 0);
-    assert.ok(progress.reconnects >= 1);
-    assert.equal((await digestOf(page)).digest, fetched(second, 'buckyball').digest);
-    await close();
-    await second.kill();
-  });
-
-  test('the banner explains it until a new server is found', async () => {
-    const first = await serve(data);
-    const { page, close } = await open(browser, first.url);
-    await settled(page);
-    await first.kill();
-    await page.waitForFunction(() => window.intervale.live.connection.state === 'waiting' && window.intervale.live.connection.attempt > 1);
-    assert.match(await page.textContent('#banner-text'), /\w+ \w+/);
-    const second = await serve(data, first.port);
-    await settled(page);
-    await page.waitForSelector('#banner', { state: 'hidden' });
-    await close();
-    await second.kill();
-  });
-});
-
-test('A token that the server requires is requested from the user, and is never part of the address', async () => {
-  const file = join(data, 'tokens');
-  writeFileSync(file, 'open-sesame-0123456789abcdef0123456789abcdef buckyball\n', { mode: 0o600 });
-  const guarded = await serve(data, 0, '--tokens', file);
-  const { page, close } = await open(browser, guarded.url);
-  await page.waitForSelector('#token-form');
-  assert.equal(await page.isVisible('#token-error'), false);
-  await page.fill('#token', 'open-simsim');
-  await page.click('#token-form button[type=submit]');
-  await page.waitForSelector('#token-error');
-  assert.match(await page.textContent('#token-error'), /does not accept/);
-  const selected = () => {
-    const { activeElement: field } = document;
-    return field.id === 'token' && field.selectionStart === 0 && field.selectionEnd === field.value.length;
-  };
-  assert.ok(await page.evaluate(selected), 'the field is selected, so that typing replaces the token');
-  await page.fill('#token', 'open-sesame-0123456789abcdef0123456789abcdef');
-  await page.click('#token-form button[type=submit]');
-  await settled(page);
-  assert.deepEqual(await page.evaluate(() => window.intervale.live.datasets.map(({ name }) => name)), ['buckyball']);
-  assert.doesNotMatch(await page.evaluate(() => location.href), /sesame/);
-  assert.doesNotMatch(guarded.log(), /sesame/);
-  await close();
-  await guarded.kill();
 });
 
 describe('Sizes', () => {
