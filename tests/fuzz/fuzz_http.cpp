@@ -119,7 +119,7 @@ void check(const HttpRequest& request, const HttpState& state, const HttpRespons
   testing::require(body != "secret", "what lies outside is never sent");
   const std::string name = path == "/" ? "/index.html" : path.value_or("");
   const auto file = viewer_files().find(name);
-  const bool is_file = file != viewer_files().end() && state.role == PortRole::all && !state.viewer.empty();
+  const bool is_file = file != viewer_files().end() && state.role == PortRole::all && state.viewer.find("/") != nullptr;
   const bool packed = header_of(answer, "Content-Encoding") == "gzip";
   for (const auto& [at, bytes] : viewer_files()) {
     if (body == bytes) testing::require(is_file && at == name && !packed, "a file is sent to who asks for it");
