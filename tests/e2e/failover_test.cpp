@@ -75,7 +75,7 @@ constexpr int kClients = 20;  // the harness is several times as slow
 constexpr const char* kSeconds = "20";
 #else
 constexpr int kClients = 100;
-constexpr const char* kSeconds = "8";
+constexpr const char* kSeconds = "16";
 #endif
 
 // SIGKILL: a replica that is there no more. SIGTERM: one that sends its clients elsewhere.
