@@ -26,6 +26,7 @@ struct Group {
 // The most important first; of equally important ones, the coarse ones first.
 std::vector<Group> by_importance(const std::vector<SlotGroup>& splits, const Importance& importance) {
   std::vector<Group> groups;
+  groups.reserve(splits.size());
   for (const SlotGroup& g : splits) groups.push_back({importance(g.key), g.key, g.slots});
   std::sort(groups.begin(), groups.end(),
             [](const Group& a, const Group& b) { return std::pair(-a.importance, a.key) < std::pair(-b.importance, b.key); });

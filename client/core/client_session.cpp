@@ -20,7 +20,7 @@ bool may_reconnect(protocol::CloseCode code) { return code == protocol::CloseCod
 ClientSession::ClientSession(Options options) : options_(std::move(options)), credit_(options_.max_bytes ? 0 : UINT64_MAX, options_.window) {}
 
 void ClientSession::look(ViewRequest request) {
-  view_ = std::move(request);
+  view_ = request;
   if (mesh_ && view_->camera) mesh_->look(*view_->camera);
   if (state_ != State::connecting) send_view();
 }

@@ -118,8 +118,7 @@ Result<ClientSession::Event> StreamConnection::receive(ClientSession& session) {
   socket.buffer.clear();
   if (const auto error = socket.run([&](auto done) { socket.ws.async_read(socket.buffer, done); })) return socket.lost(error);
   if (socket.ws.got_text()) return fail("the server at " + socket.url.authority() + " sent a text message; all messages are binary");
-  const auto event =
-      session.receive({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()}, ClientSession::Clock::now());
+  auto event = session.receive({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()}, ClientSession::Clock::now());
   if (!event && session.fault()) {
     socket.is_lost = may_reconnect(session.fault()->code);
     return tl::unexpected(socket.faulted(*session.fault(), event.error()));

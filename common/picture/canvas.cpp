@@ -29,9 +29,9 @@ Result<GLuint> compiled(const Gl& gl, GLenum kind, const std::vector<const char*
 
 Result<GLuint> linked(const Gl& gl, const char* vertex, const char* fragment) {
   const GLuint program = gl.CreateProgram();
-  const auto vertex_shader = compiled(gl, GL_VERTEX_SHADER, {vertex});
+  auto vertex_shader = compiled(gl, GL_VERTEX_SHADER, {vertex});
   if (!vertex_shader) return vertex_shader;
-  const auto fragment_shader = compiled(gl, GL_FRAGMENT_SHADER, {kFragmentPreamble, fragment});
+  auto fragment_shader = compiled(gl, GL_FRAGMENT_SHADER, {kFragmentPreamble, fragment});
   if (!fragment_shader) return fragment_shader;
   gl.AttachShader(program, *vertex_shader);
   gl.AttachShader(program, *fragment_shader);

@@ -32,7 +32,7 @@ void choose_software() {
   F(CreateContext) F(DestroyContext) F(GetError) F(GetPlatformDisplay) F(GetProcAddress) F(Initialize) F(MakeCurrent) F(ReleaseThread)
 
 struct GlContext::Egl {
-#define INTERVALE_EGL_MEMBER(name) decltype(&::egl##name) name = nullptr;
+#define INTERVALE_EGL_MEMBER(name) decltype(&::egl##name) name = nullptr;  // NOLINT(bugprone-macro-parentheses)
   INTERVALE_EGL_FUNCTIONS(INTERVALE_EGL_MEMBER)
 #undef INTERVALE_EGL_MEMBER
   EGLDisplay display = EGL_NO_DISPLAY;

@@ -24,7 +24,7 @@ namespace intervale {
 // clang-format on
 
 struct Gl {
-#define INTERVALE_GL_MEMBER(name) decltype(&::gl##name) name = nullptr;
+#define INTERVALE_GL_MEMBER(name) decltype(&::gl##name) name = nullptr;  // NOLINT(bugprone-macro-parentheses)
   INTERVALE_GL_FUNCTIONS(INTERVALE_GL_MEMBER)
 #undef INTERVALE_GL_MEMBER
 };

@@ -74,7 +74,7 @@ Result<std::uint64_t> discard(Inflater& inflater, std::uint64_t bytes) {
   std::array<std::byte, kChunk> chunk;
   std::uint64_t done = 0;
   while (done < bytes) {
-    const auto got = inflater.next(std::span(chunk).first(std::min<std::uint64_t>(chunk.size(), bytes - done)));
+    auto got = inflater.next(std::span(chunk).first(std::min<std::uint64_t>(chunk.size(), bytes - done)));
     if (!got) return got;
     done += *got;
     if (*got == 0) break;

@@ -59,7 +59,8 @@ class Balancer {
   Balancer(const std::string& haproxy, const ServerProgram& a, const ServerProgram& b)
       : ports_(free_ports<2>()),
         process_({"/usr/bin/env", "INTERVALE_BIND=" + loopback(ports_[0]), "INTERVALE_BALANCER_METRICS=" + loopback(ports_[1]),
-                  "INTERVALE_A=" + loopback(a.port()), "INTERVALE_B=" + loopback(b.port()), haproxy, "-db", "-f", INTERVALE_DEPLOY "/haproxy.cfg"}) {}
+                  "INTERVALE_A=" + loopback(a.port()), "INTERVALE_B=" + loopback(b.port()), haproxy, "-db", "-f",
+                  (INTERVALE_DEPLOY "/haproxy.cfg")}) {}
   [[nodiscard]] std::string url(const std::string& name) const { return "ws://" + loopback(ports_[0]) + "/" + name; }
   [[nodiscard]] bool answers() const { return http_get(*parse_url(url("")), "/readyz").has_value(); }
 

@@ -11,7 +11,6 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
 
 constexpr const char* kPython = "/usr/bin/python3";
 
@@ -23,13 +22,13 @@ Finished far_away(const std::string& script) {
       "for i in $(seq 600); do \"$1/intervale-client\" list ws://10.78.0.1:8080 >/dev/null 2>&1 && break; done; " +
       script + "; status=$?; kill $server; wait $server || exit 1; exit $status";
   const std::string programs = program("intervale").substr(0, program("intervale").rfind('/'));
-  return run({"/usr/bin/env", "unshare", "--map-root-user", "--net", kPython, INTERVALE_E2E "/../support/far.py", "0.05", "0.02", "sh", "-c", around,
-              "sh", programs, buckyball()});
+  return run({"/usr/bin/env", "unshare", "--map-root-user", "--net", kPython, (INTERVALE_E2E "/../support/far.py"), "0.05", "0.02", "sh", "-c",
+              around, "sh", programs, buckyball()});
 }
 
 bool can_be_had() {
   return ::access(kPython, X_OK) == 0 &&
-         run({"/usr/bin/env", "unshare", "--map-root-user", "--net", kPython, INTERVALE_E2E "/../support/far.py", "0", "0", "true"}).status == 0;
+         run({"/usr/bin/env", "unshare", "--map-root-user", "--net", kPython, (INTERVALE_E2E "/../support/far.py"), "0", "0", "true"}).status == 0;
 }
 
 TEST(Far, AStreamComesWholeThroughDelayAndLoss) {

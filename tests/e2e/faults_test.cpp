@@ -35,7 +35,6 @@ using protocol::Done;
 using protocol::Have;
 using protocol::Open;
 using protocol::Opened;
-using protocol::View;
 using testing::HasSubstr;
 using testing::StartsWith;
 

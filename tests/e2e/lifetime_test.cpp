@@ -16,7 +16,6 @@ namespace intervale {
 namespace {
 
 using protocol::CloseCode;
-using protocol::Opened;
 using testing::HasSubstr;
 using testing::StartsWith;
 

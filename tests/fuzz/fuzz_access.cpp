@@ -114,7 +114,7 @@ void check_url(const std::string& text) {
     require(url.error().usage && !url.error().message.empty(), "what is no URL is wrong usage, and told");
     return;
   }
-  require(!url->host.empty() && url->host.find_first_of(std::string("\0\r\n\t @/?#[]\\", 13)) == std::string::npos, "a host is a name or an address");
+  require(!url->host.empty() && url->host.find_first_of(std::string("\0\r\n\t @/?#[]\\", 12)) == std::string::npos, "a host is a name or an address");
   require(url->port.find_first_not_of("0123456789") == std::string::npos, "a port is a number");
   require(std::stol(url->port) >= 1 && std::stol(url->port) <= 65535, "a port is 1 to 65535");
   require(url->name.find('/') == std::string::npos, "a name is one part of a path");

@@ -20,7 +20,6 @@ namespace intervale {
 namespace {
 
 using testing::broken_law;
-using testing::canonical;
 
 constexpr std::array<testing::Dims, 4> kBoxes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
 

@@ -7,7 +7,6 @@
 namespace intervale {
 namespace {
 
-using testing::NaiveDiamond;
 using testing::Point;
 using testing::point;
 using testing::sorted;

@@ -12,19 +12,19 @@ namespace intervale {
 namespace {
 
 template <class To, class... From>
-constexpr bool none_makes = (!std::is_constructible_v<To, From> && ...);
+constexpr bool kNoneMakes = (!std::is_constructible_v<To, From> && ...);
 
 TEST(Index, OneKindDoesNotBecomeAnother) {
-  static_assert(none_makes<UpdateIndex, BrickIndex, SupercubeIndex, Slot>);
-  static_assert(none_makes<BrickIndex, UpdateIndex, SupercubeIndex, Slot>);
-  static_assert(none_makes<SupercubeIndex, UpdateIndex, BrickIndex, Slot>);
-  static_assert(none_makes<Slot, UpdateIndex, BrickIndex, SupercubeIndex>);
+  static_assert(kNoneMakes<UpdateIndex, BrickIndex, SupercubeIndex, Slot>);
+  static_assert(kNoneMakes<BrickIndex, UpdateIndex, SupercubeIndex, Slot>);
+  static_assert(kNoneMakes<SupercubeIndex, UpdateIndex, BrickIndex, Slot>);
+  static_assert(kNoneMakes<Slot, UpdateIndex, BrickIndex, SupercubeIndex>);
 }
 
 TEST(Index, AnIntegerBecomesOneOnlyExplicitly) {
   static_assert(std::is_constructible_v<UpdateIndex, int> && !std::is_convertible_v<int, UpdateIndex>);
   static_assert(std::is_constructible_v<UpdateIndex, std::size_t> && !std::is_convertible_v<std::size_t, UpdateIndex>);
-  static_assert(none_makes<UpdateIndex, double, void*>);
+  static_assert(kNoneMakes<UpdateIndex, double, void*>);
 }
 
 TEST(Index, BecomesAnIntegerImplicitly) {

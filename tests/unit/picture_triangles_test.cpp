@@ -22,7 +22,7 @@ using testing::minus;
 using testing::Vector;
 
 constexpr int kSide = 25;
-constexpr double kMiddle = (kSide - 1) / 2;
+constexpr double kMiddle = (kSide - 1) / 2.0;
 constexpr Box kBox{{0, 0, 0}, {kSide - 1, kSide - 1, kSide - 1}};
 
 // Of the volume of distances to the middle, from the greatest down: alpha's ball encloses beta's.

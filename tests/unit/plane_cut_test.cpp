@@ -23,7 +23,8 @@ Mesh block(std::uint32_t n) {
   Mesh mesh;
   const std::uint32_t side = n + 1;
   for (std::uint32_t i = 0; i < side * side * side; ++i) {
-    mesh.points.push_back({double(i % side), double(i / side % side), double(i / (side * side))});
+    const std::uint32_t x = i % side, y = i / side % side, z = i / (side * side);
+    mesh.points.push_back({double(x), double(y), double(z)});
     mesh.surface.push_back(Surface::inside);
   }
   const std::array<std::uint32_t, 3> step{1, side, side * side};

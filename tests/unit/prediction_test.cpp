@@ -87,7 +87,10 @@ TEST(Prediction, LinearFieldsAreForetold) {
   ramp.type = SampleType::f64;
   ramp.bytes.resize(ramp.grid.sample_count() * sizeof(double));
   auto* const samples = reinterpret_cast<double*>(ramp.bytes.data());
-  for (int i = 0; i < 17 * 17 * 17; ++i) samples[i] = 1.3 * (i % 17) + 0.7 * (i / 17 % 17) + 0.9 * (i / 289);
+  for (int i = 0; i < 17 * 17 * 17; ++i) {
+    const int x = i % 17, y = i / 17 % 17, z = i / 289;
+    samples[i] = 1.3 * x + 0.7 * y + 0.9 * z;
+  }
   const FieldHierarchy delta(ramp, {.range = {17.03, 29.41}});
   std::size_t sides = 0, cuts = 0, updates = 0, far = 0;
   delta.set().for_each_down([&](const Place& p) {

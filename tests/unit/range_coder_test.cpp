@@ -51,7 +51,7 @@ std::vector<unsigned> some_values(unsigned seed, std::size_t count) {
 std::vector<unsigned> decode_exact(std::span<const std::uint8_t> bytes, std::size_t count, bool& spent) {
   const std::vector<std::uint8_t> exact(bytes.begin(), bytes.end());
   RangeDecoder decoder(exact);
-  const auto got = code_all(decoder, std::vector<unsigned>(count));
+  auto got = code_all(decoder, std::vector<unsigned>(count));
   spent = decoder.is_spent();
   EXPECT_FALSE(spent && decoder.is_overdrawn());
   return got;

@@ -22,8 +22,8 @@ std::string bytes_of(const std::vector<T>& values) {
 TEST(RawReader, ReadsEveryTypeXFastest) {
   const TempDir folder;
   const auto read = [&]<class T>(SampleType type, T) {
-    std::vector<T> samples;
-    for (int i = 0; i < 24; ++i) samples.push_back(static_cast<T>(i * 5 - 7));
+    std::vector<T> samples(24);
+    for (int i = 0; i < 24; ++i) samples[i] = static_cast<T>(i * 5 - 7);
     const auto path = folder.file("v.raw", bytes_of(samples));
     const auto volume = read_raw(path, {{2, 3, 4}, type, false, 0, {1, 2, 3}, {4, 5, 6}});
     ASSERT_TRUE(volume) << volume.error().message;

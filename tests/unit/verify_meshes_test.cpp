@@ -49,6 +49,7 @@ TEST(VerifyMeshes, PartsOfTheStreamPass) {
 TEST(VerifyMeshes, AnotherMeshIsFound) {
   const auto volume = volume_of_range({-0.3, 0.2});
   std::vector<std::optional<StreamClient>> clients;
+  clients.reserve(7);
   for (int i = 0; i < 6; ++i) clients.emplace_back(streamed(volume, i));
   clients.emplace_back(streamed(volume_of_range({-0.3, 0.21}), 1000));
   const auto verified = verify_meshes(streamed(volume, 1000).front(), clients, 1);
