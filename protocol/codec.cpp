@@ -72,8 +72,8 @@ Offset<fbs::Fault> encode_body(FlatBufferBuilder& out, const Fault& message) {
 
 std::vector<std::uint8_t> finished(FlatBufferBuilder& out) { return {out.GetBufferPointer(), out.GetBufferPointer() + out.GetSize()}; }
 
-// Decoding: each verified table to its message. The verifier has checked that a string or array lies within the message;
-// its own limit is checked here.
+// Decoding: each verified table to its message. The verifier has checked that a string or array lies within the
+// message; its own limit is checked here.
 
 tl::unexpected<Error> malformed(const std::string& what) { return fail("malformed message: " + what); }
 

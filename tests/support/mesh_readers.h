@@ -1,5 +1,5 @@
-// What files of meshes hold, read in the plainest way, independently of the writers. A file that is not as expected fails
-// the test.
+// What files of meshes hold, read in the plainest way, independently of the writers. A file that is not as expected
+// fails the test.
 #pragma once
 
 #include <gtest/gtest.h>
