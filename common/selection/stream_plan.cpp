@@ -50,7 +50,7 @@ StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(s
   for (BrickIndex b{0}; b < bricks.size(); ++b) {
     const std::uint32_t end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
     pending_[b].unsent = std::uint16_t(end - bricks[b].first);
-    pending_[b].level = std::uint16_t(volume_->brick_error_step(b));
+    pending_[b].error_step = std::uint16_t(volume_->brick_error_step(b));
     pending_[b].object_error = Up16(volume_->brick_object_error(b));
   }
   const auto half_steps = volume_->supercube_half_steps();
@@ -86,10 +86,10 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     --sent_count_;
     Pending& pending = pending_[here.brick];
     ++pending.unsent;
-    const unsigned level = volume_->error_step(i);
-    pending.level = std::max(pending.level, std::uint16_t(level));
-    pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(here.supercube, scale_of_key(g.key), level)));
-    half_steps_[here.supercube] = std::max(half_steps_[here.supercube], volume_->half_of_step(level));
+    const unsigned error_step = volume_->error_step(i);
+    pending.error_step = std::max(pending.error_step, std::uint16_t(error_step));
+    pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(here.supercube, scale_of_key(g.key), error_step)));
+    half_steps_[here.supercube] = std::max(half_steps_[here.supercube], volume_->half_of_step(error_step));
   });
   return true;
 }
@@ -108,7 +108,7 @@ void StreamPlan::set_lod(const Lod& lod) {
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     const Pending& w = pending_[b];
     if (w.unsent == 0) continue;
-    set_pending(b, std::max(ranking_->of_brick(b, w.level, float(w.object_error)).bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
+    set_pending(b, std::max(ranking_->of_brick(b, w.error_step, float(w.object_error)).bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
   }
   begin_band();
 }
@@ -140,11 +140,11 @@ StreamPlan::Remaining StreamPlan::remaining() const {
     return remaining;
   }
   remaining.pixels = ranking_->bound(top);
-  unsigned level = 0;
+  unsigned error_step = 0;
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
-    if (pending_[b].rank != 0) level = std::max(level, unsigned(pending_[b].level));
+    if (pending_[b].rank != 0) error_step = std::max(error_step, unsigned(pending_[b].error_step));
   }
-  remaining.error = volume_->error_steps()[level];
+  remaining.error = volume_->error_steps()[error_step];
   return remaining;
 }
 
@@ -205,12 +205,12 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
     if (full) return;
     rest.rank = std::max(rest.rank, here->rank);
     rest.wanted += here->wanted;
-    rest.level = std::max(rest.level, here->level);
-    object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), here->level));
+    rest.error_step = std::max(rest.error_step, here->error_step);
+    object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), here->error_step));
   });
   if (full) return false;
   set_pending(brick, rest.rank, rest.wanted);
-  pending_[brick].level = std::uint16_t(rest.level);
+  pending_[brick].error_step = std::uint16_t(rest.error_step);
   pending_[brick].object_error = Up16(object_error);
   return true;
 }
@@ -222,11 +222,11 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const SupercubeIndex s = first.supercube;
   const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
-  Unsent rest{.level = volume_->step_of_half(half_steps_[s])};
+  Unsent rest{.error_step = volume_->step_of_half(half_steps_[s])};
   if (candidates == 0) return rest;
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
-  const Rank bound = std::max(ranking.bound(rest.level), budget_ ? Rank(1) : Rank(0));
+  const Rank bound = std::max(ranking.bound(rest.error_step), budget_ ? Rank(1) : Rank(0));
   if (bound < band_) {
     rest.rank = bound;
     rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
@@ -237,9 +237,9 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   rest = {};
   if (!add_band(ranking, first, candidates, builder, rest)) return {};
   for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
-    rest.level = std::max(rest.level, volume_->error_step(first.index + std::countr_zero(others)));
+    rest.error_step = std::max(rest.error_step, volume_->error_step(first.index + std::countr_zero(others)));
   }
-  half_steps_[s] = volume_->half_of_step(rest.level);
+  half_steps_[s] = volume_->half_of_step(rest.error_step);
   return rest;
 }
 
@@ -253,8 +253,8 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
   for (; candidates != 0; candidates &= candidates - 1) {
     const auto k = unsigned(std::countr_zero(candidates));
     for (; at <= k; ++at, slots &= slots - 1) place.slot = Slot(std::countr_zero(slots));
-    const unsigned level = volume_->error_step(first + k);
-    float importance = ranking.importance(level);
+    const unsigned error_step = volume_->error_step(first + k);
+    float importance = ranking.importance(error_step);
     if (importance > 0 && !ranking.meets_roi(place.slot)) importance = 0;
     importance = std::max(importance, least);
     if (importance > 0 && importance >= in_band) {
@@ -262,7 +262,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
       if (!add_with_ancestors(place, builder.around, builder)) return false;
       continue;
     }
-    rest.level = std::max(rest.level, level);
+    rest.error_step = std::max(rest.error_step, error_step);
     rest.wanted += importance > 0;
     greatest = std::max(greatest, importance);
   }

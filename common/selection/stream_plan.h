@@ -87,7 +87,7 @@ class StreamPlan {
     Rank rank = 0;             // of those that are wanted; 0: there are none
     std::uint16_t unsent = 0;  // their number
     std::uint16_t wanted = 0;  // bound on the number of those that are wanted
-    std::uint16_t level = 0;   // of error
+    std::uint16_t error_step = 0;
     Up16 object_error;
   };
   void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
@@ -95,7 +95,7 @@ class StreamPlan {
   // Upper bounds over updates that were visited and not sent.
   struct Unsent {
     Rank rank = 0;
-    unsigned wanted = 0, level = 0;
+    unsigned wanted = 0, error_step = 0;
   };
   bool visit_brick(BrickIndex brick, BatchBuilder& builder);
   std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent, BatchBuilder& builder);

@@ -16,6 +16,7 @@ namespace intervale {
 namespace {
 
 using protocol::CloseCode;
+using protocol::Opened;
 using testing::HasSubstr;
 using testing::StartsWith;
 

@@ -21,7 +21,9 @@ using protocol::Done;
 using protocol::Open;
 using protocol::Opened;
 using protocol::View;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 TEST(Server, ASessionThatDoesNotOpenIsClosed) {
   ServeOptions options;

@@ -18,6 +18,7 @@ namespace intervale {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 void save(const std::filesystem::path& path, double low) {
