@@ -66,8 +66,7 @@ Offset<fbs::Done> encode_body(FlatBufferBuilder& out, const Done& message) {
 }
 
 Offset<fbs::Fault> encode_body(FlatBufferBuilder& out, const Fault& message) {
-  const auto text = out.CreateString(message.text);
-  return fbs::CreateFault(out, static_cast<std::uint16_t>(message.code), text);
+  return fbs::CreateFault(out, static_cast<std::uint16_t>(message.code), out.CreateString(message.text));
 }
 
 std::vector<std::uint8_t> finished(FlatBufferBuilder& out) { return {out.GetBufferPointer(), out.GetBufferPointer() + out.GetSize()}; }
@@ -170,10 +169,20 @@ class Aligned {
   std::vector<std::uint64_t> copy_;
 };
 
-template <class Root>
-const Root* verified(Bytes bytes) {
-  flatbuffers::Verifier verifier(bytes.data(), bytes.size(), kMaxDepth, kMaxTables);
-  return verifier.VerifyBuffer<Root>(nullptr) ? flatbuffers::GetRoot<Root>(bytes.data()) : nullptr;
+// Verifies the bytes, and decodes the one of these tables that their root holds. what: the root, for the error.
+template <class Message, class Root, class... Tables>
+Result<Message> decode(Bytes bytes, const char* what) {
+  const Aligned aligned(bytes);
+  flatbuffers::Verifier verifier(aligned.bytes().data(), bytes.size(), kMaxDepth, kMaxTables);
+  if (!verifier.VerifyBuffer<Root>(nullptr)) return malformed(std::string("not a ") + what);
+  const auto& root = *flatbuffers::GetRoot<Root>(aligned.bytes().data());
+  std::optional<Result<Message>> message;
+  const auto take = [&message](const auto* table) {
+    if (table != nullptr) message = decode_body(*table);
+  };
+  (take(root.template body_as<Tables>()), ...);
+  if (!message) return malformed("unknown message type");  // the verifier accepts unknown union types
+  return *std::move(message);
 }
 
 }  // namespace
@@ -198,41 +207,11 @@ std::vector<std::uint8_t> encode(const ServerMessage& message) {
 }
 
 Result<ClientMessage> decode_client_message(Bytes bytes) {
-  const Aligned aligned(bytes);
-  const auto* root = verified<fbs::ClientMessage>(aligned.bytes());
-  if (root == nullptr) return malformed("not a client message");
-  switch (root->body_type()) {
-    case fbs::ClientBody::Open:
-      return decode_body(*root->body_as_Open());
-    case fbs::ClientBody::View:
-      return decode_body(*root->body_as_View());
-    case fbs::ClientBody::Credit:
-      return decode_body(*root->body_as_Credit());
-    case fbs::ClientBody::Have:
-      return decode_body(*root->body_as_Have());
-    case fbs::ClientBody::NONE:
-      break;
-  }
-  return malformed("unknown message type");  // the verifier accepts unknown union types
+  return decode<ClientMessage, fbs::ClientMessage, fbs::Open, fbs::View, fbs::Credit, fbs::Have>(bytes, "client message");
 }
 
 Result<ServerMessage> decode_server_message(Bytes bytes) {
-  const Aligned aligned(bytes);
-  const auto* root = verified<fbs::ServerMessage>(aligned.bytes());
-  if (root == nullptr) return malformed("not a server message");
-  switch (root->body_type()) {
-    case fbs::ServerBody::Opened:
-      return decode_body(*root->body_as_Opened());
-    case fbs::ServerBody::Batch:
-      return decode_body(*root->body_as_Batch());
-    case fbs::ServerBody::Done:
-      return decode_body(*root->body_as_Done());
-    case fbs::ServerBody::Fault:
-      return decode_body(*root->body_as_Fault());
-    case fbs::ServerBody::NONE:
-      break;
-  }
-  return malformed("unknown message type");
+  return decode<ServerMessage, fbs::ServerMessage, fbs::Opened, fbs::Batch, fbs::Done, fbs::Fault>(bytes, "server message");
 }
 
 }  // namespace intervale::protocol
