@@ -121,10 +121,7 @@ void add_fetch_command(Program& program) {
   const auto options = std::make_shared<FetchCommand>();
   CLI::App& command = program.add_command("fetch", "Receive a mesh, and write or draw it", [options] { return run(*options); });
   command.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
-  command
-      .add_option_function<std::string>(
-          "-o,--output", [options](const std::string& path) { options->output = path; }, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")
-      ->type_name("MESH");
+  command.add_option("-o,--output", options->output, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")->type_name("MESH");
   add_lod_options(command, options->fetch.lod);
   add_picture_options(command, options->picture);
   add_max_bytes_option(command, options->fetch.max_bytes);

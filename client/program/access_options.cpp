@@ -18,9 +18,7 @@ void add_access_options(CLI::App& app, Access& access) {
          "Identifies you to a server that requires tokens. Better given as INTERVALE_TOKEN: other users can see arguments")
       ->type_name("TOKEN")
       ->group(group);
-  app.add_option_function<std::string>(
-         "--ca", [&access](const std::string& file) { access.authorities = file; },
-         "With wss://: PEM file of certificates to trust instead of the system's, such as the server's own")
+  app.add_option("--ca", access.authorities, "With wss://: PEM file of certificates to trust instead of the system's, such as the server's own")
       ->type_name("FILE")
       ->group(group);
 }

@@ -83,10 +83,7 @@ void add_extract_command(Program& program) {
   const auto options = std::make_shared<ExtractCommand>();
   CLI::App& command = program.add_command("extract", "Extract a mesh from an interval volume, without a server", [options] { return run(*options); });
   command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
-  command
-      .add_option_function<std::string>(
-          "-o,--output", [options](const std::string& path) { options->output = path; },
-          "Mesh to write: .vtu (tetrahedra), .vtp, .ply, .stl, .obj or .glb (boundary triangles)")
+  command.add_option("-o,--output", options->output, "Mesh to write: .vtu (tetrahedra), .vtp, .ply, .stl, .obj or .glb (boundary triangles)")
       ->type_name("MESH");
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);

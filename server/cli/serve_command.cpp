@@ -149,10 +149,9 @@ void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
       ->needs(certificate);
   certificate->needs("--tls-key");
   command
-      .add_option_function<std::string>(
-          "--tokens", [&serve](const std::string& file) { serve.tokens = file; },
-          "File of access tokens: on each line a token, and patterns (with * and ?) of the data sets it grants, if not all; reloaded "
-          "when it changes")
+      .add_option("--tokens", serve.tokens,
+                  "File of access tokens: on each line a token, and patterns (with * and ?) of the data sets it grants, if not all; reloaded "
+                  "when it changes")
       ->type_name("FILE")
       ->group(group);
   command
@@ -176,17 +175,15 @@ void add_serve_command(Program& program) {
   command.add_option("--listen", options->serve.listen, "Address and port to listen on; IPv6: [::1]:8080; port 0: any free port")
       ->capture_default_str();
   command
-      .add_option_function<std::string>(
-          "--viewer", [options](const std::string& folder) { options->serve.viewer = folder; },
-          "Folder of the browser viewer. Default: ../share/intervale/viewer, relative to the program's folder, if it exists")
+      .add_option("--viewer", options->serve.viewer,
+                  "Folder of the browser viewer. Default: ../share/intervale/viewer, relative to the program's folder, if it exists")
       ->type_name("FOLDER");
   command.add_option("--threads", options->serve.threads, "Number of threads; 0: one for each core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   command
-      .add_option_function<std::string>(
-          "--metrics-listen", [options](const std::string& address) { options->serve.metrics_listen = address; },
-          "Address and port for /metrics, in plain HTTP and without tokens: keep it private")
+      .add_option("--metrics-listen", options->serve.metrics_listen,
+                  "Address and port for /metrics, in plain HTTP and without tokens: keep it private")
       ->type_name("ADDRESS:PORT")
       ->group("Logs and metrics");
   add_log_options(command, options->log);
