@@ -4,7 +4,6 @@
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "common/util/bits.h"
 #include "common/view/screen_error.h"

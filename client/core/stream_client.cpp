@@ -1,7 +1,6 @@
 #include "client/core/stream_client.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "common/codec/root_patch.h"
 #include "common/front/batch_decoder.h"

@@ -1,8 +1,6 @@
 #include "client/net/fetch.h"
 
-#include <chrono>
 #include <random>
-#include <string>
 #include <thread>
 #include <utility>
 

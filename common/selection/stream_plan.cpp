@@ -1,11 +1,9 @@
 #include "common/selection/stream_plan.h"
 
 #include <algorithm>
-#include <bit>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <boost/unordered/unordered_flat_set.hpp>
 
-#include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/batch_encoder.h"
 #include "common/ivm/refinement.h"
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <boost/locale/utf.hpp>
-#include <string_view>
 #include <utility>
 
 #include "common/util/printable.h"

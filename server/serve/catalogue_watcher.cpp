@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <exception>
 #include <system_error>
-#include <utility>
 
 #include "common/ivm/ivm_file.h"
 #include "server/serve/admission.h"

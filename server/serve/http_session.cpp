@@ -17,7 +17,6 @@
 #include <utility>
 
 #include "protocol/messages.h"
-#include "server/serve/http_routes.h"
 #include "server/serve/websocket_session.h"
 
 namespace intervale {

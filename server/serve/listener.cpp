@@ -10,7 +10,6 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <charconv>
 #include <chrono>
-#include <memory>
 #include <utility>
 
 #include "server/serve/http_session.h"

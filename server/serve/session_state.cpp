@@ -1,7 +1,6 @@
 #include "server/serve/session_state.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace intervale {
 
@@ -64,10 +63,6 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
   if (!has_work()) return {};
   if (new_lod_) plan_->set_lod(*std::exchange(new_lod_, std::nullopt));
-  return next_batch_or_done(max_payload);
-}
-
-std::optional<protocol::ServerMessage> SessionState::next_batch_or_done(std::size_t max_payload) {
   // A batch does not use all the credit: the connection would be idle until the client's next grant arrives. Clients
   // grant a quarter of their window or more, and a batch takes about half of its bound.
   const std::uint64_t bound =

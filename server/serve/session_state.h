@@ -51,7 +51,6 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
   std::optional<protocol::Fault> on(const protocol::Have& have);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
-  std::optional<protocol::ServerMessage> next_batch_or_done(std::size_t max_payload);
 
   const AtomicSharedPtr<Catalogue>& catalogue_;
   std::shared_ptr<const Scope> scope_;

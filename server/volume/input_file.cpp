@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <string>
 #include <system_error>
 #include <utility>
 
