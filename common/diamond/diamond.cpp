@@ -2,22 +2,21 @@
 // the tests repeat).
 #include "common/diamond/diamond.h"
 
+#include "common/util/vec3.h"
+
 namespace intervale {
 namespace {
 
 using Int3 = std::array<int, 3>;
 
-constexpr Int3 minus(const Int3& a, const Int3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-constexpr int dot(const Int3& a, const Int3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 constexpr Offset offset(const Int3& v) { return {std::int8_t(v[0]), std::int8_t(v[1]), std::int8_t(v[2])}; }
 constexpr Int3 int3(Offset f) { return {f.x, f.y, f.z}; }
 
-template <class T>
-constexpr bool less(const std::array<T, 3>& a, const std::array<T, 3>& b) {
-  for (int i = 0; i < 3; ++i) {
-    if (a[i] != b[i]) return a[i] < b[i];
-  }
-  return false;
+// The vector with these components along three axes.
+constexpr Int3 along(const Int3& axes, const Int3& components) {
+  Int3 v{};
+  for (int i = 0; i < 3; ++i) v[axes[i]] = components[i];
+  return v;
 }
 
 // The shape of a tetrahedron that is not flat. T holds cubes of coordinate differences.
@@ -25,13 +24,9 @@ template <class T>
 constexpr TetShape shape(std::array<std::array<T, 3>, 4> p, std::array<std::uint8_t, 4> local, int belt) {
   TetShape s;
   for (int i = 1; i < 4; ++i) {
-    for (int j = i; j > 0 && less(p[j], p[j - 1]); --j) {
-      const auto q = p[j];
-      p[j] = p[j - 1];
-      p[j - 1] = q;
-      const auto l = local[j];
-      local[j] = local[j - 1];
-      local[j - 1] = l;
+    for (int j = i; j > 0 && p[j] < p[j - 1]; --j) {
+      std::swap(p[j], p[j - 1]);
+      std::swap(local[j], local[j - 1]);
     }
   }
   s.vertex = local;
@@ -41,15 +36,9 @@ constexpr TetShape shape(std::array<std::array<T, 3>, 4> p, std::array<std::uint
     for (int b = a + 1; b < 4; ++b) s.edge[e++] = std::uint8_t(edge_between(local[a], local[b], belt));
   }
   // The five comparisons that the order of the vertices leaves open; bit i as listed at tet_order.
-  s.order = std::uint8_t(less(mid(0, 2), mid(1, 1)) | less(mid(0, 3), mid(1, 1)) << 1 | less(mid(0, 3), mid(1, 2)) << 2 |
-                         less(mid(0, 3), mid(2, 2)) << 3 | less(mid(1, 3), mid(2, 2)) << 4);
-  std::array<std::array<T, 3>, 3> d{};
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) d[i][k] = p[i + 1][k] - p[0][k];
-  }
-  const T det = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) - d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
-                d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
-  s.flip = det < 0;
+  s.order = std::uint8_t((mid(0, 2) < mid(1, 1)) | (mid(0, 3) < mid(1, 1)) << 1 | (mid(0, 3) < mid(1, 2)) << 2 | (mid(0, 3) < mid(2, 2)) << 3 |
+                         (mid(1, 3) < mid(2, 2)) << 4);
+  s.flip = triple_product(subtract(p[1], p[0]), subtract(p[2], p[0]), subtract(p[3], p[0])) < 0;
   return s;
 }
 
@@ -83,13 +72,7 @@ constexpr DiamondType around(unsigned type) {
     t.children = 6;
   } else if (clear == 1) {
     const int e = !odd[0] ? 0 : !odd[1] ? 1 : 2, a = (e + 1) % 3, b = (e + 2) % 3;
-    const auto v = [&](int sa, int sb, int se) {
-      Int3 r{};
-      r[a] = sa;
-      r[b] = sb;
-      r[e] = se;
-      return r;
-    };
+    const auto v = [&](int sa, int sb, int se) { return along({a, b, e}, {sa, sb, se}); };
     vertex(v(g[a], g[b], 0));
     vertex(v(-g[a], -g[b], 0));
     vertex(v(g[a], -g[b], 0));
@@ -101,13 +84,7 @@ constexpr DiamondType around(unsigned type) {
     t.children = 4;
   } else {
     const int a = odd[0] ? 0 : odd[1] ? 1 : 2, b = (a + 1) % 3, c = (a + 2) % 3;
-    const auto v = [&](int sa, int sb, int sc) {
-      Int3 r{};
-      r[a] = sa;
-      r[b] = sb;
-      r[c] = sc;
-      return r;
-    };
+    const auto v = [&](int sa, int sb, int sc) { return along({a, b, c}, {sa, sb, sc}); };
     vertex(v(-1, 0, 0));
     vertex(v(1, 0, 0));
     constexpr int ring[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
@@ -149,7 +126,7 @@ constexpr void hand_down(DiamondType& t, int tet, int end, std::array<int, kMaxC
   int longest = -1, s0 = 0, s1 = 0;
   for (int a = 0; a < 4; ++a) {
     for (int b = a + 1; b < 4; ++b) {
-      const Int3 d = minus(position(t, local[a]), position(t, local[b]));
+      const Int3 d = subtract(position(t, local[a]), position(t, local[b]));
       if (dot(d, d) > longest) longest = dot(d, d), s0 = a, s1 = b;
     }
   }
