@@ -49,14 +49,10 @@ Polygon clip(const std::array<std::uint8_t, 3>& face, const std::array<Side, 4>&
     const int a = face[i], b = face[(i + 1) % 3];
     const auto alpha = PatchCorner(4 + 2 * kEdge[a][b]), beta = PatchCorner(alpha + 1);
     if (side[a] == Side::inside) polygon.push_back(PatchCorner(a));
-    const bool cut_alpha = alpha_cuts(side[a], side[b]), cut_beta = beta_cuts(side[a], side[b]);
-    if (side[a] < side[b]) {
-      if (cut_alpha) polygon.push_back(alpha);
-      if (cut_beta) polygon.push_back(beta);
-    } else {
-      if (cut_beta) polygon.push_back(beta);
-      if (cut_alpha) polygon.push_back(alpha);
-    }
+    const bool rises = side[a] < side[b];
+    if (!rises && beta_cuts(side[a], side[b])) polygon.push_back(beta);
+    if (alpha_cuts(side[a], side[b])) polygon.push_back(alpha);
+    if (rises && beta_cuts(side[a], side[b])) polygon.push_back(beta);
   }
   return polygon;
 }
