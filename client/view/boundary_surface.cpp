@@ -331,11 +331,4 @@ double BoundarySurface::volume_bound() const {
   return in_world(sum, mesher_.state().grid);
 }
 
-std::size_t BoundarySurface::memory_bytes() const {
-  std::size_t bytes = position_.capacity() * sizeof(Position) + surface_.capacity() + normal_.capacity() * sizeof(NormalSum) +
-                      vertex_of_.capacity() * sizeof(std::uint32_t) + parts_.capacity() * sizeof(Part);
-  for (const Part& part : parts_) bytes += part.triangles.capacity() * sizeof(Triangle);
-  return bytes;
-}
-
 }  // namespace intervale

@@ -59,7 +59,6 @@ class BoundarySurface {
   // on different sides, the larger of its part in the mesh and the rest. Surfaces inside diamonds whose vertices all
   // lie on one side are not known and not counted. 0 when everything is split.
   [[nodiscard]] double volume_bound() const;
-  [[nodiscard]] std::size_t memory_bytes() const;
 
   // What the mesh is made of, and its points.
   [[nodiscard]] const FrontMesher& mesher() const { return mesher_; }

@@ -1,8 +1,7 @@
 #include "client/view/tets_in_box.h"
 
-#include "common/util/tetrahedron.h"
-
 namespace intervale {
+
 TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint64_t most) {
   const FrontState& front = surface.mesher().state();
   const Grid& grid = front.grid;
@@ -33,13 +32,11 @@ TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint6
       bool inside = true;
       for (int i = 0; i < 3; ++i) inside = inside && middle[i] >= low[i] && middle[i] <= high[i];
       if (!inside || ++found.out_of > most) continue;
-      const auto first = std::uint32_t(found.vertices.size());
       for (const PointId id : tet) {
         const auto& at = surface.position(id);
         found.vertices.push_back({float(at[0]) / FrontMesher::kSteps, float(at[1]) / FrontMesher::kSteps, float(at[2]) / FrontMesher::kSteps,
                                   float(middle[0]), float(middle[1]), float(middle[2]), surface.surface(id), std::uint8_t(scale)});
       }
-      for (const auto& face : kTetFaces) found.indices.insert(found.indices.end(), {first + face[0], first + face[1], first + face[2]});
       ++found.count;
     }
   }

@@ -21,8 +21,7 @@ struct TetVertex {
 static_assert(sizeof(TetVertex) == 28);
 
 struct TetsInBox {
-  std::vector<TetVertex> vertices;     // four a tetrahedron
-  std::vector<std::uint32_t> indices;  // of its faces, seen from outside counterclockwise: twelve a tetrahedron
+  std::vector<TetVertex> vertices;  // four a tetrahedron
   std::uint64_t count = 0;
   std::uint64_t out_of = 0;  // that lie there
 };
