@@ -77,28 +77,19 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
     return false;
   }
   memory_warned_ = false;
-  const auto warn_once = [&](const Error& error) {
-    if (std::exchange(file.last_warning, error.message) == error.message) return;
-    spdlog::warn("{}: {}", file.volume ? "the data read before stays in use" : "skipped", error.message);
+  const auto skip = [&file](const std::string& why) {
+    if (std::exchange(file.last_warning, why) != why) spdlog::warn("{}: {}", file.volume ? "the data read before stays in use" : "skipped", why);
+    return false;
   };
   const std::string name = path.stem().string();
-  if (auto fit = Catalogue::check_name(name); !fit) {
-    warn_once({path.string() + ": " + fit.error().message});
-    return false;
-  }
+  if (auto fit = Catalogue::check_name(name); !fit) return skip(path.string() + ": " + fit.error().message);
   const auto bytes = catching(path, [&] { return read_ivm(path); });
   // Not the file's fault, perhaps: out of descriptors, or no permission; tried again even if the file stays as it is.
-  if (!bytes) {
-    warn_once(bytes.error());
-    return false;
-  }
+  if (!bytes) return skip(bytes.error().message);
   file.stamp = stamp;
   file.last_warning.clear();
   auto volume = catching(path, [&] { return decode_ivm(*bytes, name); });
-  if (!volume) {
-    warn_once({path.string() + ": " + volume.error().message});
-    return false;
-  }
+  if (!volume) return skip(path.string() + ": " + volume.error().message);
   // It includes a hash of the contents.
   if (file.volume && file.volume->description() == volume->description()) return false;
   file.volume = std::make_shared<const IntervalVolume>(std::move(*volume));

@@ -1,8 +1,7 @@
 // Helpers for parsing HTTP header fields.
 #pragma once
 
-#include <algorithm>
-#include <cctype>
+#include <boost/beast/core/string.hpp>
 #include <string_view>
 
 namespace intervale {
@@ -21,8 +20,6 @@ namespace intervale {
   return trimmed(item);
 }
 
-[[nodiscard]] inline bool iequals(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
+using boost::beast::iequals;  // without case
 
 }  // namespace intervale
