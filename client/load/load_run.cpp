@@ -4,10 +4,8 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <condition_variable>
 #include <cstddef>
-#include <exception>
-#include <mutex>
+#include <future>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -65,65 +63,39 @@ double cpu_seconds(int whose) {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-// Threads that run clients, and their results.
-class ThreadPool {
- public:
-  ThreadPool(const LoadPlan& plan, unsigned threads) : meshes_(plan.clients), running_(threads) {
-    for (unsigned first = 0; first < threads; ++first) {
-      threads_.emplace_back([this, &plan, first, threads] { work(plan, first, threads); });
-    }
-  }
+// What the clients of one thread, or of several, measured.
+struct Share {
+  LoadStats stats;
+  double cpu_seconds = 0;  // of the busiest thread
+};
 
-  // Shows the progress on a terminal once a second, until all threads have ended.
-  void watch(const LoadPlan& plan) {
-    Progress line("loading " + printable(plan.url.name));
-    std::uint64_t updates = 0, bytes = 0;
-    std::unique_lock lock(mutex_);
-    while (!ended_.wait_for(lock, std::chrono::seconds(1), [this] { return running_ == 0; })) {
-      const std::uint64_t updates_now = progress_.updates, bytes_now = progress_.bytes;
-      line.text(fmt::format("{} of {} clients, {} updates/s, {}/s", progress_.connected.load(), plan.clients, updates_now - updates,
+// Runs the clients on threads. Shows the progress on a terminal once a second, until all threads have ended.
+Share run_threads(const LoadPlan& plan, unsigned threads, std::vector<std::optional<StreamClient>>& meshes) {
+  LoadProgress progress;
+  std::vector<std::future<Share>> running;
+  for (unsigned first = 0; first < threads; ++first) {
+    running.push_back(std::async(std::launch::async, [&, first] {
+      LoadStats stats = run_clients(plan, first, threads, meshes, progress);
+      return Share{std::move(stats), cpu_seconds(RUSAGE_THREAD)};
+    }));
+  }
+  Progress line("loading " + printable(plan.url.name));
+  std::uint64_t updates = 0, bytes = 0;
+  Share all;
+  for (std::future<Share>& thread : running) {
+    while (thread.wait_for(std::chrono::seconds(1)) == std::future_status::timeout) {
+      const std::uint64_t updates_now = progress.updates, bytes_now = progress.bytes;
+      line.text(fmt::format("{} of {} clients, {} updates/s, {}/s", progress.connected.load(), plan.clients, updates_now - updates,
                             human_bytes(bytes_now - bytes)));
       updates = updates_now;
       bytes = bytes_now;
     }
+    Share share = thread.get();
+    all.stats.add(std::move(share.stats));
+    all.cpu_seconds = std::max(all.cpu_seconds, share.cpu_seconds);
   }
-
-  LoadStats stats() {
-    for (std::thread& thread : threads_) thread.join();
-    if (failure_) std::rethrow_exception(failure_);
-    return std::move(stats_);
-  }
-
-  [[nodiscard]] double busiest_thread() const { return busiest_; }  // its CPU seconds
-  std::vector<std::optional<StreamClient>>& meshes() { return meshes_; }
-
- private:
-  void work(const LoadPlan& plan, unsigned first, unsigned step) {
-    LoadStats stats;
-    std::exception_ptr failure;
-    try {
-      stats = run_clients(plan, first, step, meshes_, progress_);
-    } catch (...) {
-      failure = std::current_exception();
-    }
-    const std::lock_guard lock(mutex_);
-    stats_.add(std::move(stats));
-    busiest_ = std::max(busiest_, cpu_seconds(RUSAGE_THREAD));
-    if (failure) failure_ = failure;
-    --running_;
-    ended_.notify_one();
-  }
-
-  std::vector<std::optional<StreamClient>> meshes_;
-  LoadProgress progress_;
-  std::mutex mutex_;
-  std::condition_variable ended_;
-  unsigned running_;
-  LoadStats stats_;
-  double busiest_ = 0;
-  std::exception_ptr failure_;
-  std::vector<std::thread> threads_;
-};
+  return all;
+}
 
 }  // namespace
 
@@ -149,15 +121,15 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   const double cpu_before = cpu_seconds(RUSAGE_SELF);
   LoadPlan plan{options, url, std::move(*tls), *description, LoadClock::now() + kStartTime};
   plan.ramp = std::min(plan.ramp, plan.duration);
-  ThreadPool threads(plan, report.threads);
-  threads.watch(plan);
-  report.stats = threads.stats();
+  std::vector<std::optional<StreamClient>> meshes(plan.clients);
+  Share all = run_threads(plan, report.threads, meshes);
+  report.stats = std::move(all.stats);
   const std::chrono::duration<double> wall = LoadClock::now() - plan.start;
   report.seconds = std::min<std::chrono::duration<double>>(wall, options.duration).count();
   report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));
-  report.busiest_thread = threads.busiest_thread() / wall.count();
+  report.busiest_thread = all.cpu_seconds / wall.count();
   if (reference) {
-    const auto [compared, differing] = verify_meshes(reference->front(), threads.meshes(), options.seed);
+    const auto [compared, differing] = verify_meshes(reference->front(), meshes, options.seed);
     report.verified = compared;
     report.differing = differing;
   }
