@@ -40,21 +40,20 @@ function withoutShaders(): Plugin {
   };
 }
 
-export default defineConfig(() => {
-  const core = () => clientCore(process.env.INTERVALE_CORE_DIR);
-  return {
-    base: './', // relative: the page may be served below any path
-    plugins: [core(), withoutShaders()],
-    resolve: { alias: [{ find: /^three$/, replacement: 'three/src/Three.js' }] },
-    worker: { format: 'es' as const, plugins: () => [core()] },
-    build: {
-      outDir: process.env.INTERVALE_VIEWER_OUT ?? 'dist',
-      emptyOutDir: true,
-      target: 'es2022',
-      cssTarget: ['chrome123', 'firefox120', 'safari17.5'], // light-dark()
-      assetsInlineLimit: 0, // the server's Content-Security-Policy allows data: URLs for images only
-      modulePreload: { polyfill: false },
-      chunkSizeWarningLimit: 700, // kB; three.js takes 130 compressed
-    },
-  };
+const core = () => clientCore(process.env.INTERVALE_CORE_DIR);
+
+export default defineConfig({
+  base: './', // relative: the page may be served below any path
+  plugins: [core(), withoutShaders()],
+  resolve: { alias: [{ find: /^three$/, replacement: 'three/src/Three.js' }] },
+  worker: { format: 'es', plugins: () => [core()] },
+  build: {
+    outDir: process.env.INTERVALE_VIEWER_OUT ?? 'dist',
+    emptyOutDir: true,
+    target: 'es2022',
+    cssTarget: ['chrome123', 'firefox120', 'safari17.5'], // light-dark()
+    assetsInlineLimit: 0, // the server's Content-Security-Policy allows data: URLs for images only
+    modulePreload: { polyfill: false },
+    chunkSizeWarningLimit: 700, // kB; three.js takes 130 compressed
+  },
 });

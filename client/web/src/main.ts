@@ -1,5 +1,5 @@
 // The page: connects the controls, the view's state, the worker and the picture.
-import { expose } from './automation';
+import { automation } from './automation';
 import { showAxes } from './axes';
 import { watchBanner } from './banner';
 import { ClipControls } from './clip';
@@ -200,7 +200,7 @@ function start(): void {
     status.set({ error: kNoWebGl });
     return;
   }
-  expose(view, status, viewer, worker);
+  window.intervale = automation(view, status, viewer, worker);
   void new Page(viewer, worker).load(listing);
 }
 

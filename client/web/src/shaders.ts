@@ -70,8 +70,7 @@ uniform vec3 hiddenMin, hiddenMax;
 in vec3 vPosition;
 bool is_hidden() { return all(greaterThan(vPosition, hiddenMin)) && all(lessThan(vPosition, hiddenMax)); }
 void discard_clipped() {
-  if (dot(clip.xyz, vPosition) > clip.w) discard;
-  if (is_hidden()) discard;
+  if (dot(clip.xyz, vPosition) > clip.w || is_hidden()) discard;
 }
 `;
 

@@ -20,7 +20,6 @@ export interface Extras {
 }
 
 export class StreamSession {
-  private readonly dataset: string;
   private viewer: Viewer;
   private connection: Connection;
   private isEnded = false;
@@ -40,13 +39,12 @@ export class StreamSession {
 
   constructor(
     private readonly core: Core,
-    { dataset, url, token }: Extract<Request, { type: 'open' }>,
+    private readonly request: Extract<Request, { type: 'open' }>,
     private readonly extras: Readonly<Extras>,
     private readonly report: SendReport,
   ) {
-    this.dataset = dataset;
-    this.viewer = new core.Viewer(dataset);
-    this.connection = new Connection(url, token, {
+    this.viewer = new core.Viewer(request.dataset);
+    this.connection = new Connection(request.url, request.token, {
       connected: () => {
         this.viewer.connected(performance.now());
         this.send();
@@ -117,7 +115,7 @@ export class StreamSession {
     if (!this.isOpen) return this.report({ type: 'error', text: 'There is no mesh to save yet.' });
     const bytes = this.viewer.save(`mesh.${format}`);
     if (typeof bytes === 'string') return this.report({ type: 'error', text: `The mesh cannot be saved: ${bytes}` });
-    this.report({ type: 'saved', format, name: `${this.dataset}.${format}`, bytes }, [bytes]);
+    this.report({ type: 'saved', format, name: `${this.request.dataset}.${format}`, bytes }, [bytes]);
   }
 
   digest(): void {

@@ -23,16 +23,13 @@ export interface Wanted {
 
 export class WorkerClient {
   private worker: Worker;
-  private view: View | null = null;
+  private wanted: Wanted | null = null;
   private sentView: View | null = null;
   private nextViewAt = 0; // performance.now()
   private viewTimer = 0;
-  private plane: Plane | null = null;
   private sentPlane: Plane | null = null;
   private isAwaitingCap = false;
-  private tetsBox: Box | null = null;
   private tetsTimer = 0;
-  private edges = false;
 
   // received: called with each report, after the status has changed.
   constructor(private status: Store<Status>, private received: (report: Report) => void) {
@@ -66,34 +63,30 @@ export class WorkerClient {
   open(dataset: string, wanted: Wanted): void {
     const { token } = this.status.value;
     this.status.set({ error: null, progress: null, tets: null, connection: { state: 'connecting' } });
-    this.view = wanted.view;
+    this.wanted = wanted;
     this.sentView = null;
     this.sendView();
     this.send({ type: 'open', url: streamUrl(), dataset, ...(token === null ? {} : { token }) });
-    this.plane = this.sentPlane = wanted.plane;
+    this.sentPlane = wanted.plane;
     this.isAwaitingCap = false;
     this.send({ type: 'clip', plane: wanted.plane });
-    this.tetsBox = wanted.tetsBox;
     this.send({ type: 'tets', box: wanted.tetsBox });
-    this.edges = wanted.edges;
     this.send({ type: 'edges', wanted: wanted.edges });
   }
 
   // Sends what differs from what was wanted before.
   update(wanted: Wanted): void {
-    this.setView(wanted.view);
-    this.plane = wanted.plane;
+    const last = this.wanted;
+    this.wanted = wanted;
+    this.requestView();
     this.requestCap();
-    this.setTetsBox(wanted.tetsBox);
-    if (wanted.edges === this.edges) return;
-    this.edges = wanted.edges;
-    this.send({ type: 'edges', wanted: wanted.edges });
+    if (!sameJson(wanted.tetsBox, last?.tetsBox ?? null)) this.requestTets();
+    if (wanted.edges !== (last?.edges ?? false)) this.send({ type: 'edges', wanted: wanted.edges });
   }
 
   // Sends at once, or when the interval since the last one is over: the last view of a motion is always sent.
-  private setView(view: View): void {
-    this.view = view;
-    if (this.viewTimer !== 0 || sameJson(view, this.sentView)) return;
+  private requestView(): void {
+    if (this.viewTimer !== 0 || sameJson(this.wanted?.view, this.sentView)) return;
     const wait = this.nextViewAt - performance.now();
     if (wait <= 0) return this.sendView();
     this.viewTimer = window.setTimeout(() => this.sendView(), wait);
@@ -102,28 +95,27 @@ export class WorkerClient {
   private sendView(): void {
     window.clearTimeout(this.viewTimer);
     this.viewTimer = 0;
-    if (!this.view || sameJson(this.view, this.sentView)) return;
-    this.sentView = this.view;
+    if (!this.wanted || sameJson(this.wanted.view, this.sentView)) return;
+    this.sentView = this.wanted.view;
     this.nextViewAt = performance.now() + kIntervalMs;
-    this.send({ type: 'view', view: this.view });
+    this.send({ type: 'view', view: this.sentView });
   }
 
-  private setTetsBox(box: Box | null): void {
-    if (sameJson(box, this.tetsBox)) return;
-    this.tetsBox = box;
+  private requestTets(): void {
     if (this.tetsTimer !== 0) return;
     this.tetsTimer = window.setTimeout(() => {
       this.tetsTimer = 0;
-      this.send({ type: 'tets', box: this.tetsBox });
+      this.send({ type: 'tets', box: this.wanted!.tetsBox });
     }, kIntervalMs);
   }
 
   // One request at a time: the latest plane is sent when the last one was answered.
   private requestCap(): void {
-    if (this.isAwaitingCap || sameJson(this.plane, this.sentPlane)) return;
-    this.sentPlane = this.plane;
+    const plane = this.wanted?.plane ?? null;
+    if (this.isAwaitingCap || sameJson(plane, this.sentPlane)) return;
+    this.sentPlane = plane;
     this.isAwaitingCap = true;
-    this.send({ type: 'clip', plane: this.plane });
+    this.send({ type: 'clip', plane });
   }
 
   private receive(report: Report): void {
