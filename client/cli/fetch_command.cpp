@@ -92,9 +92,8 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const M
 }
 
 Result<void> run(const FetchCommand& options) {
-  auto url = parse_url(options.url);
+  const auto url = parse_url(options.url, options.access);
   if (!url) return tl::unexpected(url.error());
-  url->access = options.access;
   if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;

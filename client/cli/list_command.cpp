@@ -36,9 +36,8 @@ std::string line_of(const nlohmann::ordered_json& dataset) {
 }
 
 Result<void> list(const ListOptions& options) {
-  auto url = parse_url(options.url);
+  const auto url = parse_url(options.url, options.access);
   if (!url) return tl::unexpected(url.error());
-  url->access = options.access;
   if (!url->name.empty()) return misuse("list expects a server without the name of a data set: " + url->server());
   const auto body = http_get(*url, "/api/datasets");
   if (!body) return tl::unexpected(body.error());

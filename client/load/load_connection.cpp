@@ -16,7 +16,6 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
-using asio::ip::tcp;
 
 constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
@@ -37,7 +36,7 @@ asio::awaitable<bool> LoadConnection::open() {
     co_return false;
   }
   beast::error_code ignored;
-  stream.socket().set_option(tcp::no_delay(true), ignored);
+  stream.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
   if (plan_.tls) {
     stream.use_tls(plan_.tls, plan_.url.host);
     if (const auto [error] = co_await stream.async_handshake(kAwait); error) {

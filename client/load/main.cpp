@@ -33,9 +33,8 @@ Result<void> check_report(const LoadReport& report) {
 }
 
 Result<void> run(const LoadCommand& options) {
-  auto url = parse_url(options.url);
+  const auto url = parse_url(options.url, options.access);
   if (!url) return tl::unexpected(url.error());
-  url->access = options.access;
   if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
   const auto report = run_load(*url, options.load);
   if (!report) return tl::unexpected(report.error());

@@ -14,7 +14,6 @@
 namespace intervale {
 namespace {
 
-namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
@@ -107,7 +106,7 @@ Result<StreamConnection> StreamConnection::open(const ServerUrl& url) {
 
 Result<void> StreamConnection::send(ClientSession& session) {
   for (const auto& message : session.take_messages()) {
-    const auto error = socket_->run([&](auto done) { socket_->ws.async_write(asio::buffer(message), done); });
+    const auto error = socket_->run([&](auto done) { socket_->ws.async_write(boost::asio::buffer(message), done); });
     if (error) return socket_->lost(error);
   }
   return {};

@@ -1,19 +1,12 @@
 #include "client/net/url.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <charconv>
 #include <cstdint>
 
 namespace intervale {
 namespace {
-
-struct Scheme {
-  std::string_view text;
-  bool secure;
-};
-constexpr std::array<Scheme, 2> kSchemes{{{"ws://", false}, {"wss://", true}}};
 
 bool is_host(std::string_view host, bool bracketed) {
   if (bracketed && host.find(':') == std::string_view::npos) return false;  // only an IPv6 address has brackets
@@ -45,15 +38,15 @@ std::string percent_decoded(std::string_view text) {
 
 std::string ServerUrl::authority() const { return (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + port; }
 
-Result<ServerUrl> parse_url(std::string_view text) {
+Result<ServerUrl> parse_url(std::string_view text, Access access) {
   const auto wrong = [text](const char* what) {
     return misuse("invalid URL '" + std::string(text) + "': " + what + "; expected ws://host:port or ws://host:port/name");
   };
-  const auto* const scheme = std::find_if(kSchemes.begin(), kSchemes.end(), [text](const Scheme& one) { return text.starts_with(one.text); });
-  if (scheme == kSchemes.end()) return wrong("it does not begin with ws:// or wss://");
-  std::string_view rest = text.substr(scheme->text.size());
   ServerUrl url;
-  url.secure = scheme->secure;
+  url.access = std::move(access);
+  url.secure = text.starts_with("wss://");
+  if (!url.secure && !text.starts_with("ws://")) return wrong("it does not begin with ws:// or wss://");
+  std::string_view rest = text.substr(text.find("//") + 2);
   if (const auto slash = rest.find('/'); slash != std::string_view::npos) {
     url.name = rest.substr(slash + 1);
     rest = rest.substr(0, slash);

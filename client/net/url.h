@@ -29,7 +29,7 @@ struct ServerUrl {
 
 // Parses "ws://host:port" or "ws://host:port/name"; wss:// for TLS. An IPv6 address is in brackets. The default port is
 // 80, or 443 with TLS. The name is percent-decoded; a % without two hexadecimal digits after it stays. Anything else is
-// Error::usage.
-[[nodiscard]] Result<ServerUrl> parse_url(std::string_view text);
+// Error::usage. access: of the result.
+[[nodiscard]] Result<ServerUrl> parse_url(std::string_view text, Access access = {});
 
 }  // namespace intervale

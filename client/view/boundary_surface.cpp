@@ -19,7 +19,6 @@ using Position = FrontMesher::Position;
 
 // Volumes are summed up in cubes of samples / kSteps.
 constexpr double kStepsCubed = double(FrontMesher::kSteps) * FrontMesher::kSteps * FrontMesher::kSteps;
-double in_world(double volume, const Grid& grid) { return volume * grid.spacing[0] * grid.spacing[1] * grid.spacing[2] / kStepsCubed; }
 
 constexpr int kCellsAcross = 8;  // pieces along the virtual grid's side, at most
 constexpr int kLeastCell = 16;   // samples
@@ -319,16 +318,11 @@ BoundarySurface::Change BoundarySurface::all() {
   return change;
 }
 
-double BoundarySurface::volume() const {
+double BoundarySurface::in_world(double Part::*volume) const {
   double sum = 0;
-  for (const Part& part : parts_) sum += part.volume;
-  return in_world(sum, mesher_.state().grid);
-}
-
-double BoundarySurface::volume_bound() const {
-  double sum = 0;
-  for (const Part& part : parts_) sum += part.bound;
-  return in_world(sum, mesher_.state().grid);
+  for (const Part& part : parts_) sum += part.*volume;
+  const auto& spacing = mesher_.state().grid.spacing;
+  return sum * spacing[0] * spacing[1] * spacing[2] / kStepsCubed;
 }
 
 }  // namespace intervale

@@ -54,11 +54,11 @@ class BoundarySurface {
 
   // As of the last update.
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
-  [[nodiscard]] double volume() const;  // of the mesh, world units cubed
+  [[nodiscard]] double volume() const { return in_world(&Part::volume); }  // of the mesh, world units cubed
   // How much splits can change that volume: for each tetrahedron of a diamond that can be split and whose vertices lie
   // on different sides, the larger of its part in the mesh and the rest. Surfaces inside diamonds whose vertices all
   // lie on one side are not known and not counted. 0 when everything is split.
-  [[nodiscard]] double volume_bound() const;
+  [[nodiscard]] double volume_bound() const { return in_world(&Part::bound); }
 
   // What the mesh is made of, and its points.
   [[nodiscard]] const FrontMesher& mesher() const { return mesher_; }
@@ -79,6 +79,7 @@ class BoundarySurface {
     std::vector<Triangle> triangles;
   };
 
+  [[nodiscard]] double in_world(double Part::*volume) const;  // the sum of all parts
   void forget_all();
   std::vector<std::uint8_t> find_changes();
   void mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const;
