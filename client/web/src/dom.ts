@@ -19,10 +19,9 @@ export function setText(target: Element, text: string): void {
 }
 
 type Tags = HTMLElementTagNameMap;
-type Tag = keyof Tags;
 
 // A new element with these properties and children.
-export function create<T extends Tag>(tag: T, properties: Partial<Tags[T]>, ...children: (Node | string)[]): Tags[T] {
+export function create<T extends keyof Tags>(tag: T, properties: Partial<Tags[T]>, ...children: (Node | string)[]): Tags[T] {
   const made = Object.assign(document.createElement(tag), properties);
   made.append(...children);
   return made;

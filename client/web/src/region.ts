@@ -137,10 +137,7 @@ export class RegionControls {
       label: `Move the region's ${end === 'min' ? 'lower' : 'upper'} ${kAxisNames[axis]} face`,
       position: () => {
         const now = region();
-        if (!now) return null;
-        const at = center(now);
-        at[axis] = now[end][axis]!;
-        return at;
+        return now && (center(now).map((c, i) => (i === axis ? now[end][i]! : c)) as Vec3);
       },
       grab: () => {
         const from = region()!;

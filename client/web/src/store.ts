@@ -9,10 +9,8 @@ export class Store<T extends object> {
   }
 
   set(change: Partial<T>): void {
-    const changed = new Set<keyof T>();
-    for (const key of Object.keys(change) as (keyof T)[]) {
-      if (!Object.is(this.current[key], change[key])) changed.add(key);
-    }
+    const names = Object.keys(change) as (keyof T)[];
+    const changed = new Set(names.filter((name) => !Object.is(this.current[name], change[name])));
     if (changed.size === 0) return;
     this.current = { ...this.current, ...change };
     for (const watcher of this.watchers) watcher(this.current, changed);

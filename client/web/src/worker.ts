@@ -20,33 +20,26 @@ async function handle(request: Request): Promise<void> {
       session?.close();
       session = new StreamSession(loaded, request, extras, report);
       if (view) session.look(view);
-      break;
+      return;
     case 'view':
       view = request.view;
-      session?.look(view);
-      break;
+      return session?.look(view);
     case 'clip':
       extras.plane = request.plane;
-      session?.sendCap();
-      break;
+      return session?.sendCap();
     case 'tets':
       extras.box = request.box;
-      session?.sendTets();
-      break;
+      return session?.sendTets();
     case 'edges':
-      if (extras.edges === request.wanted) break;
+      if (extras.edges === request.wanted) return;
       extras.edges = request.wanted;
-      session?.remake();
-      break;
+      return session?.remake();
     case 'shown':
-      session?.pageShows(request.version);
-      break;
+      return session?.pageShows(request.version);
     case 'save':
-      session?.save(request.format);
-      break;
+      return session?.save(request.format);
     case 'digest':
-      session?.digest();
-      break;
+      return session?.digest();
   }
 }
 
