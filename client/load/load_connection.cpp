@@ -1,13 +1,12 @@
 #include "client/load/load_connection.h"
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/connect.hpp>
-#include <boost/asio/use_awaitable.hpp>
 
 #include "client/core/backoff.h"
 #include "client/net/blocking_connection.h"
 #include "client/net/connection.h"
 #include "protocol/messages.h"
+#include "protocol/transport/await.h"
 
 namespace intervale {
 namespace {
@@ -16,8 +15,6 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
-
-constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 }  // namespace
 

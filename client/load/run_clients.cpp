@@ -1,14 +1,12 @@
 #include "client/load/run_clients.h"
 
 #include <algorithm>
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core.hpp>
 #include <chrono>
 #include <exception>
@@ -19,6 +17,7 @@
 #include "client/core/client_session.h"
 #include "client/load/load_connection.h"
 #include "client/load/load_views.h"
+#include "protocol/transport/await.h"
 
 namespace intervale {
 namespace {
@@ -28,8 +27,6 @@ namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 using asio::ip::tcp;
 using Time = LoadClock::time_point;
-
-constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 CameraPath path_of(const LoadPlan& plan, unsigned client) {
   return {.scenario = plan.scenario,

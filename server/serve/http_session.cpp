@@ -2,11 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/http/span_body.hpp>
@@ -17,6 +15,7 @@
 #include <utility>
 
 #include "protocol/messages.h"
+#include "protocol/transport/await.h"
 #include "server/serve/websocket_session.h"
 
 namespace intervale {
@@ -26,7 +25,6 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 
-constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 constexpr std::chrono::seconds kKeepAliveTime{30};  // between requests
 constexpr std::chrono::seconds kWriteTime{30};
 constexpr std::chrono::milliseconds kShutdownTime{1000};

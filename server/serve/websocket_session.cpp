@@ -3,11 +3,9 @@
 // sent, so a slow client costs the memory of one message, and no time of other sessions.
 #include "server/serve/websocket_session.h"
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
 #include <optional>
@@ -15,6 +13,7 @@
 #include <utility>
 
 #include "protocol/codec.h"
+#include "protocol/transport/await.h"
 #include "server/serve/admission.h"
 #include "server/serve/log.h"
 #include "server/serve/session_state.h"
@@ -34,8 +33,6 @@ using Request = http::request<http::empty_body>;
 constexpr std::chrono::seconds kMaxPingBacklog{1};  // how far pings may exceed the message rate
 // Payloads while other sessions wait for a worker: the first of a view, and the others.
 constexpr std::size_t kContendedFirstPayload = 4 << 10, kContendedPayload = 16 << 10;
-
-constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
  public:
