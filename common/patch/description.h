@@ -43,6 +43,9 @@ struct Description {
   friend bool operator==(const Description&, const Description&) = default;
 };
 
+// Checks a grid from outside: sides within bounds, a box that is finite and not flat.
+[[nodiscard]] Result<void> check_grid(const Grid& grid);
+
 // Checks a description from outside: sides within bounds, a box that is finite and not flat, a valid range, a finite
 // error. decode_root_patch checks the root patch.
 [[nodiscard]] Result<void> check_description(const Description& description);

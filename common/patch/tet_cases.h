@@ -53,6 +53,7 @@ class Ring {
     belt_ |= (belt_ & 3) << (2 * belt);  // the ring closes
   }
   [[nodiscard]] unsigned tet(int i) const { return ends_[0] | ends_[1] << 2 | (belt_ >> (2 * i) & 15) << 4; }
+  [[nodiscard]] unsigned belt_pair(int i) const { return belt_ >> (2 * i) & 15; }
   [[nodiscard]] unsigned half(int i, int end) const { return ends_[end] | centre_ << 2 | (belt_ >> (2 * i) & 15) << 4; }
 
  private:

@@ -10,15 +10,9 @@
 #include <vector>
 
 #include "common/diamond/grid.h"
+#include "common/patch/sample_type.h"
 
 namespace intervale {
-
-enum class SampleType : std::uint8_t { u8, i8, u16, i16, u32, i32, f32, f64 };
-// Their C++ types, in the same order.
-using SampleTypes = std::tuple<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, std::uint32_t, std::int32_t, float, double>;
-
-[[nodiscard]] std::size_t size_of(SampleType type);  // bytes
-[[nodiscard]] const char* name_of(SampleType type);  // "u8", "i8", ...
 
 // Samples in the machine's byte order, x fastest, then y, then z; bytes.size() = grid.sample_count() * size_of(type).
 struct Volume {

@@ -1,4 +1,4 @@
-#include "server/volume/volume.h"
+#include "common/patch/sample_type.h"
 
 #include <array>
 
