@@ -29,5 +29,7 @@ struct DiamondParts {
 // local vertex; of halves, also for the centre.
 [[nodiscard]] std::uint64_t count_tets(const Domain& domain, const Diamond& d, const DiamondParts& parts, std::uint32_t sides);
 [[nodiscard]] std::uint64_t count_halves(const Domain& domain, const Diamond& d, const DiamondParts& parts, std::uint32_t sides);
+// The second less the first.
+[[nodiscard]] std::int64_t count_added(const Domain& domain, const Diamond& d, const DiamondParts& parts, std::uint32_t sides);
 
 }  // namespace intervale

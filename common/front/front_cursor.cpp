@@ -1,17 +1,21 @@
 #include "common/front/front_cursor.h"
 
+#include <algorithm>
+
 #include "common/util/bits.h"
 
 namespace intervale {
 
-const FrontState::Block* BlockFinder::none() {
-  static const FrontState::Block block{};
+template <class State>
+typename BlockFinderOf<State>::Found BlockFinderOf<State>::none() {
+  static FrontState::Block block{};  // nobody changes it: it has no splits
   return &block;
 }
 
-const FrontState::Block* BlockFinder::find(int where, const SupercubePlace& place) const {
+template <class State>
+typename BlockFinderOf<State>::Found BlockFinderOf<State>::find(int where, const SupercubePlace& place) const {
   if (where == kHere) return here_ == nullptr ? none() : here_;
-  const bool is_cached = where < kCorner && here_ != nullptr;
+  const bool is_cached = where < kFiner && here_ != nullptr;
   if (is_cached) {
     if (const std::uint32_t number = here_->neighbours.load(where); number != NeighbourCache::kUnknown) return &state_.blocks[number - 1];
   }
@@ -22,9 +26,12 @@ const FrontState::Block* BlockFinder::find(int where, const SupercubePlace& plac
   return &state_.blocks[number];
 }
 
+template class BlockFinderOf<const FrontState>;
+template class BlockFinderOf<FrontState>;
+
 void FrontCursor::move_to(int scale, Vertex position) {
   neighbours_.move_to(scale, position);
-  is_interior_ = is_interior(state_.domain, scale, position);
+  is_interior_ = intervale::is_interior(state_.domain, scale, position);
 }
 
 void FrontCursor::move_to(const Diamond& d) {
@@ -32,7 +39,7 @@ void FrontCursor::move_to(const Diamond& d) {
   move_to(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
 }
 
-bool FrontCursor::gather(Slot slot) {
+bool FrontCursor::gather_parts(Slot slot) {
   slot_ = slot;
   const DiamondType& row = diamond_type(kTypeOfSlot[std::size_t(slot)]);
   if (scale() >= state_.domain.levels()) return false;
@@ -41,16 +48,31 @@ bool FrontCursor::gather(Slot slot) {
   if (parts_.tets == 0) return false;
   context_.row = &row;
   context_.vertices = parts_.vertices;
+  return true;
+}
+
+void FrontCursor::gather_own(Slot slot) {
+  gather_parts(slot);
+  context_.sides = here().of[std::size_t(slot)].vertex_sides(context_.pairs());
+}
+
+bool FrontCursor::gather_sides(Slot slot) {
+  if (!gather_parts(slot)) return false;
   const Links& links = neighbours_.links(slot);
   std::uint32_t sides = 0;
-  for (int v = 0; v < row.vertices; ++v) {
+  for (int v = 0; v < context_.row->vertices; ++v) {
     if (!(parts_.vertices >> v & 1)) continue;
     const Neighbour vertex = at(links.vertex[std::size_t(v)]);
     if (!vertex.is_split()) return false;
-    split_[std::size_t(v)] = vertex.split();
-    sides |= std::uint32_t(vertex.split().side()) << (2 * v);
+    sides |= std::uint32_t(state_.values ? vertex.block.side(vertex.slot) : vertex.split().side()) << (2 * v);
   }
   context_.sides = sides;
+  return true;
+}
+
+bool FrontCursor::gather_splits() {
+  const Links& links = this->links();
+  for (const int v : set_bits(parts_.vertices)) split_[std::size_t(v)] = at(links.vertex[std::size_t(v)]).split();
   return true;
 }
 
@@ -87,6 +109,11 @@ bool FrontCursor::has_child_in(std::uint64_t Block::*slots) {
   return false;
 }
 
+bool FrontCursor::has_shown_child() {
+  const std::span<const Link> children = neighbours_.children(slot_);
+  return std::any_of(children.begin(), children.end(), [this](Link child) { return at(child).is_shown(); });
+}
+
 const DiamondContext& FrontCursor::gather_cuts() {
   if (!context_.is_mixed()) {  // no edge is cut
     context_.cut = {};
@@ -114,8 +141,7 @@ std::int64_t FrontCursor::added_tets(const Split& split) const {
   if (!parts_.straddles && split.cut_bits() == 0) {  // all on one side: every tetrahedron inside becomes two
     return split.side() == Side::inside ? std::popcount(parts_.tets) : 0;
   }
-  const std::uint32_t sides = context_.sides | std::uint32_t(split.side()) << (2 * kCentre);
-  return std::int64_t(count_halves(state_.domain, *diamond_, parts_, sides)) - std::int64_t(count_tets(state_.domain, *diamond_, parts_, sides));
+  return count_added(state_.domain, *diamond_, parts_, context_.sides | std::uint32_t(split.side()) << (2 * kCentre));
 }
 
 }  // namespace intervale

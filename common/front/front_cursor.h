@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <type_traits>
 
 #include "common/codec/prediction.h"
 #include "common/diamond/diamond.h"
@@ -15,21 +16,27 @@
 
 namespace intervale {
 
-// Finds the blocks of a front. Never null: for a supercube without splits a block without any.
-class BlockFinder {
+// Finds the blocks of a front. Never null: for a supercube without splits a block without any. State: FrontState, const
+// if the blocks are only read.
+template <class State>
+class BlockFinderOf {
  public:
   static constexpr bool kImmutable = false;
-  using Found = const FrontState::Block*;
-  explicit BlockFinder(const FrontState& state) : state_(state) {}
-  void move_to(int scale, Vertex position) { here_ = state_.find_block(scale, position); }
+  using Found = std::conditional_t<std::is_const_v<State>, const FrontState::Block*, FrontState::Block*>;
+  explicit BlockFinderOf(State& state) : state_(state) {}
+  void move_to(int scale, Vertex position) {
+    const std::uint32_t number = state_.find_number(scale, position);
+    here_ = number == FrontState::kNone ? nullptr : &state_.blocks[number];
+  }
   void set_here(Found block) { here_ = block; }
   [[nodiscard]] Found find(int where, const SupercubePlace& place) const;
   [[nodiscard]] static Found none();
 
  private:
-  const FrontState& state_;
+  State& state_;
   Found here_ = nullptr;  // null if there is none
 };
+using BlockFinder = BlockFinderOf<const FrontState>;
 
 // Sees the state as it was when the cursor last moved, and splits that Front::split made through this cursor since. One
 // thread at a time.
@@ -46,7 +53,12 @@ class FrontCursor {
 
   // Finds the diamond in a slot if it exists and all its vertices' diamonds are split: if it is split, or in the front
   // with all its tetrahedra. The functions below are of the diamond found last.
-  bool gather(Slot slot);
+  bool gather(Slot slot) { return gather_sides(slot) && gather_splits(); }
+  // The same without split_of and what needs it.
+  bool gather_sides(Slot slot);
+  // Finds the diamond in a slot whose own split is there, with its cuts. Its vertices' sides follow from those; split_of
+  // is left as it is.
+  void gather_own(Slot slot);
   // The same, if it can be split now.
   bool find(Slot slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
 
@@ -56,6 +68,13 @@ class FrontCursor {
   [[nodiscard]] const Links& links() const { return neighbours_.links(slot_); }
   // Of the vertex's diamond
   [[nodiscard]] const Split& split_of(int vertex) const { return split_[std::size_t(vertex)]; }
+  // Of a front split by values: the key of the value at a vertex that exists, and at the centre of a diamond that is
+  // split.
+  [[nodiscard]] ValueKey key_of(int vertex) {
+    const Neighbour found = at(links().vertex[std::size_t(vertex)]);
+    return found.block.key[std::size_t(found.slot)];
+  }
+  [[nodiscard]] ValueKey centre_key() { return here().key[std::size_t(slot_)]; }
   // Its cuts may be those of another diamond
   [[nodiscard]] const DiamondContext& context() const { return context_; }
   // The same, with its own cuts
@@ -63,9 +82,16 @@ class FrontCursor {
   [[nodiscard]] bool is_split() { return here().is_split(slot_); }
   [[nodiscard]] bool is_shown() { return here().is_shown(slot_); }
   [[nodiscard]] bool is_noop() const { return parts_.straddles && state_.domain.is_noop(*diamond_); }
+  // Whether a split of it is possible, or was: all parents that exist are split, and it would change something. The
+  // diamond is found if not all its supercube is inside the box.
+  [[nodiscard]] bool is_splittable(Slot slot) { return parents_are_split(slot) && (is_interior_ || (gather_sides(slot) && !is_noop())); }
   [[nodiscard]] bool parents_are_shown();
   // Whether the diamond handed tetrahedra to a child whose split is in `slots`: &Block::split or &Block::shown.
   [[nodiscard]] bool has_child_in(std::uint64_t Block::*slots);
+  // Whether a child's split is shown: one by its place, whether it was handed tetrahedra or not.
+  [[nodiscard]] bool has_shown_child();
+  // Whether all diamonds of the supercube lie inside the box.
+  [[nodiscard]] bool is_interior() const { return is_interior_; }
   // How many tetrahedra the mesh gains by this split of it; less than 0 if it loses some.
   [[nodiscard]] std::int64_t added_tets(const Split& split) const;
 
@@ -91,6 +117,8 @@ class FrontCursor {
 
  private:
   [[nodiscard]] bool parents_are_split(Slot slot);
+  bool gather_splits();
+  bool gather_parts(Slot slot);
 
   const FrontState& state_;
   SupercubeNeighbours<BlockFinder> neighbours_;

@@ -8,6 +8,7 @@
 
 #include "common/front/front.h"
 #include "common/front/front_mesher.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 namespace {
@@ -21,7 +22,8 @@ class FrontMesh {
       : state_(state),
         mesher_(state),
         parallel_(parallel),
-        pieces_((state.blocks.size() + kPiece - 1) / kPiece),
+        shown_(numbers_of_shown(state)),
+        pieces_((shown_.size() + kPiece - 1) / kPiece),
         used_(state.q.size()),
         number_(state.q.size()) {}
 
@@ -39,6 +41,7 @@ class FrontMesh {
     Mesh mesh;
     mesh.points.resize(points);
     mesh.surface.resize(points);
+    if (state_.values) mesh.value.resize(points);
     mesh.tets.resize(state_.tet_count);
     parallel_(pieces_, [&](std::size_t piece) { place_points(piece, mesh); });
     place_tets(mesh);
@@ -47,13 +50,24 @@ class FrontMesh {
 
  private:
   static constexpr std::size_t kPiece = 32;  // supercubes
-  static constexpr std::size_t kPiecesAtOnce = 64;
+  static constexpr std::size_t kPiecesAtOnce = 16;
+
+  // The supercubes of which something is shown. The first has the corners.
+  static std::vector<std::size_t> numbers_of_shown(const FrontState& state) {
+    std::vector<std::size_t> numbers;
+    std::size_t number = 0;
+    for (const FrontState::Block& block : state.blocks) {
+      if (block.shown != 0) numbers.push_back(number);
+      ++number;
+    }
+    return numbers;
+  }
 
   // Calls visit(number) for the supercubes of a piece.
   template <class Visit>
   void for_each_supercube(std::size_t piece, const Visit& visit) const {
-    const std::size_t end = std::min(state_.blocks.size(), (piece + 1) * kPiece);
-    for (std::size_t number = piece * kPiece; number < end; ++number) visit(number);
+    const std::size_t end = std::min(shown_.size(), (piece + 1) * kPiece);
+    for (std::size_t i = piece * kPiece; i < end; ++i) visit(shown_[i]);
   }
 
   // Marks all points that splits brought, but for those on the border.
@@ -83,7 +97,7 @@ class FrontMesh {
   void use_border() {
     std::vector<Tet> tets;
     std::vector<FrontMesher::Point> points;
-    for (std::size_t number = 0; number < state_.blocks.size(); ++number) {
+    for (const std::size_t number : shown_) {
       if (!mesher_.is_at_border(number)) continue;
       mesher_.append_points(number, points);
       tets.clear();
@@ -125,8 +139,23 @@ class FrontMesh {
         const std::uint32_t n = number_[p.id];
         for (int i = 0; i < 3; ++i) mesh.points[n][i] = grid.origin[i] + grid.spacing[i] * p.position[i] * (1.0 / FrontMesher::kSteps);
         mesh.surface[n] = p.surface;
+        if (state_.values && p.surface != Surface::inside) {
+          mesh.value[n] = p.surface == Surface::alpha ? state_.values->range.alpha : state_.values->range.beta;
+        }
       }
+      if (state_.values) place_values(number, mesh);
     });
+  }
+
+  // The values of a supercube's centres that are points.
+  void place_values(std::size_t number, Mesh& mesh) const {
+    const auto place_centre = [&](const FrontState::Block& block, Slot slot) {
+      const PointId id = block.of[slot].centre();
+      if (used_[id]) mesh.value[number_[id]] = state_.values->format.value(block.key[slot]);
+    };
+    const FrontState::Block& block = mesher_.block(number);
+    for (const Slot slot : set_bits<Slot>(block.shown & block.inside)) place_centre(block, slot);
+    if (number == 0 && state_.origin.side(Slot()) == Side::inside) place_centre(state_.origin, Slot());
   }
 
   // A few pieces at a time: their tetrahedra are copied to their place while they are still in a cache.
@@ -149,6 +178,7 @@ class FrontMesh {
   const FrontState& state_;
   const FrontMesher mesher_;
   const ParallelFor& parallel_;
+  std::vector<std::size_t> shown_;
   std::size_t pieces_;
   std::vector<std::uint8_t> used_;                 // by PointId: 1 for those of the mesh
   std::vector<std::uint32_t> number_;              // in the mesh, by PointId

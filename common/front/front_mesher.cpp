@@ -8,6 +8,18 @@
 namespace intervale {
 namespace {
 
+// Of each class: the edges at each vertex, a bit each.
+constexpr std::array<std::array<std::uint32_t, kMaxVertices>, 3> kEdgesAt = [] {
+  std::array<std::array<std::uint32_t, kMaxVertices>, 3> tables{};
+  constexpr std::array<int, 3> belts{6, 4, 8};
+  for (std::size_t cls = 0; cls < 3; ++cls) {
+    for (int e = 0; e < 1 + 3 * belts[cls]; ++e) {
+      for (const int end : edge_ends(e, belts[cls])) tables[cls][std::size_t(end)] |= 1u << e;
+    }
+  }
+  return tables;
+}();
+
 struct OwnIds {  // numbers points by their ids
   PointId operator[](PointId id) const { return id; }
 };
@@ -104,6 +116,18 @@ inline void FrontMesher::append_patch(std::vector<Tet>& tets, const TetShape& sh
   }
 }
 
+// A bit for each child whose split is not shown.
+unsigned FrontMesher::children_not_shown(FrontCursor& cursor, Slot slot) {
+  const std::span<const Link> children = cursor.children(slot);
+  if (cursor.scale() == 0 && class_of_slot(slot) == 2) return (1u << children.size()) - 1;  // leaves, which are never split
+  unsigned some = 0, bit = 1;
+  for (const Link link : children) {
+    if (!cursor.at(link).is_shown()) some |= bit;
+    bit <<= 1;
+  }
+  return some;
+}
+
 template <class Numbers>
 void FrontMesher::append(const Output<Numbers>& out, std::size_t number) const {
   if (state_.is_root_block(block(number))) {
@@ -114,12 +138,10 @@ void FrontMesher::append(const Output<Numbers>& out, std::size_t number) const {
   FrontCursor cursor(state_);
   cursor.move_to(block(number).scale, block(number).position);
   for (const Slot slot : set_bits<Slot>(block(number).shown)) {
-    unsigned unsplit = 0, bit = 1;  // a bit for each child whose split is not shown
-    for (const Link link : cursor.children(slot)) {
-      if (!cursor.at(link).is_shown()) unsplit |= bit;
-      bit <<= 1;
-    }
-    if (unsplit != 0 && cursor.gather(slot)) append_children(out, cursor, unsplit);
+    const unsigned unsplit = children_not_shown(cursor, slot);
+    if (unsplit == 0) continue;
+    cursor.gather_own(slot);
+    append_children(out, cursor, unsplit);
   }
 }
 
@@ -141,18 +163,23 @@ void FrontMesher::append_root(const Output<Numbers>& out) const {
 }
 
 template <class Numbers>
-void FrontMesher::gather_points(const FrontCursor& cursor, const Numbers& numbers, PointsAround& points) {
+void FrontMesher::gather_points(FrontCursor& cursor, const Numbers& numbers, PointsAround& points) {
   const DiamondContext& context = cursor.context();
-  for (int v = 0; v < context.row->vertices; ++v) {
-    if (context.has(v) && context.side(v) == Side::inside) points[v] = numbers[cursor.split_of(v).centre()];
-  }
-  if (!context.is_mixed()) return;
   const Links& links = cursor.links();
-  for (const int e : set_bits(cursor.parts().edges)) {
+  const auto& edges_at = kEdgesAt[context.row->cls];
+  std::uint32_t alpha = 0, beta = 0;  // the edges that each surface cuts: exactly one end is below, or above
+  for (const int v : set_bits(context.vertices)) {
+    const Side side = context.side(v);
+    if (side == Side::inside) {
+      points[v] = numbers[cursor.at(links.vertex[v]).split().centre()];
+    } else {
+      (side == Side::below ? alpha : beta) ^= edges_at[v];
+    }
+  }
+  for (const int e : set_bits((alpha | beta) & cursor.parts().edges)) {
     const Links::Edge edge = links.edge[e];
-    const FrontState::Split& owner = cursor.split_of(edge.owner);
+    const FrontState::Split& owner = cursor.at(links.vertex[edge.owner]).split();
     const unsigned surfaces = owner.cuts_to(edge.other);
-    if (surfaces == 0) continue;
     PointId id = owner.cut(2 * edge.other);
     if (surfaces & 1) points[kCutsFrom + 2 * e] = numbers[id++];
     if (surfaces & 2) points[kCutsFrom + 2 * e + 1] = numbers[id];

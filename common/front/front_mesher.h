@@ -83,8 +83,9 @@ class FrontMesher {
   static Corners corners_of(const TetShape& s);
   static const HalfCorners& half_corners();
   template <class Numbers>
-  static void gather_points(const FrontCursor& cursor, const Numbers& numbers, PointsAround& points);
+  static void gather_points(FrontCursor& cursor, const Numbers& numbers, PointsAround& points);
 
+  static unsigned children_not_shown(FrontCursor& cursor, Slot slot);
   [[nodiscard]] bool is_on_border(Vertex v) const;
   template <class Numbers>
   void append(const Output<Numbers>& out, std::size_t number) const;

@@ -25,16 +25,22 @@ FrontState::Block& FrontState::obtain_block(int scale, Vertex position) {
   return blocks[place->second];
 }
 
-std::size_t FrontState::memory_bytes() const { return blocks.size() * sizeof(Block) + index.bucket_count() * 17 + q.capacity(); }
+std::size_t FrontState::memory_bytes() const {
+  std::size_t bytes = blocks.size() * sizeof(Block) + index.bucket_count() * 17 + q.capacity();
+  for (const Block& block : blocks) bytes += block.key.memory_bytes();
+  return bytes;
+}
 
 void FrontState::pack() {
   std::deque<Block> kept;
   std::vector<std::uint8_t> kept_q;
   const auto pack_cuts = [&](Block& block) {
     block.neighbours = {};
+    const std::uint64_t with_cuts = values ? block.shown : block.split;
+    block.placed = with_cuts;
     for (Slot slot{0}; slot < kSlots; ++slot) {
       Split& s = block.of[std::size_t(slot)];
-      if (!block.is_split(slot)) {
+      if (!(with_cuts >> slot & 1)) {
         s = {};
         continue;
       }

@@ -1,4 +1,4 @@
-// The data of a front: the split diamonds by supercube, their cuts, and counts.
+// The data of a front: the split diamonds by supercube, their values or cuts, and counts.
 //
 // Weiss and De Floriani 2008, sections 6 and 7. In the paper each diamond of the front holds its vertices and edges,
 // and a split hands each child its duet. Here what a split brought (the side of the centre, the cuts on the subdivision
@@ -6,13 +6,20 @@
 // ancestors' splits (supercube_neighbours.h). A split then writes eight bytes and its cuts, a merge clears one bit, and
 // the front itself is implied.
 //
+// A front is split by cuts or by values. One that is split by values has FrontState::values. It keeps the key of the
+// value at each split diamond's centre, and derives sides and cuts from the keys. Only shown splits have cuts and
+// points, so that a front may hold far more than it shows.
+//
 // Invariants, which Front keeps and Front::validate checks:
 //   1. Of each split diamond, all parents that exist are split; of each shown one, all are shown. shown is a subset of
 //      split.
-//   2. A split has the cuts that its side and its diamond's vertices call for.
+//   2. A split, or by values a shown split, has the cuts that its side and its diamond's vertices call for.
 //   3. index has the number of each block under its scale and position, and no other. A block stays where it is until
 //      pack().
 //   4. The counters are those of the splits and of the mesh that the shown ones make.
+//   5. Split by values: what is shown and does not count for the range has a child whose split is shown. If no split
+//      that counts is hidden and the mesh is not limited, every split with a shown child is shown. A child is one by
+//      its place, whether it was handed tetrahedra or not.
 #pragma once
 
 #include <array>
@@ -21,7 +28,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
+#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/diamond/diamond.h"
@@ -29,7 +39,10 @@
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
 #include "common/diamond/supercube_neighbours.h"
+#include "common/patch/description.h"
+#include "common/patch/key_sides.h"
 #include "common/patch/range.h"
+#include "common/patch/value_format.h"
 
 namespace intervale {
 
@@ -44,13 +57,52 @@ using PointId = std::uint32_t;
 class NeighbourCache {
  public:
   static constexpr std::uint32_t kUnknown = 0;
-  // The number of the block, and 1; or kUnknown. where: below kCorner.
+  // The number of the block, and 1; or kUnknown. where: below kFiner.
   [[nodiscard]] std::uint32_t load(int where) const { return __atomic_load_n(&number_[std::size_t(where)], __ATOMIC_RELAXED); }
   void store(int where, std::uint32_t number) const { __atomic_store_n(&number_[std::size_t(where)], number, __ATOMIC_RELAXED); }
 
  private:
   // No std::atomic, which cannot be copied; no std::atomic_ref, which Emscripten lacks
-  mutable std::array<std::uint32_t, kCorner> number_{};
+  mutable std::array<std::uint32_t, kFiner> number_{};
+};
+
+// What the values of a front mean, and the range that its mesh is made for.
+struct FrontValues {
+  FrontValues(const ValueFormat& of, const Range& kept, Refine how) : format(of), range(kept), refine(how), sides(of, kept) {}
+  ValueFormat format;
+  Range range;
+  Refine refine;
+  KeySides sides;              // of format and range
+  std::uint64_t withheld = 0;  // split diamonds that count for the range, but are hidden
+  bool is_limited = false;     // a split that has a shown child was hidden, for want of room
+  // Whether the mesh is all that the rule says (Front).
+  [[nodiscard]] bool is_complete() const { return withheld == 0 && !is_limited; }
+};
+
+// The keys of one supercube, by slot; without memory until the first is set.
+class BlockKeys {
+ public:
+  BlockKeys() = default;
+  BlockKeys(const BlockKeys& other) : keys_(other.keys_ ? std::make_unique<Keys>(*other.keys_) : nullptr) {}
+  BlockKeys(BlockKeys&&) noexcept = default;
+  BlockKeys& operator=(BlockKeys other) noexcept {
+    keys_ = std::move(other.keys_);
+    return *this;
+  }
+  ~BlockKeys() = default;
+  // Of a slot whose key was set.
+  [[nodiscard]] ValueKey operator[](std::size_t slot) const { return (*keys_)[slot]; }
+  void set(std::size_t slot, ValueKey key) { obtain()[slot] = key; }
+  using Keys = std::array<ValueKey, kSlots>;
+  [[nodiscard]] Keys& obtain() {
+    if (!keys_) keys_ = std::make_unique<Keys>();
+    return *keys_;
+  }
+  [[nodiscard]] const Keys* all() const { return keys_.get(); }  // or null
+  [[nodiscard]] std::size_t memory_bytes() const { return keys_ ? sizeof(Keys) : 0; }
+
+ private:
+  std::unique_ptr<Keys> keys_;
 };
 
 struct FrontState {
@@ -67,6 +119,13 @@ struct FrontState {
     [[nodiscard]] PointId cut(int bit) const { return first + PointId(count_below(bits, bit)); }
     [[nodiscard]] PointId centre() const { return first + PointId(std::popcount(cut_bits())); }
     [[nodiscard]] std::uint32_t points() const { return centre() - first + (side() == Side::inside); }
+    // The sides of the diamond's vertices, as DiamondContext has them; pairs: DiamondContext::pairs.
+    [[nodiscard]] std::uint32_t vertex_sides(std::uint32_t pairs) const {
+      const std::uint32_t alpha = bits & pairs, beta = bits >> 1 & pairs;
+      if (side() == Side::below) return (alpha & ~beta) | beta << 1;
+      if (side() == Side::inside) return (pairs & ~(alpha | beta)) | beta << 1;
+      return (beta & ~alpha) | (pairs & ~beta) << 1;
+    }
     // Which of the two surfaces cut the edge to local vertex v: bit 0 alpha, bit 1 beta.
     [[nodiscard]] unsigned cuts_to(int v) const { return bits >> (2 * v) & 3; }
   };
@@ -74,12 +133,24 @@ struct FrontState {
   struct Block {
     Vertex position;  // centre >> (scale + 2)
     std::int32_t scale = 0;
-    std::uint64_t split = 0;         // slots
-    std::uint64_t shown = 0;         // those of `split` that the mesh is made with; the others are hidden
-    std::array<Split, kSlots> of{};  // by slot
+    std::uint64_t split = 0;  // slots
+    std::uint64_t shown = 0;  // those of `split` that the mesh is made with; the others are hidden
+    // Of a front split by values: the sides of the centres of those of `split`; which of them count for the range; and
+    // which slots have points
+    std::uint64_t inside = 0, above = 0, counts = 0, placed = 0;
+    // Bounds of the keys at the centres and the vertices of the diamonds that are split, or were
+    ValueKey least = ~ValueKey(0), greatest = 0;
     NeighbourCache neighbours;
+    std::array<Split, kSlots> of{};  // by slot; by values: of those placed
+    BlockKeys key;                   // by slot, if split by values
     [[nodiscard]] bool is_split(Slot slot) const { return (split >> slot & 1) != 0; }
     [[nodiscard]] bool is_shown(Slot slot) const { return (shown >> slot & 1) != 0; }
+    [[nodiscard]] bool is_counting(Slot slot) const { return (counts >> slot & 1) != 0; }
+    [[nodiscard]] Side side(Slot slot) const { return Side((inside >> slot & 1) | (above >> slot & 1) << 1); }
+    void set_side(Slot slot, Side side) {
+      inside = (inside & ~(std::uint64_t(1) << slot)) | std::uint64_t(side == Side::inside) << slot;
+      above = (above & ~(std::uint64_t(1) << slot)) | std::uint64_t(side == Side::above) << slot;
+    }
   };
   static constexpr std::uint32_t kNone = ~std::uint32_t(0);
 
@@ -98,11 +169,13 @@ struct FrontState {
   }
   [[nodiscard]] bool is_root_block(const Block& block) const { return block.scale == domain.levels(); }
   [[nodiscard]] std::size_t memory_bytes() const;
-  // Removes blocks without splits and cuts that belong to no split. Blocks move, and points get other numbers.
+  // Removes blocks without splits and cuts that belong to no split, or by values to none that is shown. Blocks move,
+  // and points get other numbers.
   void pack();
 
   Grid grid;
   Domain domain;
+  std::optional<FrontValues> values;  // of a front split by values
   // The first has the domain's corners but (0, 0, 0), as diamonds of scale `levels`
   std::deque<Block> blocks;
   boost::unordered_flat_map<std::uint64_t, std::uint32_t> index;  // of blocks

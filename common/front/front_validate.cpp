@@ -1,6 +1,9 @@
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "common/front/front.h"
+#include "common/front/shown_splits.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -10,25 +13,61 @@ using Block = FrontState::Block;
 using Split = FrontState::Split;
 
 struct Counts {
-  std::uint64_t splits = 0, shown = 0, tets = 0;
+  std::uint64_t splits = 0, shown = 0, tets = 0, withheld = 0;
 };
+using Wrong = std::optional<std::string>;
+
+// The cuts of the split that the cursor found last.
+Wrong validate_cuts(const FrontState& state, const FrontCursor& cursor, const Split& split) {
+  if (unsigned(split.side()) > 2) return "a side is not below, inside or above";
+  if (split.cut_bits() != cursor.context().cut_bits(split.side())) return "the cuts do not fit the sides";
+  if (std::size_t(split.first) + split.points() > state.q.size()) return "a cut is out of range";
+  return {};
+}
+
+// What follows from the values of the split that the cursor found last.
+Wrong validate_values(const FrontState& state, FrontCursor& cursor, const Block& block) {
+  const FrontValues& values = *state.values;
+  const Slot slot = cursor.slot();
+  const Side side = side_of(values.format.value(block.key[slot]), values.range);
+  const bool is_counting = counts(cursor.context(), side, values.refine), is_shown = block.is_shown(slot), has_child = cursor.has_shown_child();
+  if (block.side(slot) != side) return "a side is not that of the value";
+  if (block.is_counting(slot) != is_counting) return "whether a diamond counts is wrong";
+  if (is_shown && !is_counting && !has_child) return "a split is shown that does not count, without a shown child";
+  if (values.is_complete() && (is_counting || has_child) != is_shown) return "what is shown is not what the rule says";
+  if (!is_shown) return {};
+  if (!(block.placed >> slot & 1)) return "a shown split has no points";
+  if (block.of[slot].side() != side) return "the side of a split is wrong";
+  std::vector<std::uint8_t> q;
+  append_cuts(values, cursor, block.of[slot].cut_bits(), q);
+  const auto kept = state.cuts_of(block.of[slot]);
+  if (!std::equal(q.begin(), q.end(), kept.begin(), kept.end())) return "the cuts are not those of the values";
+  return {};
+}
 
 // The first violation in one supercube, and what it adds to the counts.
-std::optional<std::string> validate_block(const FrontState& state, const Block& block, FrontCursor& cursor, Counts& counts) {
+Wrong validate_block(const FrontState& state, const Block& block, FrontCursor& cursor, Counts& counts) {
   if (state.find_block(block.scale, block.position) != &block) return "a supercube is not found under its scale and position";
   if ((block.shown & ~block.split) != 0) return "a diamond is shown as split, but is not split";
+  if ((block.counts & ~block.split) != 0) return "a diamond counts, but is not split";
   if (state.is_root_block(block)) return {};
   cursor.move_to(block.scale, block.position);
   for (const Slot slot : set_bits<Slot>(block.split)) {
     const Vertex c = centre_of(block.scale, block.position, slot);
     const auto where = " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")";
     const Split& split = block.of[slot];
-    if (!cursor.gather(slot)) return "a diamond is split before its parents" + where;
-    if (unsigned(split.side()) > 2) return "a side is not below, inside or above" + where;
-    if (split.cut_bits() != cursor.context().cut_bits(split.side())) return "the cuts do not fit the sides" + where;
-    if (std::size_t(split.first) + split.points() > state.q.size()) return "a cut is out of range" + where;
+    if (!cursor.gather_sides(slot)) return "a diamond is split before its parents" + where;
+    if (!state.values || block.is_shown(slot)) {
+      if (const Wrong wrong = validate_cuts(state, cursor, split)) return *wrong + where;
+    }
+    if (state.values) {
+      if (const Wrong wrong = validate_values(state, cursor, block)) return *wrong + where;
+    }
     ++counts.splits;
-    if (!block.is_shown(slot)) continue;
+    if (!block.is_shown(slot)) {
+      counts.withheld += block.is_counting(slot);
+      continue;
+    }
     ++counts.shown;
     if (!cursor.parents_are_shown()) return "a split is shown, but a parent's is hidden" + where;
     const std::uint32_t sides = cursor.context().sides | std::uint32_t(split.side()) << (2 * kCentre);
@@ -38,7 +77,7 @@ std::optional<std::string> validate_block(const FrontState& state, const Block& 
   return {};
 }
 
-std::optional<std::string> compare(const char* what, std::uint64_t counted, std::uint64_t kept) {
+Wrong compare(const char* what, std::uint64_t counted, std::uint64_t kept) {
   if (counted == kept) return {};
   return "the number of " + std::string(what) + " is " + std::to_string(kept) + ", counted are " + std::to_string(counted);
 }
@@ -49,13 +88,14 @@ std::optional<std::string> Front::validate() const {
   FrontCursor cursor(state_);
   const Diamond root(state_.domain.root());
   cursor.move_to(root);
-  if (!cursor.gather(kSlotOfType[root.type])) return "the root is not there";
-  Counts counts{0, 0, count_tets(state_.domain, root, cursor.parts(), cursor.context().sides)};
+  if (!cursor.gather_sides(kSlotOfType[root.type])) return "the root is not there";
+  Counts counts{0, 0, count_tets(state_.domain, root, cursor.parts(), cursor.context().sides), 0};
   for (const Block& block : state_.blocks) {
     if (auto wrong = validate_block(state_, block, cursor, counts)) return wrong;
   }
   if (auto wrong = compare("split diamonds", counts.splits, state_.split_count)) return wrong;
   if (auto wrong = compare("shown splits", counts.shown, state_.shown_count)) return wrong;
+  if (auto wrong = compare("hidden splits that count", counts.withheld, state_.values ? state_.values->withheld : 0)) return wrong;
   return compare("tetrahedra", counts.tets, state_.tet_count);
 }
 

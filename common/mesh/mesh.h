@@ -37,6 +37,7 @@ using MeshArray = std::vector<T, DefaultInit<T>>;
 struct Mesh {
   MeshArray<std::array<double, 3>> points;
   MeshArray<Surface> surface;  // one for each point
+  MeshArray<double> value;     // of the field, one for each point; or none, where it is not known
   MeshArray<std::array<std::uint32_t, 4>> tets;
 };
 

@@ -123,6 +123,26 @@ TEST(MeshWriter, VtuHoldsEveryPointAndTetrahedron) {
   }
 }
 
+TEST(MeshWriter, VtuAndVtpHoldTheValuesOfThePointsIfThereAreAny) {
+  const TempDir folder;
+  auto mesh = block(6, 5);
+  std::mt19937 random(5);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) mesh.value.push_back(std::ldexp(double(random()), int(random() % 400) - 200));
+  for (const char* name : {"m.vtu", "m.vtp"}) {
+    ASSERT_TRUE(write_mesh(folder / name, mesh));
+    auto vtk = read_vtk(folder / name);
+    EXPECT_EQ(vtk.types["value"], "Float64");
+    const auto points = as<Point>(vtk.arrays["Points"]);
+    const auto values = as<double>(vtk.arrays["value"]);
+    ASSERT_EQ(values.size(), points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto original = std::find(mesh.points.begin(), mesh.points.end(), points[i]);
+      ASSERT_NE(original, mesh.points.end());
+      EXPECT_EQ(values[i], mesh.value[static_cast<std::size_t>(original - mesh.points.begin())]);
+    }
+  }
+}
+
 TEST(MeshWriter, EverySurfaceFormatHoldsTheClosedHullAndNoOtherPoint) {
   const TempDir folder;
   const std::uint32_t n = 4;

@@ -1,5 +1,5 @@
 // Mesh files: .vtu holds the tetrahedra; .vtp, .ply, .stl, .obj and .glb hold the boundary's triangles, oriented
-// outward.
+// outward. .vtu and .vtp also hold the values of the points, if the mesh has them.
 #pragma once
 
 #include <cstddef>

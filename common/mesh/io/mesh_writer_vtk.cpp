@@ -67,6 +67,7 @@ void write_head(MeshOutput& out, const std::string& kind, const std::string& cel
            "\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<" + kind +
            ">\n<Piece NumberOfPoints=\"" + std::to_string(points) + "\" " + cell_counts + ">\n<PointData Scalars=\"surface\">\n");
   write_array(out, R"(type="UInt8" Name="surface")", points, [&](std::uint64_t i) { return mesh.surface[point_at(i)]; });
+  if (!mesh.value.empty()) write_array(out, R"(type="Float64" Name="value")", points, [&](std::uint64_t i) { return mesh.value[point_at(i)]; });
   out.text("</PointData>\n<Points>\n");
   write_array(out, R"(type="Float64" Name="Points" NumberOfComponents="3")", points, [&](std::uint64_t i) { return mesh.points[point_at(i)]; });
   out.text("</Points>\n");

@@ -1,0 +1,279 @@
+// All that a front split by values shows for a range, made at once from the keys of its splits.
+//
+// Passes over the supercubes, each of which many threads can share: the sides of the centres; which diamonds count;
+// ancestors of those, from the finest scale on and class by class, so that a parent is complete before its own parents
+// follow; then the cuts of what is shown. Only the first pass visits supercubes whose diamonds are all on one side.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <optional>
+#include <vector>
+
+#include "common/front/corners.h"
+#include "common/front/front.h"
+#include "common/front/shown_splits.h"
+#include "common/util/bits.h"
+
+namespace intervale {
+namespace {
+
+using Block = FrontState::Block;
+using Split = FrontState::Split;
+
+constexpr std::size_t kPiece = 32;  // supercubes
+
+constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
+
+// A bit for each of the keys that is not less than `first`.
+std::uint64_t at_least(const std::array<ValueKey, kSlots>& keys, std::uint64_t first) {
+  if (first > ~ValueKey(0)) return 0;
+  std::array<std::uint8_t, kSlots> is;
+  for (std::size_t i = 0; i < kSlots; ++i) is[i] = keys[i] >= ValueKey(first);
+  std::uint64_t mask = 0;
+  for (std::size_t i = 0; i < kSlots; i += 8) {
+    std::uint64_t eight = 0;
+    for (std::size_t k = 0; k < 8; ++k) eight |= std::uint64_t(is[i + k]) << (8 * k);
+    mask |= (eight * 0x0102040810204080u >> 56) << i;  // bit 0 of byte k becomes bit k
+  }
+  return mask;
+}
+
+// Makes what is shown of a front from its splits and their keys, whatever was shown before.
+class Reclassification {
+ public:
+  Reclassification(FrontState& state, const ParallelFor& parallel) : state_(state), values_(*state.values), parallel_(parallel) {}
+
+  void run() {
+    std::vector<std::uint8_t>().swap(state_.q);
+    place_corners(state_, root_patch_of(state_));
+    find_sides();
+    find_counting();
+    show_ancestors();
+    derive();
+    values_.withheld = 0;
+    values_.is_limited = false;
+    ++state_.point_generation;
+  }
+
+ private:
+  using Around = SupercubeNeighbours<BlockFinderOf<FrontState>>;
+
+  // Calls visit(begin, end, piece) for pieces of [0, count).
+  template <class Visit>
+  void for_each_piece(std::size_t count, const Visit& visit) const {
+    parallel_((count + kPiece - 1) / kPiece, [&](std::size_t piece) { visit(piece * kPiece, std::min(count, (piece + 1) * kPiece), piece); });
+  }
+
+  // The side of all centres and vertices of a supercube's diamonds, if it is one.
+  [[nodiscard]] std::optional<Side> side_of_all(const Block& block) const {
+    const Side side = values_.sides.side(block.least);
+    return side == values_.sides.side(block.greatest) ? std::optional(side) : std::nullopt;
+  }
+
+  // The sides of all centres. Finds the supercubes where diamonds may count.
+  void find_sides() {
+    std::vector<std::vector<Block*>> found((state_.blocks.size() + kPiece - 1) / kPiece);
+    for_each_piece(state_.blocks.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
+      for (std::size_t number = std::max<std::size_t>(1, begin); number < end; ++number) {  // the first has the corners
+        Block& block = state_.blocks[number];
+        block.shown = block.counts = block.placed = 0;
+        const std::optional<Side> all = side_of_all(block);
+        if (all) {
+          block.above = *all == Side::above ? block.split : 0;
+          block.inside = *all == Side::inside ? block.split : 0;
+          if (*all != Side::inside || values_.refine != Refine::uniform) continue;
+        } else {
+          block.above = at_least(*block.key.all(), values_.sides.first_above()) & block.split;
+          block.inside = at_least(*block.key.all(), values_.sides.first_inside()) & block.split & ~block.above;
+        }
+        if (block.split != 0) found[piece].push_back(&block);
+      }
+    });
+    for (const auto& some : found) active_.insert(active_.end(), some.begin(), some.end());
+  }
+
+  void find_counting() {
+    for_each_piece(active_.size(), [this](std::size_t begin, std::size_t end, std::size_t) {
+      FrontCursor cursor(state_);
+      for (std::size_t i = begin; i < end; ++i) count_in(*active_[i], cursor);
+    });
+  }
+
+  // Shows the diamonds that count, and writes the bits of their splits.
+  void count_in(Block& block, FrontCursor& cursor) const {
+    cursor.move_to(block.scale, block.position);
+    for (const Slot slot : set_bits<Slot>(block.split)) {
+      const Side side = block.side(slot);
+      if (!cursor.gather_sides(slot) || !counts(cursor.context(), side, values_.refine)) continue;
+      block.counts |= bit(slot);
+      block.of[std::size_t(slot)].bits = cursor.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
+    }
+    block.shown = block.counts;
+  }
+
+  void show_ancestors() {
+    std::array<std::vector<Block*>, kMaxLevels + 1> of_scale;
+    for (Block* const block : active_) {
+      if (block->shown != 0) of_scale[std::size_t(block->scale)].push_back(block);
+    }
+    std::vector<std::vector<Block*>> reached;  // by piece: supercubes where nothing was shown before
+    for (std::vector<Block*>& blocks : of_scale) {
+      for (int cls = 2; cls >= 0; --cls) {
+        reached.assign((blocks.size() + kPiece - 1) / kPiece, {});
+        for_each_piece(blocks.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
+          Around around(state_);
+          for (std::size_t i = begin; i < end; ++i) show_parents(around, *blocks[i], kSlotsOfClass[std::size_t(cls)], reached[piece]);
+        });
+        for (const auto& some : reached) {
+          for (Block* const block : some) of_scale[std::size_t(block->scale)].push_back(block);
+        }
+      }
+      for (const Block* const block : blocks) shown_.push_back(state_.find_number(block->scale, block->position));
+    }
+    std::sort(shown_.begin(), shown_.end());
+  }
+
+  // Many threads may show diamonds of one supercube; those of the class that they read are complete.
+  static void show_parents(Around& around, const Block& block, std::uint64_t slots, std::vector<Block*>& reached) {
+    const std::uint64_t shown = __atomic_load_n(&block.shown, __ATOMIC_RELAXED) & slots;
+    if (shown == 0) return;
+    around.move_to(block.scale, block.position);
+    for (const Slot slot : set_bits<Slot>(shown)) {
+      const Links& links = around.links(slot);
+      const int parents = diamond_type(kTypeOfSlot[std::size_t(slot)]).parents;
+      for (int k = 0; k < parents; ++k) {
+        const auto parent = around.at(links.vertex[links.parent[std::size_t(k)]]);
+        if (!parent.supercube->is_split(parent.slot)) continue;
+        if ((__atomic_load_n(&parent.supercube->shown, __ATOMIC_RELAXED) >> parent.slot & 1) != 0) continue;
+        if (__atomic_fetch_or(&parent.supercube->shown, bit(parent.slot), __ATOMIC_RELAXED) == 0) reached.push_back(parent.supercube);
+      }
+    }
+  }
+
+  // The cuts of all that is shown. Points are numbered within each piece first.
+  void derive() {
+    struct Made {
+      std::vector<std::uint8_t> q;
+      std::uint64_t shown = 0;
+      std::int64_t tets = 0;
+    };
+    std::vector<Made> made((shown_.size() + kPiece - 1) / kPiece);
+    for_each_piece(shown_.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
+      FrontCursor cursor(state_);
+      for (std::size_t i = begin; i < end; ++i) {
+        Block& block = state_.blocks[shown_[i]];
+        made[piece].shown += std::uint64_t(std::popcount(block.shown));
+        made[piece].tets += derive_in(block, cursor, made[piece].q);
+      }
+    });
+    state_.shown_count = 0;
+    std::vector<std::size_t> base(made.size() + 1, state_.q.size());
+    for (std::size_t piece = 0; piece < made.size(); ++piece) {
+      base[piece + 1] = base[piece] + made[piece].q.size();
+      state_.shown_count += made[piece].shown;
+      state_.tet_count += std::uint64_t(made[piece].tets);
+    }
+    state_.q.resize(base.back());
+    for_each_piece(shown_.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
+      std::copy(made[piece].q.begin(), made[piece].q.end(), state_.q.begin() + std::ptrdiff_t(base[piece]));
+      for (std::size_t i = begin; i < end; ++i) {
+        Block& block = state_.blocks[shown_[i]];
+        for (const Slot slot : set_bits<Slot>(block.shown)) block.of[std::size_t(slot)].first += PointId(base[piece]);
+      }
+    });
+  }
+
+  // Appends q of the cuts; returns how many tetrahedra the splits add.
+  std::int64_t derive_in(Block& block, FrontCursor& cursor, std::vector<std::uint8_t>& q) const {
+    std::int64_t tets = 0;
+    block.placed = block.shown;
+    cursor.move_to(block.scale, block.position);
+    for (const Slot slot : set_bits<Slot>(block.shown)) {
+      Split& split = block.of[std::size_t(slot)];
+      // What does not count has its vertices and its centre on one side.
+      if (!block.is_counting(slot)) split.bits = std::uint32_t(block.side(slot)) << FrontState::kSideBit;
+      split.first = PointId(q.size());
+      cursor.gather_own(slot);
+      if (split.cut_bits() != 0) append_cuts(values_, cursor, split.cut_bits(), q);
+      if (split.side() == Side::inside) q.push_back(0);
+      tets += cursor.added_tets(split);
+    }
+    return tets;
+  }
+
+  FrontState& state_;
+  FrontValues& values_;
+  const ParallelFor& parallel_;
+  std::vector<Block*> active_;        // supercubes with diamonds that may count
+  std::vector<std::uint32_t> shown_;  // numbers of the supercubes with diamonds that are shown
+};
+
+// Hides all splits, and shows those that count from the coarsest scale on until one does not fit.
+void show_within(FrontState& state, std::uint64_t max_tets) {
+  const RootPatch root_patch = root_patch_of(state);
+  std::vector<const Block*> blocks;  // coarsest first
+  for (Block& block : state.blocks) {
+    if (state.is_root_block(block)) continue;
+    block.shown = 0;
+    state.values->withheld += std::uint64_t(std::popcount(block.counts));
+    blocks.push_back(&block);
+  }
+  std::stable_sort(blocks.begin(), blocks.end(), [](const Block* a, const Block* b) { return a->scale > b->scale; });
+  state.shown_count = 0;
+  state.tet_count = count_root_tets(state, root_patch);
+  ShownSplits splits(state);
+  FrontCursor cursor(state);
+  for (const Block* const block : blocks) {
+    cursor.move_to(block->scale, block->position);
+    for (const Slot slot : set_bits<Slot>(block->counts)) {
+      if (block->is_shown(slot)) continue;
+      if (!cursor.gather_sides(slot) || !splits.show(cursor, max_tets)) return;
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<Vertex> Front::split_all(std::span<const SlotGroup> groups, const GroupKeys& keys_of, const ParallelFor& parallel) {
+  std::vector<Block*> blocks;
+  blocks.reserve(groups.size());
+  for (const SlotGroup& g : groups) {
+    Block& block = state_.obtain_block(scale_of_key(g.key), position_of_key(g.key));
+    block.split = g.slots;
+    blocks.push_back(&block);
+    state_.split_count += std::uint64_t(std::popcount(g.slots));
+  }
+  std::atomic<bool> failed = false;
+  Vertex misfit;
+  parallel((groups.size() + kPiece - 1) / kPiece, [&](std::size_t piece) {
+    FrontCursor cursor(state_);
+    for (std::size_t i = piece * kPiece; i < std::min(groups.size(), (piece + 1) * kPiece); ++i) {
+      keys_of(groups[i], blocks[i]->key.obtain());
+      cursor.move_to(groups[i].key);
+      for (const Slot slot : set_bits<Slot>(groups[i].slots)) {
+        if (!cursor.is_splittable(slot) && !failed.exchange(true)) misfit = centre_of(groups[i].key, slot);
+      }
+    }
+  });
+  if (failed) return misfit;
+  parallel((groups.size() + kPiece - 1) / kPiece, [&](std::size_t piece) {
+    FrontCursor cursor(state_);
+    for (std::size_t i = piece * kPiece; i < std::min(groups.size(), (piece + 1) * kPiece); ++i) {
+      cursor.move_to(groups[i].key);
+      for (const Slot slot : set_bits<Slot>(groups[i].slots)) {
+        if (cursor.gather_sides(slot)) widen_bounds(cursor, *blocks[i]);
+      }
+    }
+  });
+  Reclassification(state_, parallel).run();
+  return {};
+}
+
+void Front::set_range(const Range& range, Refine refine, std::uint64_t max_tets, const ParallelFor& parallel) {
+  state_.values = FrontValues(format(), range, refine);
+  Reclassification(state_, parallel).run();
+  if (state_.tet_count > max_tets && state_.shown_count > 0) show_within(state_, max_tets);
+}
+
+}  // namespace intervale

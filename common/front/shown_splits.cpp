@@ -1,0 +1,138 @@
+#include "common/front/shown_splits.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "common/front/diamond_parts.h"
+#include "common/util/bits.h"
+
+namespace intervale {
+namespace {
+
+using Block = FrontState::Block;
+using Split = FrontState::Split;
+
+constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
+
+}  // namespace
+
+bool counts(const DiamondContext& context, Side centre, Refine refine) {
+  if (context.is_mixed()) return true;
+  const Side all = context.sides == 0 ? Side::below : context.sides == context.pairs() ? Side::inside : Side::above;
+  return centre != all || (refine == Refine::uniform && all == Side::inside);
+}
+
+int append_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, std::vector<std::uint8_t>& q) {
+  const std::size_t before = q.size();
+  const double centre = values.format.value(at.centre_key());
+  for (std::uint32_t bits = cut_bits; bits != 0;) {
+    const int v = std::countr_zero(bits) / 2;
+    bits &= ~(3u << (2 * v));
+    const Cuts cuts = cuts_between(centre, values.format.value(at.key_of(v)), values.range);
+    for (int i = 0; i < cuts.count; ++i) q.push_back(cuts.q[i]);
+  }
+  return int(q.size() - before);
+}
+
+void widen_bounds(FrontCursor& at, Block& block) {
+  const ValueKey centre = block.key[std::size_t(at.slot())];
+  ValueKey least = std::min(block.least, centre), greatest = std::max(block.greatest, centre);
+  for (const int v : set_bits(at.parts().vertices)) {
+    const ValueKey key = at.key_of(v);
+    least = std::min(least, key);
+    greatest = std::max(greatest, key);
+  }
+  block.least = least;
+  block.greatest = greatest;
+}
+
+// Adds the parents by place that are split and shown, or hidden.
+void ShownSplits::add_parents(FrontCursor& at, bool shown, std::vector<Place>& places) {
+  const Links& links = at.links();
+  for (int k = 0; k < at.diamond().row->parents; ++k) {
+    const FrontCursor::Neighbour parent = at.at(links.vertex[links.parent[std::size_t(k)]]);
+    if (!parent.is_split() || parent.is_shown() != shown || state_.is_root_block(parent.block)) continue;
+    places.push_back({&state_.obtain_block(parent.block.scale, parent.block.position), parent.slot});
+  }
+}
+
+bool ShownSplits::move_to(const Place& place) {
+  if (!cursor_) cursor_.emplace(state_);
+  cursor_->move_to(place.block->scale, place.block->position);
+  return cursor_->gather_sides(place.slot);
+}
+
+// Derives the split of the diamond that the cursor found last. Returns how many tetrahedra it adds to the mesh. If it
+// was placed before, and its vertices have the same sides, its points come back.
+std::int64_t ShownSplits::place_points(FrontCursor& at, const Place& place) {
+  Block& block = *place.block;
+  Split& split = block.of[std::size_t(place.slot)];
+  const Side side = block.side(place.slot);
+  const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
+  const bool is_back = (block.placed >> place.slot & 1) != 0 && split.bits == bits;
+  std::vector<std::uint8_t>& q = state_.q;
+  const std::size_t end = q.size();
+  append_cuts(*state_.values, at, bits & FrontState::kCutBits, q);
+  if (is_back) {
+    std::copy(q.begin() + std::ptrdiff_t(end), q.end(), q.begin() + split.first);
+    q.resize(end);
+  } else {
+    split = {bits, PointId(end)};
+    q.resize(end + split.points());
+    block.placed |= bit(place.slot);
+  }
+  return at.added_tets(split);
+}
+
+bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
+  const Place own{&state_.obtain_block(at.scale(), at.position()), at.slot()};
+  std::vector<Place> ancestors;
+  // Marks ancestors as shown when they are found, so that each is found once.
+  const auto add_hidden_parents = [&](FrontCursor& of) {
+    const std::size_t before = ancestors.size();
+    add_parents(of, false, ancestors);
+    for (std::size_t k = before; k < ancestors.size(); ++k) ancestors[k].block->shown |= bit(ancestors[k].slot);
+  };
+  own.block->shown |= bit(own.slot);
+  std::uint64_t tets = state_.tet_count + std::uint64_t(place_points(at, own));
+  add_hidden_parents(at);
+  for (std::size_t i = 0; i < ancestors.size(); ++i) {
+    const Place place = ancestors[i];
+    move_to(place);
+    tets += std::uint64_t(place_points(*cursor_, place));
+    add_hidden_parents(*cursor_);
+  }
+  ancestors.push_back(own);
+  if (tets > max_tets) {
+    for (const Place& place : ancestors) place.block->shown &= ~bit(place.slot);
+    return false;
+  }
+  state_.tet_count = tets;
+  state_.shown_count += ancestors.size();
+  for (const Place& place : ancestors) state_.values->withheld -= place.block->is_counting(place.slot);
+  return true;
+}
+
+void ShownSplits::hide_one(FrontCursor& at) {
+  Block& block = state_.obtain_block(at.scale(), at.position());
+  state_.tet_count -= std::uint64_t(at.added_tets(block.of[std::size_t(at.slot())]));
+  block.shown &= ~bit(at.slot());
+  --state_.shown_count;
+  state_.values->withheld += block.is_counting(at.slot());
+}
+
+void ShownSplits::hide(FrontCursor& at) {
+  std::vector<Place> places;
+  hide_one(at);
+  add_parents(at, true, places);
+  while (!places.empty()) {
+    const Place place = places.back();
+    places.pop_back();
+    // A parent of several that were hidden may be here more than once.
+    if (!place.block->is_shown(place.slot) || place.block->is_counting(place.slot) || !move_to(place) || cursor_->has_shown_child()) continue;
+    hide_one(*cursor_);
+    add_parents(*cursor_, true, places);
+  }
+}
+
+}  // namespace intervale

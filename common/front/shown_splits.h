@@ -1,0 +1,49 @@
+// Shows and hides the splits of a front split by values, one at a time and with the ancestors that follow by the rule
+// (front.h). Inside the front.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/front/front_cursor.h"
+#include "common/front/front_state.h"
+
+namespace intervale {
+
+// Whether a diamond counts for a range. context: of the diamond, with its sides; centre: the side of its centre.
+[[nodiscard]] bool counts(const DiamondContext& context, Side centre, Refine refine);
+
+// Appends q of each cut on the subdivision edges of the split diamond that the cursor found last, in order of the bits
+// of its split. Returns their number.
+int append_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, std::vector<std::uint8_t>& q);
+
+// Widens the bounds of a supercube's keys by those of the diamond that the cursor found last, which has its key.
+void widen_bounds(FrontCursor& at, FrontState::Block& block);
+
+class ShownSplits {
+ public:
+  explicit ShownSplits(FrontState& state) : state_(state) {}
+
+  // Shows the hidden split of the diamond that the cursor found last, and those of all its ancestors. False, and
+  // nothing done, if the mesh would have more than max_tets tetrahedra.
+  bool show(FrontCursor& at, std::uint64_t max_tets);
+  // Hides the shown split of the diamond that the cursor found last, which has no shown child; then ancestors that do
+  // not count and have none.
+  void hide(FrontCursor& at);
+
+ private:
+  struct Place {
+    FrontState::Block* block;
+    Slot slot;
+  };
+  void add_parents(FrontCursor& at, bool shown, std::vector<Place>& places);
+  bool move_to(const Place& place);
+  std::int64_t place_points(FrontCursor& at, const Place& place);
+  void hide_one(FrontCursor& at);
+
+  FrontState& state_;
+  std::optional<FrontCursor> cursor_;  // over ancestors, once there are some
+};
+
+}  // namespace intervale
