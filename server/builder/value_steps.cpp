@@ -1,0 +1,202 @@
+#include "server/builder/value_steps.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <type_traits>
+
+#include "common/util/decimal.h"
+#include "server/builder/exact_step.h"
+#include "server/builder/sample_range.h"
+
+namespace intervale {
+namespace {
+
+constexpr std::size_t kMostExact = std::size_t(1) << 16;  // values of an exact format that is chosen unasked
+constexpr std::size_t kGrain = 1 << 14;                   // samples that a thread takes at once
+constexpr double kMostSteps = 0x1p53;                     // from 0: whole numbers that a double distinguishes
+
+using Indices = tbb::blocked_range<std::size_t>;
+
+// Distinct numbers of type T, up to one more than kMostExact. -0 is 0.
+template <class T>
+class DistinctSet {
+ public:
+  DistinctSet() : slots_(4 * kMostExact, kFree) {}
+  [[nodiscard]] bool is_full() const { return size_ > kMostExact; }
+  // Only while it is not full.
+  void insert(T value) {
+    value += T(0);  // -0 becomes 0
+    if (value == last_) return;
+    last_ = value;
+    std::size_t i = hash(value);
+    while (!std::isinf(slots_[i]) && slots_[i] != value) i = (i + 1) % slots_.size();
+    size_ += std::isinf(slots_[i]);
+    slots_[i] = value;
+  }
+  void append_to(std::vector<double>& values) const {
+    for (const T v : slots_) {
+      if (!std::isinf(v)) values.push_back(double(v));
+    }
+  }
+
+ private:
+  static constexpr T kFree = std::numeric_limits<T>::infinity();
+  static std::size_t hash(T value) {
+    using Bits = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
+    return std::size_t(std::uint64_t(std::bit_cast<Bits>(value)) * 0x9e3779b97f4a7c15 >> 46);  // 18 bits: a slot
+  }
+  static_assert(4 * kMostExact == std::size_t(1) << 18);
+  std::vector<T> slots_;
+  std::size_t size_ = 0;
+  T last_ = kFree;
+};
+
+// The distinct samples, ascending; none if there are more than kMostExact.
+template <class T>
+std::vector<double> few_distinct(std::span<const T> samples) {
+  tbb::enumerable_thread_specific<DistinctSet<T>> sets;
+  std::atomic<bool> too_many = false;
+  tbb::parallel_for(Indices(0, samples.size(), kGrain), [&](const Indices& part) {
+    DistinctSet<T>& set = sets.local();
+    if (too_many.load(std::memory_order_relaxed)) return;
+    for (std::size_t i = part.begin(); i < part.end() && !set.is_full(); ++i) set.insert(samples[i]);
+    if (set.is_full()) too_many.store(true, std::memory_order_relaxed);
+  });
+  if (too_many) return {};
+  std::vector<double> values;
+  for (const DistinctSet<T>& set : sets) set.append_to(values);
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  if (values.size() > kMostExact) values.clear();
+  return values;
+}
+
+// The distinct samples, ascending.
+template <class T>
+std::vector<double> all_distinct(std::span<const T> samples) {
+  std::vector<double> values(samples.begin(), samples.end());
+  for (double& v : values) v += 0.0;  // -0 becomes 0
+  tbb::parallel_sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  return values;
+}
+
+std::string text_of(double number) {
+  std::array<char, 32> digits;
+  return std::string(decimal(number, digits));
+}
+
+// Keeps the ends of a format within the type's numbers.
+void stay_finite(ValueFormat& format) {
+  if (format.last > 0 && !std::isfinite(format.greatest())) --format.last;
+  if (format.last > 0 && !std::isfinite(format.least())) {
+    ++format.first;
+    --format.last;
+  }
+}
+
+// The multiples of a step nearest to samples within [least, greatest].
+Result<ValueFormat> format_of_step(SampleType type, double step, double least, double greatest) {
+  const auto refuse = [&](const std::string& why) { return misuse("a step of " + text_of(step) + " is too fine: " + why); };
+  const double first = std::floor(least / step + 0.5), last = std::floor(greatest / step + 0.5);
+  if (!(std::fabs(first) <= kMostSteps && std::fabs(last) <= kMostSteps)) return refuse("samples lie more than 2^53 steps from 0");
+  if (last - first >= double(std::numeric_limits<ValueKey>::max())) return refuse("the samples span more than 2^32 - 2 steps");
+  ValueFormat format{type, step, std::int64_t(first), ValueKey(last - first)};
+  stay_finite(format);
+  if (!check_value_format(format)) return refuse(std::string("samples of type ") + name_of(type) + " do not distinguish its multiples");
+  return format;
+}
+
+// A power of two, at least as large as the distance of the type's numbers around the largest value.
+double default_step(SampleType type, double least, double greatest) {
+  int exponent = 0, largest = 0;
+  std::frexp(greatest / 2 - least / 2, &exponent);  // halved: the difference of two doubles can overflow
+  std::frexp(std::max(std::fabs(least), std::fabs(greatest)), &largest);
+  const int ulp = type == SampleType::f32 ? std::max(largest - 24, -149) : std::max(largest - 53, -1074);
+  return std::ldexp(1.0, std::max(exponent - 16, ulp));
+}
+
+// The numbers of the type f32 from the least sample to the greatest one.
+ValueFormat format_of_numbers(double least, double greatest) {
+  const auto number = [](double value) {
+    const auto size = std::int64_t(std::bit_cast<std::uint32_t>(std::fabs(float(value))));
+    return value < 0 ? -size : size;
+  };
+  return {SampleType::f32, 0, number(least), ValueKey(number(greatest) - number(least))};
+}
+
+template <class T>
+Result<ValueFormat> exact_format(SampleType type, std::span<const T> samples, double least, double greatest) {
+  if (type == SampleType::f32) return format_of_numbers(least, greatest);
+  if (const auto found = find_exact_format(type, all_distinct(samples), std::numeric_limits<ValueKey>::max() - 1)) return *found;
+  return misuse("these f64 samples have no exact step of at most 2^32 values; give a step greater than 0: --step S");
+}
+
+template <class T>
+Result<ValueFormat> choose(SampleType type, std::span<const T> samples, std::optional<double> step, const SampleRange& range) {
+  const auto [least, greatest] = range;
+  if constexpr (std::is_integral_v<T>) {
+    if (step && *step != 0 && *step != 1) {
+      return misuse(std::string("samples of type ") + name_of(type) + " are stored exactly: the step may be 0 or 1, not " + text_of(*step));
+    }
+    if (greatest - least >= double(std::numeric_limits<ValueKey>::max())) {
+      return fail(std::string("the samples take all values of type ") + name_of(type) + ": at most 2^32 - 1 can be stored");
+    }
+    return ValueFormat{type, 1, std::int64_t(least), ValueKey(greatest - least)};
+  } else {
+    if (step && !(*step >= 0 && std::isfinite(*step))) {
+      return misuse("the step is 0 (exact) or a finite number greater than 0, not " + text_of(*step));
+    }
+    if (step && *step > 0) return format_of_step(type, *step, least, greatest);
+    if (const auto values = few_distinct(samples); !values.empty()) {
+      if (const auto found = find_exact_format(type, values, ValueKey(kMostExact - 1))) return *found;
+    }
+    if (step) return exact_format(type, samples, least, greatest);
+    return format_of_step(type, default_step(type, least, greatest), least, greatest);
+  }
+}
+
+}  // namespace
+
+Result<ValueFormat> choose_value_format(const Volume& volume, std::optional<double> step) {
+  return visit_samples(volume, [&](auto samples) { return choose(volume.type, samples, step, sample_range(volume)); });
+}
+
+std::vector<ValueKey> keys_of(const Volume& volume, const ValueFormat& format) {
+  std::vector<ValueKey> keys(volume.grid.sample_count());
+  visit_samples(volume, [&]<class T>(std::span<const T> samples) {
+    tbb::parallel_for(Indices(0, samples.size(), kGrain), [&](const Indices& part) {
+      for (std::size_t i = part.begin(); i < part.end(); ++i) {
+        if constexpr (std::is_integral_v<T>) {
+          keys[i] = ValueKey(samples[i]) - ValueKey(format.first);  // modulo 2^32
+        } else {
+          keys[i] = format.key(double(samples[i]));
+        }
+      }
+    });
+  });
+  return keys;
+}
+
+void round_samples(Volume& volume, const ValueFormat& format) {
+  visit_samples(volume, [&]<class T>(std::span<const T>) {
+    if constexpr (!std::is_integral_v<T>) {
+      T* const samples = reinterpret_cast<T*>(volume.bytes.data());
+      tbb::parallel_for(Indices(0, volume.bytes.size() / sizeof(T), kGrain), [&](const Indices& part) {
+        for (std::size_t i = part.begin(); i < part.end(); ++i) samples[i] = T(format.value(format.key(double(samples[i]))));
+      });
+    }
+  });
+}
+
+}  // namespace intervale

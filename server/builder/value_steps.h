@@ -1,0 +1,41 @@
+// Chooses the whole numbers that represent a field's values, and converts samples to them.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "common/patch/value_format.h"
+#include "common/util/result.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+// All functions here use all cores that oneTBB may; their results do not depend on the number of threads.
+
+// The format of a volume's samples, which are finite; at least one. O(n) for n samples.
+//
+// Whole numbers are exact, with step 1; `step` may be left out, 0 or 1. Fails if they span all 2^32 values of a type.
+// Floats without `step`: exact if there is a step of which at most 2^16 values, and no more between the least and the
+// greatest one, are whole multiples (exact_step.h). If not, a power of two: the greatest one that divides the distance
+// of the least and the greatest sample into at least 2^16 steps, or the distance of neighbouring numbers of the type
+// around the largest sample, whichever is greater.
+// Floats with a step greater than 0: the nearest multiples of the step.
+// Floats with step 0: exact. As without `step` if that is exact; otherwise f32 in the type's own numbers (step 0 of the
+// format), and f64 in a step of up to 2^32 values. O(n log n) for f64.
+//
+// Where a format is not exact, a value differs from its sample by at most half a step, and the rounding of the type. A
+// multiple that is too large for the type is replaced by the next one that is not.
+//
+// Misuse: a step that is negative or not finite; for whole numbers another one than 0 and 1; a step so fine that the
+// samples span more than 2^32 of it, lie more than 2^53 of it from 0, or have a type that does not distinguish its
+// multiples; step 0 for f64 samples that have no exact step.
+[[nodiscard]] Result<ValueFormat> choose_value_format(const Volume& volume, std::optional<double> step);
+
+// The key of each sample, in the order of the samples. format: chosen for this volume. O(n).
+[[nodiscard]] std::vector<ValueKey> keys_of(const Volume& volume, const ValueFormat& format);
+
+// Replaces each sample by the value of its key, so that whatever is computed from the volume holds for what the keys
+// represent. Whole numbers are left as they are: their formats are exact. format: chosen for this volume. O(n).
+void round_samples(Volume& volume, const ValueFormat& format);
+
+}  // namespace intervale
