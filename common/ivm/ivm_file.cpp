@@ -189,6 +189,7 @@ Result<void> check_start(std::span<const std::byte> start, std::uint64_t bytes) 
   if (start.size() < sizeof kMagic || std::memcmp(start.data(), kMagic, sizeof kMagic) != 0) return fail("not an interval volume file (.ivm)");
   if (start.size() < kTableBytes) return fail("the file ends within its header");
   std::memcpy(&header, start.data(), sizeof header);
+  if (header.version == kIvmVersion + 1) return fail("a data set of every range, which cannot be used here yet: build it with --range");
   if (header.version != kIvmVersion) {
     return fail("version " + std::to_string(header.version) + " of the format, this program reads version " + std::to_string(kIvmVersion) +
                 (header.version > kIvmVersion ? "; use a newer program" : "; build the file again"));

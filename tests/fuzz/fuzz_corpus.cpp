@@ -8,6 +8,7 @@
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/refinement.h"
+#include "common/ivm/value_file.h"
 
 #include "protocol/codec.h"
 #include "tests/fuzz/small_volumes.h"
@@ -138,6 +139,7 @@ int main(int argc, char** argv) {
   const Corpus corpus(argv[1]);
   for (std::size_t i = 0; i < testing::small_volumes().size(); ++i) {
     corpus.add("ivm_file", "volume" + std::to_string(i), "", encode_ivm(testing::small_volumes()[i]));
+    corpus.add("value_file", "volume" + std::to_string(i), "", encode_values(testing::small_value_volumes()[i]));
   }
   add_batches(corpus);
   add_nrrds(corpus);

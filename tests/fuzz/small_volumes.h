@@ -5,6 +5,8 @@
 
 #include "common/ivm/interval_volume.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/builder/value_builder.h"
+#include "server/builder/value_steps.h"
 #include "tests/support/analytic_fields.h"
 
 namespace intervale::testing {
@@ -19,6 +21,20 @@ inline const std::vector<IntervalVolume>& small_volumes() {
     for (std::size_t i = 0; i < dims.size(); ++i) {
       const Volume volume = i == 0 ? gyroid(dims[i]) : digits(dims[i], unsigned(i));
       made.push_back(FieldHierarchy(volume, {.range = ranges[i]}).compact().value());
+    }
+    return made;
+  }();
+  return all;
+}
+
+// The values of the same boxes: floats in steps, and whole numbers.
+inline const std::vector<ValueVolume>& small_value_volumes() {
+  static const std::vector<ValueVolume> all = [] {
+    std::vector<ValueVolume> made;
+    for (const std::array<std::int32_t, 3>& dims : {std::array{5, 5, 5}, std::array{4, 7, 6}, std::array{2, 6, 3}}) {
+      Volume volume = dims[0] == 5 ? gyroid(dims) : digits(dims, unsigned(dims[0]));
+      const ValueFormat format = choose_value_format(volume, {}).value();
+      made.push_back(build_value_volume(volume, format));
     }
     return made;
   }();

@@ -1,0 +1,67 @@
+// Codes the residual of a value from its prediction (value_prediction.h), with models by class, scale and activity.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstdlib>
+
+#include "common/codec/range_coder.h"
+#include "common/codec/value_prediction.h"
+
+namespace intervale {
+
+// A whole number of either sign that is mostly small: whether it is 0, its sign, how many bits its size has, the two
+// below the highest, and the rest as raw bits. Sizes below 2^33.
+struct SignedModel {
+  static constexpr int kLengths = 18;  // lengths with models of their own; longer numbers say theirs in raw bits
+  BitModel is_zero, is_negative;
+  std::array<BitModel, kLengths> longer;
+  std::array<std::array<BitModel, 3>, kLengths> below;
+
+  template <class Coder>
+  std::int64_t code(Coder& coder, std::int64_t value = 0) {
+    if (coder.bit(is_zero, value == 0)) return 0;
+    const bool negative = coder.bit(is_negative, value < 0);
+    const std::uint64_t size = std::uint64_t(negative ? -value : value);
+    const int length = int(std::bit_width(size)) - 1;  // below the highest bit
+    int n = 0;
+    while (n < kLengths && coder.bit(longer[std::size_t(n)], n < length)) ++n;
+    std::uint64_t number = 1;
+    int left = n;  // bits that are not coded yet
+    if (n == kLengths) {
+      left += int(coder.raw_bits(4, unsigned(length - kLengths)));
+    } else {
+      for (unsigned path = 0; left > 0 && left > n - 2;) {
+        --left;
+        const bool bit = coder.bit(below[std::size_t(n)][path], (size >> left & 1) != 0);
+        path = 1 + unsigned(bit);
+        number = 2 * number + unsigned(bit);
+      }
+    }
+    while (left > 0) {
+      const int some = left < 16 ? left : 16;
+      left -= some;
+      number = number << some | coder.raw_bits(some, unsigned(size >> left) & ((1u << some) - 1));
+    }
+    return negative ? -std::int64_t(number) : std::int64_t(number);
+  }
+};
+
+// All models of values.
+struct ValueModels {
+  std::array<std::array<std::array<SignedModel, kActivityLevels>, 2>, 3> of;  // by class, whether the scale is 0, activity
+
+  // Codes the key of a diamond's centre from those of its vertices, none of which is kNoKey. `key` matters to an encoder
+  // only. A decoder may return a key that is greater than `last`, or wrap, if its bytes are damaged.
+  template <class Coder>
+  ValueKey code(Coder& coder, int cls, int scale, const VertexKeys& around, const ValueWeights& weights, ValueKey last, ValueKey key = 0) {
+    const PredictorValues values = predictor_values(cls, around);
+    const std::int64_t predicted = predict(values, weights.of[std::size_t(scale)][std::size_t(cls)], last);
+    SignedModel& model = of[std::size_t(cls)][scale == 0][std::size_t(activity_level(values.activity))];
+    const std::int64_t coded = predicted + model.code(coder, std::int64_t(key) - predicted);
+    return coded < 0 || coded > std::int64_t(kNoKey) ? kNoKey : ValueKey(coded);
+  }
+};
+
+}  // namespace intervale

@@ -1,0 +1,83 @@
+#include "common/codec/value_prediction.h"
+
+#include <algorithm>
+#include <bit>
+#include <span>
+
+namespace intervale {
+namespace {
+
+constexpr int kWeightBits = 8;  // of a pair's difference
+
+// The weight of a pair by its difference: as the inverse of the difference squared.
+constexpr std::array<std::uint32_t, 1 << kWeightBits> kPairWeights = [] {
+  std::array<std::uint32_t, 1 << kWeightBits> weights{};
+  for (std::uint32_t d = 0; d < weights.size(); ++d) weights[d] = 65536 / (d * d + 4);
+  return weights;
+}();
+
+struct Pair {
+  std::int64_t sum, difference;
+};
+
+}  // namespace
+
+PredictorValues predictor_values(int cls, const VertexKeys& keys) {
+  constexpr std::array<int, 3> kBelt{6, 4, 8};
+  const int half = kBelt[std::size_t(cls)] / 2, pairs = half + 1;
+  std::array<Pair, 5> pair;
+  const auto pair_of = [&keys](int a, int b) {
+    const std::int64_t x = keys[std::size_t(a)], y = keys[std::size_t(b)];
+    return Pair{x + y, x < y ? y - x : x - y};
+  };
+  pair[0] = pair_of(0, 1);
+  std::int64_t widest = pair[0].difference;
+  for (int i = 0; i < half; ++i) {
+    pair[std::size_t(i + 1)] = pair_of(2 + i, 2 + i + half);
+    widest = std::max(widest, pair[std::size_t(i + 1)].difference);
+  }
+  const int shift = std::max(0, int(std::bit_width(std::uint64_t(widest))) - kWeightBits);
+  std::int64_t weights = 0, sum = 0;
+  for (const Pair& p : std::span(pair).first(std::size_t(pairs))) {
+    const std::int64_t weight = kPairWeights[std::size_t(p.difference >> shift)];
+    weights += weight;
+    sum += weight * p.sum;
+  }
+  const std::int64_t mean = 8 * sum / weights;
+  PredictorValues values;
+  values.spine = 8 * pair[0].sum;
+  if (cls == 0) {
+    values.difference[0] = (pair[1].sum + pair[2].sum + pair[3].sum) * 8 / 3 - values.spine;
+  } else if (cls == 1) {  // the belt is far, near, far, near
+    values.difference[0] = 8 * pair[2].sum - values.spine;
+    values.difference[1] = 8 * pair[1].sum - values.spine;
+  } else {  // near, far, ...
+    values.difference[0] = 4 * (pair[1].sum + pair[3].sum) - values.spine;
+    values.difference[1] = 4 * (pair[2].sum + pair[4].sum) - values.spine;
+  }
+  values.difference[2] = mean - values.spine;
+  ValueKey least = keys[0], greatest = keys[0];
+  for (int v = 1; v < 2 * pairs; ++v) {
+    least = std::min(least, keys[std::size_t(v)]);
+    greatest = std::max(greatest, keys[std::size_t(v)]);
+  }
+  std::int64_t disagreement = 0;
+  for (const Pair& p : std::span(pair).first(std::size_t(pairs))) disagreement += std::max(8 * p.sum - mean, mean - 8 * p.sum);
+  values.activity = std::uint64_t(disagreement) + 4 * std::uint64_t(pairs) * (greatest - least);
+  return values;
+}
+
+ValueKey predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last) {
+  std::int64_t more = 128;
+  for (int i = 0; i < kPredictors; ++i) more += weights[std::size_t(i)] * values.difference[std::size_t(i)];
+  const std::int64_t key = (values.spine + (more >> 8) + 8) >> 4;
+  return ValueKey(std::clamp<std::int64_t>(key, 0, last));
+}
+
+int activity_level(std::uint64_t activity) {
+  const int octave = int(std::bit_width(activity + 1)) - 1;
+  const bool upper = (activity + 1) << (63 - octave) >= 0xb504f333f9de6485u;  // 2^63.5
+  return std::min(2 * octave + int(upper), kActivityLevels - 1);
+}
+
+}  // namespace intervale

@@ -1,0 +1,57 @@
+// Predicts the value at the centre of a diamond from the values at its vertices, and how far off the prediction may be.
+//
+// The vertices of a diamond stand around its centre in pairs: the spine's ends, and opposite vertices of the belt. The
+// prediction is the mean of the spine, plus weighted differences from it: of the mean of the near belt vertices, of that
+// of the far ones, and of a mean of all pairs in which pairs of like values count more. The weights are least-squares
+// coefficients, by class and scale, which a data set stores.
+//
+// Arithmetic is in whole numbers, so that every machine predicts alike. A prediction reads nothing but the diamond's
+// vertices, so residuals do not depend on the order in which values arrive.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "common/diamond/diamond.h"
+#include "common/patch/value_format.h"
+
+namespace intervale {
+
+// Keys of a diamond's vertices, by local number. All must be set; fill_missing() sets those that are not known.
+using VertexKeys = std::array<ValueKey, kMaxVertices>;
+inline constexpr ValueKey kNoKey = ~ValueKey(0);
+
+// Differences from the spine's mean, in 1/16 of a key: near belt, far belt, weighted pairs. Class 0 has no far belt.
+inline constexpr int kPredictors = 3;
+struct PredictorValues {
+  std::int64_t spine = 0;                              // the spine's mean, in 1/16 of a key
+  std::array<std::int64_t, kPredictors> difference{};  // in 1/16 of a key
+  std::uint64_t activity = 0;                          // how much the pairs disagree, and how far the vertices spread
+};
+// cls: the diamond's class, 0 to 2.
+[[nodiscard]] PredictorValues predictor_values(int cls, const VertexKeys& keys);
+
+// Least-squares coefficients of one class and scale, in 1/256.
+using PredictorWeights = std::array<std::int16_t, kPredictors>;
+struct ValueWeights {
+  std::array<std::array<PredictorWeights, 3>, kMaxLevels> of{};  // by scale and class
+  friend bool operator==(const ValueWeights&, const ValueWeights&) = default;
+};
+
+// The predicted key, in [0, last].
+[[nodiscard]] ValueKey predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last);
+
+// A class of diamonds whose predictions are about equally far off: the activity in half octaves, at most
+// kActivityLevels - 1.
+inline constexpr int kActivityLevels = 40;
+[[nodiscard]] int activity_level(std::uint64_t activity);
+
+// Replaces kNoKey by the mean of the spine, whose ends must be known. vertices: how many the diamond has.
+inline void fill_missing(VertexKeys& keys, int vertices) {
+  const auto mean = ValueKey((std::uint64_t(keys[0]) + keys[1]) / 2);
+  for (int v = 2; v < vertices; ++v) {
+    if (keys[std::size_t(v)] == kNoKey) keys[std::size_t(v)] = mean;
+  }
+}
+
+}  // namespace intervale

@@ -1,0 +1,84 @@
+// The values around the diamonds of one block, at the points of a lattice.
+//
+// A block is the diamonds of one scale whose centres share the bits above the lowest six, in units of h = 2^scale: 64 x
+// 64 x 64 points of the lattice of spacing h, 16 x 16 x 16 supercubes. Every vertex of those diamonds is a point of the
+// lattice from -1 to 64. Points with even coordinates only are of coarser scales; the others at -1 belong to
+// neighbouring blocks.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/codec/value_prediction.h"
+#include "common/diamond/supercube.h"
+#include "common/ivm/value_volume.h"
+
+namespace intervale {
+
+// A block's name: the part that its supercubes' keys share. Ascending along with them.
+using BlockKey = std::uint64_t;
+inline constexpr int kBlockBits = 12;  // of a supercube's key, that tell supercubes of one block apart
+[[nodiscard]] constexpr BlockKey block_of(SupercubeKey key) { return key >> kBlockBits; }
+
+// The bricks [first, end) of a set.
+struct BrickRun {
+  BrickIndex first, end;
+};
+// The blocks of a set, ascending.
+[[nodiscard]] std::vector<BrickRun> blocks_of(const SupercubeSet& set);
+
+class BlockLattice {
+ public:
+  static constexpr int kSide = 66;  // points on an axis, from -1 to 64
+
+  // All must outlive it; the keys may change.
+  BlockLattice(const FieldDescription& description, const SupercubeSet& set, const ValueKeys& keys);
+
+  enum class Load {
+    coarser,  // the points of coarser scales
+    own,      // and those of the block
+    all,      // and those of its neighbours at -1
+  };
+  // Sets the points that exist; all others become kNoKey.
+  void move_to(BlockKey block, Load load);
+
+  // A point's number. at(): of the first point of one of the block's supercubes; of_slot(): a diamond's centre, and
+  // its vertices, from there.
+  using Point = std::int32_t;
+  [[nodiscard]] Point at(SupercubeKey key) const;
+  [[nodiscard]] static Point of_slot(Slot slot) { return offsets().centre[slot]; }
+  // A vertex, from the centre of the diamond.
+  [[nodiscard]] static Point to_vertex(Slot slot, int vertex) { return offsets().vertex[slot][std::size_t(vertex)]; }
+
+  [[nodiscard]] ValueKey key(Point point) const { return keys_[std::size_t(point)]; }
+  void set_key(Point point, ValueKey key) { keys_[std::size_t(point)] = key; }
+  // The keys of a diamond's vertices, or kNoKey.
+  void gather(Point centre, Slot slot, VertexKeys& keys) const {
+    const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+    const auto& offset = offsets().vertex[slot];
+    for (std::size_t v = 0; v < row.vertices; ++v) keys[v] = keys_[std::size_t(centre + offset[v])];
+  }
+
+ private:
+  struct Offsets {
+    std::array<Point, kSlots> centre{};
+    std::array<std::array<Point, kMaxVertices>, kSlots> vertex{};
+  };
+  static const Offsets& offsets() {
+    static const Offsets table = make_offsets();
+    return table;
+  }
+  static Offsets make_offsets();
+  static constexpr Point point_of(std::int32_t x, std::int32_t y, std::int32_t z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
+  void load_scale(int scale, bool own_only);
+
+  const FieldDescription& description_;
+  const SupercubeSet& set_;
+  const ValueKeys& values_;
+  int levels_, scale_ = 0;
+  Vertex first_;  // the block's first point, in units of h
+  std::vector<ValueKey> keys_;
+};
+
+}  // namespace intervale

@@ -1,0 +1,37 @@
+// The values of every range as a file: version 5 of the .ivm format. FORMAT-5.md is the specification.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/ivm/value_volume.h"
+#include "common/util/parallel.h"
+#include "common/util/result.h"
+
+namespace intervale {
+
+inline constexpr std::uint32_t kValueFileVersion = 5;
+
+// Whether a file begins like one of this format, of whatever version from kValueFileVersion on. False if it cannot be
+// read: those who open it say why.
+[[nodiscard]] bool is_value_file(const std::filesystem::path& path);
+
+// The file's bytes. Equal volumes give equal bytes, whatever `parallel` is; the name is not stored.
+[[nodiscard]] std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel = serial);
+
+// The inverse, for bytes from outside: checks every checksum, and that the bytes can hold as many values as they claim
+// before it allocates.
+[[nodiscard]] Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial);
+
+// Writes a temporary file and renames it. Returns the number of bytes.
+[[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial);
+
+// The file's contents; the name is the file's, without folders and extension. Errors begin with the path.
+[[nodiscard]] Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel = serial);
+
+}  // namespace intervale

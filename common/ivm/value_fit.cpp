@@ -1,0 +1,97 @@
+// Least-squares coefficients for the prediction of values.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "common/ivm/value_page.h"
+
+namespace intervale {
+namespace {
+
+__extension__ using Wide = __int128;
+
+// The normal equations of one class and scale, in whole numbers: their sums do not depend on the order of the terms.
+struct NormalEquations {
+  std::array<std::array<Wide, kPredictors>, kPredictors> product{};
+  std::array<Wide, kPredictors> target{};
+
+  void add(const PredictorValues& values, ValueKey key) {
+    const std::int64_t difference = 16 * std::int64_t(key) - values.spine;
+    for (std::size_t i = 0; i < kPredictors; ++i) {
+      for (std::size_t j = 0; j <= i; ++j) product[i][j] += Wide(values.difference[i]) * values.difference[j];
+      target[i] += Wide(values.difference[i]) * difference;
+    }
+  }
+  void add(const NormalEquations& other) {
+    for (std::size_t i = 0; i < kPredictors; ++i) {
+      for (std::size_t j = 0; j <= i; ++j) product[i][j] += other.product[i][j];
+      target[i] += other.target[i];
+    }
+  }
+  // Cholesky's method, with a little added to the diagonal, so that predictors that agree share the weight.
+  [[nodiscard]] PredictorWeights solve() const {
+    double trace = 1;
+    for (std::size_t i = 0; i < kPredictors; ++i) trace += double(product[i][i]);
+    std::array<std::array<double, kPredictors>, kPredictors> root{};
+    std::array<double, kPredictors> x{};
+    for (std::size_t i = 0; i < kPredictors; ++i) {
+      for (std::size_t j = 0; j <= i; ++j) {
+        double sum = double(product[i][j]) + (i == j ? 1e-6 * trace : 0);
+        for (std::size_t k = 0; k < j; ++k) sum -= root[i][k] * root[j][k];
+        root[i][j] = i == j ? std::sqrt(sum) : sum / root[j][j];
+      }
+      x[i] = double(target[i]);
+      for (std::size_t k = 0; k < i; ++k) x[i] -= root[i][k] * x[k];
+      x[i] /= root[i][i];
+    }
+    PredictorWeights weights{};
+    for (std::size_t i = kPredictors; i-- > 0;) {
+      for (std::size_t k = i + 1; k < kPredictors; ++k) x[i] -= root[k][i] * x[k];
+      x[i] /= root[i][i];
+      constexpr double kMost = 4 * 256;
+      weights[i] = std::int16_t(std::lround(std::clamp(x[i] * 256, -kMost, kMost)));
+    }
+    return weights;
+  }
+};
+
+using ByClass = std::array<NormalEquations, 3>;
+
+ByClass equations_of(const ValueVolume::Parts& parts, BlockLattice& lattice, const BrickRun& block) {
+  ByClass equations;
+  VertexKeys around{};
+  lattice.move_to(block_of(parts.set.bricks()[block.first].key), BlockLattice::Load::own);
+  for (BrickIndex brick = block.first; brick < block.end; ++brick) {
+    parts.set.for_each_in_brick(brick, ~std::uint64_t(0), [&](const Place& p) {
+      lattice.gather(lattice.at(p.key) + BlockLattice::of_slot(p.slot), p.slot, around);
+      fill_missing(around, diamond_type(kTypeOfSlot[p.slot]).vertices);
+      const int cls = class_of_slot(p.slot);
+      equations[std::size_t(cls)].add(predictor_values(cls, around), parts.keys[p.index]);
+    });
+  }
+  return equations;
+}
+
+}  // namespace
+
+ValueWeights fit_weights(const ValueVolume::Parts& parts, const ParallelFor& parallel) {
+  const std::vector<BrickRun> blocks = blocks_of(parts.set);
+  std::vector<ByClass> found(blocks.size());
+  parallel(blocks.size(), [&](std::size_t i) {
+    BlockLattice lattice(parts.description, parts.set, parts.keys);
+    found[i] = equations_of(parts, lattice, blocks[i]);
+  });
+  std::array<ByClass, kMaxLevels> sums{};
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    ByClass& sum = sums[std::size_t(scale_of_key(parts.set.bricks()[blocks[i].first].key))];
+    for (std::size_t cls = 0; cls < 3; ++cls) sum[cls].add(found[i][cls]);
+  }
+  ValueWeights weights;
+  for (std::size_t scale = 0; scale < kMaxLevels; ++scale) {
+    for (std::size_t cls = 0; cls < 3; ++cls) weights.of[scale][cls] = sums[scale][cls].solve();
+  }
+  return weights;
+}
+
+}  // namespace intervale

@@ -1,0 +1,38 @@
+// Pages: the values and errors of some diamonds, coded together. FORMAT-5.md is the specification.
+//
+// A page is a run of blocks (block_lattice.h). What is predicted in a block reads only values of the block itself and of
+// coarser scales, so a page can be decoded as soon as the coarser pages are.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/codec/value_coder.h"
+#include "common/ivm/block_lattice.h"
+#include "common/ivm/value_volume.h"
+#include "common/util/parallel.h"
+
+namespace intervale {
+
+// A page: some blocks.
+using ValuePage = std::vector<BrickRun>;
+
+inline constexpr std::uint32_t kPageValuesMost = 1 << 18;  // in a page of more than one block
+
+// The pages of a set, in order of their numbers, none empty. The first one has the coarsest scales, as many whole ones as
+// fit; each further one has blocks of one scale.
+[[nodiscard]] std::vector<ValuePage> pages_of(const SupercubeSet& set);
+
+// The bytes of a page: the keys and error levels of its diamonds. Needs 2 MB.
+[[nodiscard]] std::vector<std::uint8_t> encode_page(const ValueVolume::Parts& parts, const ValuePage& page);
+
+// The inverse, for bytes from outside: sets the page's keys and error levels, in arrays that have their sizes; those of
+// all coarser scales are set. False if the bytes are not a page. Pages of one scale may be decoded at the same time.
+[[nodiscard]] bool decode_page(ValueVolume::Parts& parts, const ValuePage& page, std::span<const std::uint8_t> bytes);
+
+// The least-squares coefficients that predict the values best, by class and scale. The keys are known. The same for any
+// number of threads.
+[[nodiscard]] ValueWeights fit_weights(const ValueVolume::Parts& parts, const ParallelFor& parallel = serial);
+
+}  // namespace intervale

@@ -1,0 +1,88 @@
+#include "common/ivm/value_volume.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "common/diamond/supercube_neighbours.h"
+
+namespace intervale {
+namespace {
+
+// The slots of a supercube's diamonds that have an update.
+std::uint64_t updated_slots(const Domain& domain, int scale, Vertex position) {
+  if (is_interior(domain, scale, position)) return (std::uint64_t(1) << kSlots) - 1;
+  const std::int32_t most = 1 << domain.levels();
+  std::uint64_t slots = 0;
+  for (Slot slot{0}; slot < kSlots; ++slot) {
+    const Diamond d(centre_of(scale, position, slot), scale, kTypeOfSlot[slot]);
+    if (d.centre.x > most || d.centre.y > most || d.centre.z > most) continue;
+    if (domain.tets(d) != 0 && !domain.is_noop(d)) slots |= std::uint64_t(1) << slot;
+  }
+  return slots;
+}
+
+}  // namespace
+
+ValueVolume::ValueVolume(Parts parts) : parts_(std::move(parts)), domain_(parts_.description.grid.dims) {}
+
+std::size_t ValueVolume::memory_bytes() const { return parts_.set.memory_bytes() + parts_.keys.memory_bytes() + parts_.error_levels.size(); }
+
+ErrorLevel ValueVolume::error_level(UpdateIndex i, SetNeighbours& around, Slot slot) const {
+  if (i < parts_.error_levels.size()) return parts_.error_levels[i];
+  const auto key_at = [&](int v) {
+    const auto vertex = around.at(around.links(slot).vertex[std::size_t(v)]);
+    if (vertex.supercube.has(vertex.slot)) return key(vertex.supercube.index(vertex.slot));
+    const Diamond root(domain_.root());
+    const Vertex c = Diamond(centre_of(around.scale(), around.position(), slot)).vertex(v);
+    for (std::size_t corner = 0; corner < kRootVertices; ++corner) {
+      if (root.vertex(int(corner)) == c) return description().corners[corner];
+    }
+    return ValueKey(0);
+  };
+  return level_of_error(description().max_error, spine_error(description().format, key_at(0), key_at(1), key(i)));
+}
+
+double ValueVolume::error_of_level(double max_error, ErrorLevel level) {
+  if (level == 0) return 0;
+  return std::ldexp(max_error, level - (kErrorLevels - 1));
+}
+
+ErrorLevel ValueVolume::level_of_error(double max_error, double error) {
+  if (!(error > 0)) return 0;
+  int exponent = 0;
+  const double ratio = std::frexp(error / max_error, &exponent);  // in [0.5, 1) * 2^exponent
+  return ErrorLevel(std::clamp(kErrorLevels - 1 + exponent - int(ratio == 0.5), 1, kErrorLevels - 1));
+}
+
+SupercubeSet all_diamonds(const Domain& domain) {
+  std::vector<std::pair<SupercubeKey, std::uint64_t>> found;
+  for (int scale = 0; scale < domain.levels(); ++scale) {
+    // A diamond reaches h from its centre.
+    const auto positions = [&](std::int32_t last) { return std::min(last + (1 << scale), 1 << domain.levels()) >> (scale + 2); };
+    const Vertex last{positions(domain.last().x), positions(domain.last().y), positions(domain.last().z)};
+    for (Vertex p; p.z <= last.z; ++p.z) {
+      for (p.y = 0; p.y <= last.y; ++p.y) {
+        for (p.x = 0; p.x <= last.x; ++p.x) {
+          if (const std::uint64_t slots = updated_slots(domain, scale, p)) found.emplace_back(supercube_key(scale, p), slots);
+        }
+      }
+    }
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<SupercubeKey> keys;
+  std::vector<std::uint64_t> occupancy;
+  for (const auto& [key, slots] : found) {
+    keys.push_back(key);
+    occupancy.push_back(slots);
+  }
+  return {keys, std::move(occupancy)};
+}
+
+std::uint32_t coarse_diamonds(const SupercubeSet& set) {
+  const auto [first, end] = set.of_scale(0);
+  return first == end ? set.size() : std::uint32_t(set.bricks()[first].first);
+}
+
+}  // namespace intervale

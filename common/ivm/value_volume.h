@@ -1,0 +1,122 @@
+// The values of a field at the centres of all diamonds, with their errors: an interval volume of every range.
+//
+// Where interval_volume.h keeps what one range needs, this keeps the field itself, in the order of the hierarchy: a key
+// (value_format.h) for each diamond. Sides and cuts of any range follow from the values of a diamond's vertices. Every
+// sample is the value of a diamond's centre or of a corner of the virtual grid, clamped to the box (domain.h), so nothing
+// is lost. Immutable, shared by all that read it.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/codec/root_patch.h"
+#include "common/codec/value_prediction.h"
+#include "common/diamond/domain.h"
+#include "common/diamond/grid.h"
+#include "common/diamond/supercube.h"
+#include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/volume_table.h"
+#include "common/patch/value_format.h"
+#include "common/util/result.h"
+
+namespace intervale {
+
+// Keys by number, in as many bytes each as the greatest one needs.
+class ValueKeys {
+ public:
+  ValueKeys() = default;
+  ValueKeys(std::size_t size, ValueKey last) : width_(last < 1u << 8 ? 1 : last < 1u << 16 ? 2 : 4), bytes_(size * width_) {}
+  [[nodiscard]] std::size_t size() const { return bytes_.size() / width_; }
+  [[nodiscard]] ValueKey operator[](std::size_t i) const {
+    const std::uint8_t* const at = bytes_.data() + i * width_;
+    ValueKey key = at[0];
+    for (unsigned b = 1; b < width_; ++b) key |= ValueKey(at[b]) << (8 * b);
+    return key;
+  }
+  void set(std::size_t i, ValueKey key) {
+    for (unsigned b = 0; b < width_; ++b) bytes_[i * width_ + b] = std::uint8_t(key >> (8 * b));
+  }
+  [[nodiscard]] std::size_t memory_bytes() const { return bytes_.size(); }
+
+ private:
+  unsigned width_ = 1;
+  std::vector<std::uint8_t> bytes_;
+};
+
+// Errors of diamonds of scale 1 and coarser, saturated over all children, are rounded up to one of 32 levels: 0, and the
+// largest error over powers of two. Those of scale 0 follow from the values.
+using ErrorLevel = std::uint8_t;
+inline constexpr int kErrorLevels = 32;
+
+// Bin i counts the samples v with least + i * width <= v < least + (i + 1) * width; the last bin also those at its
+// upper end.
+struct ValueHistogram {
+  double least = 0;                  // the least value of the field
+  double width = 0;                  // of each bin; greater than 0
+  std::vector<std::uint64_t> count;  // by bin; 1 to kMostBins bins, the first and the last are not empty
+  friend bool operator==(const ValueHistogram&, const ValueHistogram&) = default;
+};
+inline constexpr std::size_t kMostBins = 256;
+
+// What is known of a field besides its values.
+struct FieldDescription {
+  std::string name;
+  Grid grid;
+  ValueFormat format;
+  std::array<ValueKey, kRootVertices> corners{};  // at the root's vertices, in local order
+  bool is_exact = true;                           // whether every sample is the value of its key
+  double max_error = 0;                           // the largest error, in the field's units
+  ValueHistogram histogram;
+  VolumeTable volumes;             // what any range encloses
+  std::uint64_t content_hash = 0;  // of the contents; the name does not count
+  friend bool operator==(const FieldDescription&, const FieldDescription&) = default;
+};
+
+// The error of linear interpolation between the ends of a spine, at its middle: no larger than the diamond's.
+[[nodiscard]] inline double spine_error(const ValueFormat& format, ValueKey end_0, ValueKey end_1, ValueKey centre) {
+  return std::abs(format.value(centre) - (format.value(end_0) / 2 + format.value(end_1) / 2));
+}
+
+class ValueVolume {
+ public:
+  struct Parts {
+    FieldDescription description;
+    ValueWeights weights;
+    SupercubeSet set;                      // all_diamonds()
+    ValueKeys keys;                        // by number
+    std::vector<ErrorLevel> error_levels;  // by number; of all diamonds of scale 1 and coarser, which come first
+  };
+  explicit ValueVolume(Parts parts);
+
+  [[nodiscard]] const Parts& parts() const { return parts_; }
+  [[nodiscard]] const FieldDescription& description() const { return parts_.description; }
+  [[nodiscard]] const Domain& domain() const { return domain_; }
+  [[nodiscard]] const ValueWeights& weights() const { return parts_.weights; }
+  [[nodiscard]] const SupercubeSet& set() const { return parts_.set; }
+  [[nodiscard]] ValueKey key(UpdateIndex i) const { return parts_.keys[i]; }
+  // The error level of a diamond: saturated, but at scale 0 that of its spine alone. around: at its supercube.
+  [[nodiscard]] ErrorLevel error_level(UpdateIndex i, SetNeighbours& around, Slot slot) const;
+  // The error of a level, in the field's units: 0 for level 0.
+  [[nodiscard]] double error(ErrorLevel level) const { return error_of_level(description().max_error, level); }
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+  // Levels and errors: error_of_level(e, kErrorLevels - 1) = e. The level of an error is the least whose error is no
+  // smaller; error at most `max_error`.
+  [[nodiscard]] static double error_of_level(double max_error, ErrorLevel level);
+  [[nodiscard]] static ErrorLevel level_of_error(double max_error, double error);
+
+ private:
+  Parts parts_;
+  Domain domain_;
+};
+
+// All diamonds of a domain that have an update: those that exist, and whose split is not a no-op.
+[[nodiscard]] SupercubeSet all_diamonds(const Domain& domain);
+
+// How many diamonds of a set are of scale 1 or coarser; they have the first numbers.
+[[nodiscard]] std::uint32_t coarse_diamonds(const SupercubeSet& set);
+
+}  // namespace intervale

@@ -1,0 +1,71 @@
+#include "server/builder/value_histogram.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <span>
+#include <type_traits>
+
+namespace intervale {
+namespace {
+
+constexpr std::size_t kGrain = 1 << 14;  // samples that a thread takes at once
+using Counts = std::array<std::uint64_t, kMostBins>;
+
+// bin_of: of a sample; less than kMostBins.
+template <class T, class BinOf>
+Counts count(std::span<const T> samples, const BinOf& bin_of) {
+  tbb::enumerable_thread_specific<Counts> all(Counts{});
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, samples.size(), kGrain), [&](const auto& part) {
+    Counts& counts = all.local();
+    for (std::size_t i = part.begin(); i < part.end(); ++i) ++counts[bin_of(samples[i])];
+  });
+  Counts sum{};
+  for (const Counts& counts : all) std::transform(sum.begin(), sum.end(), counts.begin(), sum.begin(), std::plus<>());
+  return sum;
+}
+
+// Bins of `keys` keys each.
+Counts count_keys(const Volume& volume, const ValueFormat& format, ValueKey keys) {
+  return visit_samples(volume, [&]<class T>(std::span<const T> samples) {
+    return count(samples, [&](T v) -> std::size_t {
+      if constexpr (std::is_integral_v<T>) {
+        return (ValueKey(v) - ValueKey(format.first)) / keys;  // the difference modulo 2^32
+      } else {
+        return format.key(double(v)) / keys;
+      }
+    });
+  });
+}
+
+}  // namespace
+
+ValueHistogram make_value_histogram(const Volume& volume, const ValueFormat& format) {
+  const double least = format.least(), greatest = format.greatest();
+  ValueHistogram result{least, 1, {}};
+  Counts counts{};
+  std::size_t bins = 1;
+  if (format.step == 0 && format.last > 0) {
+    bins = kMostBins;
+    result.width = (greatest - least) / double(bins);
+    counts = visit_samples(volume, [&](auto samples) {
+      return count(samples, [&](auto v) {
+        const double along = format.value(format.key(double(v))) - least;
+        return std::min(bins - 1, std::size_t(along / (greatest - least) * double(bins)));
+      });
+    });
+  } else {
+    const auto keys = ValueKey(format.last / kMostBins + 1);
+    bins = format.last / keys + 1;
+    if (format.step > 0) result.width = format.step * double(keys);
+    counts = count_keys(volume, format, keys);
+  }
+  result.count.assign(counts.begin(), counts.begin() + std::ptrdiff_t(bins));
+  return result;
+}
+
+}  // namespace intervale

@@ -1,0 +1,125 @@
+#include "common/ivm/value_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "common/ivm/value_page.h"
+#include "common/ivm/value_verify.h"
+#include "server/builder/all_cores.h"
+#include "server/builder/field_hierarchy.h"
+#include "server/builder/value_builder.h"
+#include "tests/support/temp_dir.h"
+#include "tests/support/value_fields.h"
+
+namespace intervale {
+namespace {
+
+using ::testing::HasSubstr;
+using Dims = std::array<std::int32_t, 3>;
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+ValueVolume build(const testing::ValueField& field) {
+  Volume volume = field.volume;
+  return build_value_volume(volume, field.format);
+}
+
+std::vector<std::byte> small_file() { return encode_values(build(testing::random_value_field({5, 4, 6}, 0))); }
+
+TEST(AllDiamonds, AreThoseThatAnyRangeNeeds) {
+  for (const Dims& dims : {Dims{2, 2, 2}, Dims{5, 5, 5}, Dims{9, 7, 5}, Dims{17, 12, 33}, Dims{2, 3, 40}, Dims{70, 3, 2}}) {
+    const Volume volume = testing::digits(dims, 1);
+    const FieldHierarchy hierarchy(volume, {{-kInf, kInf}, Refine::uniform});
+    const SupercubeSet all = all_diamonds(Domain(dims));
+    EXPECT_TRUE(std::ranges::equal(all.occupancy(), hierarchy.set().occupancy()));
+    ASSERT_EQ(all.bricks().size(), hierarchy.set().bricks().size());
+    for (BrickIndex b{0}; b < all.bricks().size(); ++b) EXPECT_EQ(all.bricks()[b].key, hierarchy.set().bricks()[b].key);
+  }
+}
+
+TEST(ValueFile, GivesBackAllValues) {
+  for (unsigned seed = 0; seed < 15; ++seed) {
+    const Dims boxes[] = {{9, 9, 9}, {9, 7, 5}, {17, 12, 33}, {2, 2, 2}, {70, 67, 66}};
+    const testing::ValueField field = testing::random_value_field(boxes[seed / 5 == 2 ? 4 : seed % 4], seed);
+    const ValueVolume volume = build(field);
+    const std::vector<std::byte> bytes = encode_values(volume);
+    EXPECT_EQ(bytes, encode_values(volume, on_all_cores));
+    const auto decoded = decode_values(bytes, "again", on_all_cores);
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(encode_values(*decoded), bytes);
+    EXPECT_EQ(decoded->description().format, field.format);
+    EXPECT_EQ(decoded->description().max_error, volume.description().max_error);
+    EXPECT_EQ(decoded->description().histogram, volume.description().histogram);
+    EXPECT_EQ(decoded->parts().error_levels, volume.parts().error_levels);
+    EXPECT_TRUE(validate(*decoded));
+    decoded->set().for_each_down([&](const Place& p) { ASSERT_EQ(field.format.value(decoded->key(p.index)), field.value(SupercubeSet::centre(p))); });
+  }
+}
+
+TEST(ValueFile, RefusesEveryFlippedByteAndEveryTruncation) {
+  const std::vector<std::byte> bytes = small_file();
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    std::vector<std::byte> damaged = bytes;
+    damaged[i] ^= std::byte(1 << i % 8);
+    EXPECT_FALSE(decode_values(damaged, "damaged")) << "byte " << i;
+    EXPECT_FALSE(decode_values(std::span(bytes).first(i), "short")) << i << " bytes";
+  }
+  std::vector<std::byte> longer = bytes;
+  longer.emplace_back();
+  EXPECT_FALSE(decode_values(longer, "long"));
+}
+
+TEST(ValueFile, SaysWhichVersionItReads) {
+  const TempDir folder;
+  std::vector<std::byte> bytes = small_file();
+  const auto file = folder.file("values.ivm", std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  EXPECT_TRUE(is_value_file(file));
+  bytes[8] = std::byte(6);
+  const auto newer = decode_values(bytes, "newer");
+  ASSERT_FALSE(newer);
+  EXPECT_THAT(newer.error().message, HasSubstr("use a newer program"));
+  bytes[8] = std::byte(4);
+  EXPECT_FALSE(is_value_file(folder.file("older.ivm", std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()))));
+  EXPECT_FALSE(is_value_file(folder.file("text.ivm", "no data set")));
+}
+
+TEST(ValuePage, DamagedPagesAreRefusedOrDecoded) {
+  const testing::ValueField field = testing::random_value_field({17, 12, 33}, 0);
+  const ValueVolume volume = build(field);
+  ValueVolume::Parts parts = volume.parts();
+  const auto pages = pages_of(parts.set);
+  ASSERT_EQ(pages.size(), 1u);
+  const std::vector<std::uint8_t> bytes = encode_page(parts, pages[0]);
+  std::mt19937 random(1);
+  for (int i = 0; i < 300; ++i) {
+    std::vector<std::uint8_t> damaged = bytes;
+    damaged.resize(random() % 4 == 0 ? random() % bytes.size() : bytes.size());
+    for (int k = 0; k < 3 && !damaged.empty(); ++k) damaged[random() % damaged.size()] ^= std::uint8_t(1u << random() % 8);
+    (void)decode_page(parts, pages[0], damaged);
+  }
+  EXPECT_TRUE(decode_page(parts, pages[0], bytes));
+}
+
+TEST(ErrorLevels, AreTheLeastThatAreNoSmaller) {
+  for (const double largest : {1.0, 3.0, 1e-9, 7e30}) {
+    EXPECT_EQ(ValueVolume::level_of_error(largest, 0), 0);
+    EXPECT_EQ(ValueVolume::error_of_level(largest, kErrorLevels - 1), largest);
+    for (int i = 0; i <= 1000; ++i) {
+      const double error = std::min(largest, largest * i / 1000);
+      const ErrorLevel level = ValueVolume::level_of_error(largest, error);
+      EXPECT_GE(ValueVolume::error_of_level(largest, level), error);
+      EXPECT_TRUE(level <= 1 || ValueVolume::error_of_level(largest, ErrorLevel(level - 1)) < error);
+    }
+  }
+}
+
+TEST(FitWeights, DoesNotDependOnThreads) {
+  const ValueVolume volume = build(testing::random_value_field({70, 67, 66}, 0));
+  EXPECT_EQ(fit_weights(volume.parts()), fit_weights(volume.parts(), on_all_cores));
+}
+
+}  // namespace
+}  // namespace intervale
