@@ -9,9 +9,13 @@
 #include <optional>
 
 #include "common/ivm/ivm_file.h"
+#include "common/ivm/value_file.h"
 #include "common/program/progress.h"
+#include "common/program/range_option.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/builder/value_builder.h"
+#include "server/builder/value_steps.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"
@@ -23,33 +27,13 @@ struct BuildCommand {
   std::string input, output;
   std::vector<std::string> range;
   std::string refine = "boundary", type;
-  std::optional<double> nan;
+  std::optional<double> nan, step;
   unsigned threads = 0;
   std::vector<std::int64_t> dims;
   std::vector<double> spacing, origin;
   bool big_endian = false, json = false;
   std::uint64_t skip = 0;
 };
-
-Result<double> parse_bound(const std::string& text) {
-  std::size_t used = 0;
-  try {
-    const double value = std::stod(text, &used);
-    if (used == text.size() && !std::isnan(value)) return value;
-  } catch (const std::exception&) {
-    // reported below
-  }
-  return misuse("--range: '" + text + "' is not a number, -inf or inf");
-}
-
-Result<Range> parse_range(const std::vector<std::string>& bounds) {
-  const auto low = parse_bound(bounds.at(0)), high = parse_bound(bounds.at(1));
-  if (!low) return tl::unexpected(low.error());
-  if (!high) return tl::unexpected(high.error());
-  if (*low > *high) return misuse("--range: invalid range: LO (" + bounds[0] + ") is greater than HI (" + bounds[1] + ")");
-  if (*low == INFINITY || *high == -INFINITY) return misuse("--range: no number lies between " + bounds[0] + " and " + bounds[1]);
-  return Range{*low, *high};
-}
 
 Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
   const bool any = !options.dims.empty() || !options.type.empty() || !options.spacing.empty() || !options.origin.empty() || options.big_endian ||
@@ -85,10 +69,44 @@ std::string text_of_values(const Volume& volume) {
   });
 }
 
+// Of one range: frees the samples once they are not needed any more.
+Result<nlohmann::ordered_json> build_range(const BuildCommand& options, Volume& volume, const Range& range, std::string& text) {
+  const std::string values = text_of_values(volume);
+  Result<IntervalVolume> made = fail("");
+  {
+    Progress progress("building " + volume.name);
+    const FieldHierarchy hierarchy(
+        volume, {range, options.refine == "uniform" ? Refine::uniform : Refine::boundary, [&](double done) { progress.fraction(done); }});
+    made = hierarchy.compact();
+  }
+  if (!made) return tl::unexpected(made.error());
+  volume.bytes = std::vector<std::byte>();  // the compression runs on several threads
+  if (auto saved = save_ivm(options.output, *made, on_all_cores); !saved) return tl::unexpected(saved.error());
+  if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
+    fmt::print(stderr, "intervale: warning: no part of the volume lies in the range; its values are {}\n", values);
+  }
+  text = text_of(*made, options.output) + "values " + values + "\n";
+  return stats_of(*made, options.output);
+}
+
+// Of every range.
+Result<nlohmann::ordered_json> build_values(const BuildCommand& options, Volume& volume, std::string& text) {
+  const auto format = choose_value_format(volume, options.step);
+  if (!format) return tl::unexpected(format.error());
+  Progress progress("building " + volume.name);
+  const ValueVolume made = build_value_volume(volume, *format, [&](double done) { progress.fraction(done); });
+  volume.bytes = std::vector<std::byte>();
+  if (auto saved = save_values(options.output, made, on_all_cores); !saved) return tl::unexpected(saved.error());
+  text = text_of(made, options.output);
+  return stats_of(made, options.output);
+}
+
 Result<void> run(const BuildCommand& options) {
   const auto start = std::chrono::steady_clock::now();
   const auto range = parse_range(options.range);
   if (!range) return tl::unexpected(range.error());
+  if (*range && options.step) return misuse("--step is for data sets of every range: leave out --range or --step");
+  if (!*range && options.refine != "boundary") return misuse("--refine belongs to a range: give --range too, or --refine to extract");
   const auto layout = parse_layout(options);
   if (!layout) return tl::unexpected(layout.error());
   // Before the long computation, not after it.
@@ -101,43 +119,37 @@ Result<void> run(const BuildCommand& options) {
   if (!volume) return tl::unexpected(volume.error());
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
   volume->name = std::filesystem::path(options.output).stem().string();
-  const std::string values = text_of_values(*volume);
 
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  Result<IntervalVolume> made = fail("");
-  {
-    Progress progress("building " + volume->name);
-    const FieldHierarchy hierarchy(
-        *volume, {*range, options.refine == "uniform" ? Refine::uniform : Refine::boundary, [&](double done) { progress.fraction(done); }});
-    made = hierarchy.compact();
-  }
-  if (!made) return tl::unexpected(made.error());
-  volume->bytes = std::vector<std::byte>();  // frees memory for the compression, which runs on several threads
-  if (auto saved = save_ivm(options.output, *made, on_all_cores); !saved) return saved;
+  std::string text;
+  auto stats = *range ? build_range(options, *volume, **range, text) : build_values(options, *volume, text);
+  if (!stats) return tl::unexpected(stats.error());
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
-    fmt::print(stderr, "intervale: warning: no part of the volume lies in the range; its values are {}\n", values);
-  }
   if (options.json) {
-    auto stats = stats_of(*made, options.output);
-    stats["seconds"] = seconds;
-    return print_json(stats);
+    (*stats)["seconds"] = seconds;
+    return print_json(*stats);
   }
-  return print(text_of(*made, options.output) + fmt::format("values {}\nwrote {} in {:.2f} s\n", values, options.output, seconds));
+  return print(text + fmt::format("wrote {} in {:.2f} s\n", options.output, seconds));
 }
 
 }  // namespace
 
 void add_build_command(Program& program) {
   const auto o = std::make_shared<BuildCommand>();
-  CLI::App& command = program.add_command("build", "Build an interval volume from a volume and a range of values", [o] { return run(*o); });
+  CLI::App& command =
+      program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
   command.add_option("INPUT", o->input, "Volume: .nrrd, .nhdr, or raw samples (with --dims and --type)")->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
-  command.add_option("--range", o->range, "Closed range of values to keep: numbers, -inf or inf; LO may equal HI")
-      ->required()
-      ->expected(2)
-      ->type_name("LO HI");
+  add_range_option(
+      command, o->range,
+      "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range, and cannot be served yet");
+  command
+      .add_option(
+          "--step", o->step,
+          "Every range: distance of the values that floats are rounded to; 0: exact. Default: exact if 65536 steps are enough, else a power of "
+          "two")
+      ->type_name("S");
   command.add_option("--refine", o->refine, "What to refine: boundary: the surfaces of the range only; uniform: the inside too")
       ->check(CLI::IsMember({"boundary", "uniform"}))
       ->capture_default_str();

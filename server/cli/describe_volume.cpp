@@ -3,6 +3,10 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include "common/program/describe.h"
 #include "common/program/program.h"
 #include "common/util/printable.h"
@@ -17,10 +21,27 @@ std::uint64_t size_of(const std::filesystem::path& file) {
   return code ? 0 : size;
 }
 
+// The histogram as bars: some bins a line.
+std::string bars_of(const ValueHistogram& histogram) {
+  constexpr std::size_t kLines = 32, kWidth = 60;
+  const std::size_t bins = (histogram.count.size() + kLines - 1) / kLines;  // a line
+  std::vector<std::uint64_t> sums((histogram.count.size() + bins - 1) / bins);
+  for (std::size_t i = 0; i < histogram.count.size(); ++i) sums[i / bins] += histogram.count[i];
+  const std::uint64_t most = std::max<std::uint64_t>(1, *std::max_element(sums.begin(), sums.end()));
+  std::string text;
+  for (std::size_t line = 0; line < sums.size(); ++line) {
+    // The cube root shows small peaks beside large ones; a bar is never empty if there is a sample.
+    const auto length = std::size_t(std::ceil(std::cbrt(double(sums[line]) / double(most)) * kWidth));
+    text += fmt::format("{:>12.6g} {}\n", histogram.least + double(line * bins) * histogram.width, std::string(length, '#'));
+  }
+  return text;
+}
+
 }  // namespace
 
 nlohmann::ordered_json stats_of(const IntervalVolume& volume, const std::filesystem::path& file) {
   nlohmann::ordered_json stats = to_json(volume.description());
+  stats["scope"] = "one";
   stats["supercubes"] = volume.set().supercubes();
   stats["memory_bytes"] = volume.memory_bytes();
   stats["file_bytes"] = size_of(file);
@@ -41,6 +62,44 @@ std::string text_of(const IntervalVolume& volume, const std::filesystem::path& f
                       human_bytes(d.full.indexed_bytes()));
   return text + fmt::format("in memory {} ({:.1f} times smaller than the full mesh), in the file {} ({:.1f} times smaller)\n",
                             human_bytes(volume.memory_bytes()), times(volume.memory_bytes()), human_bytes(file_bytes), times(file_bytes));
+}
+
+nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem::path& file) {
+  const FieldDescription& d = volume.description();
+  return {
+      {"name", d.name},
+      {"scope", "every"},
+      {"dims", d.grid.dims},
+      {"spacing", d.grid.spacing},
+      {"origin", d.grid.origin},
+      {"type", name_of(d.format.type)},
+      {"values", {{"least", d.format.least()}, {"greatest", d.format.greatest()}}},
+      {"step", d.is_exact ? 0.0 : d.format.step},
+      {"max_error", d.max_error},
+      {"updates", volume.set().size()},
+      {"supercubes", volume.set().supercubes()},
+      {"memory_bytes", volume.memory_bytes()},
+      {"file_bytes", size_of(file)},
+      {"histogram", d.histogram.count},
+      {"histogram_width", d.histogram.width},
+  };
+}
+
+std::string text_of(const ValueVolume& volume, const std::filesystem::path& file) {
+  const FieldDescription& d = volume.description();
+  const std::uint64_t file_bytes = size_of(file), raw = d.grid.sample_count() * size_of(d.format.type);
+  std::string text = fmt::format("{}: {} x {} x {} samples of type {}, every range\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
+                                 d.grid.dims[2], name_of(d.format.type));
+  const Box box = box_of(d.grid);
+  text += fmt::format("world box ({:g}) to ({:g})\n", fmt::join(box.min, ", "), fmt::join(box.max, ", "));
+  text += fmt::format(
+      "values {:g} to {:g}, {}\n", d.format.least(), d.format.greatest(),
+      d.is_exact ? std::string("exact") : fmt::format("rounded to multiples of {:g}: off by {:g} at most", d.format.step, d.format.step / 2));
+  text += fmt::format("{} updates, {} supercubes, largest error {:g}\n", volume.set().size(), volume.set().supercubes(), d.max_error);
+  text += fmt::format("in memory {} ({:.2f} bytes a sample), in the file {} ({:.2f} times smaller than the samples)\n",
+                      human_bytes(volume.memory_bytes()), double(volume.memory_bytes()) / double(d.grid.sample_count()), human_bytes(file_bytes),
+                      file_bytes == 0 ? 0.0 : double(raw) / double(file_bytes));
+  return text + "histogram (bars: cube root of the number of samples)\n" + bars_of(d.histogram);
 }
 
 }  // namespace intervale

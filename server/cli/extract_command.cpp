@@ -9,12 +9,15 @@
 
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
+#include "common/ivm/value_extraction.h"
+#include "common/ivm/value_file.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/mesh_digest.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
+#include "common/program/range_option.h"
 #include "common/util/printable.h"
 #include "server/builder/all_cores.h"
 #include "server/cli/commands.h"
@@ -26,51 +29,80 @@ struct ExtractCommand {
   std::string file;
   std::optional<std::filesystem::path> output;
   std::optional<PictureOptions> picture;
+  std::vector<std::string> range;
+  std::optional<std::string> refine;
   Lod lod;
   unsigned threads = 0;
   bool digest = false;
   bool json = false;
 };
 
-Result<Extraction> extract_with_progress(const IntervalVolume& volume, const Lod& lod) {
-  Progress progress("extracting " + printable(volume.description().name));
-  return extract(
-      volume, lod, [&progress](double done) { progress.fraction(done); }, on_all_cores);
+// What was extracted, and of what.
+struct Extracted {
+  std::string name;
+  Grid grid;
+  Extraction extraction;
+};
+
+Result<Extracted> extract_values(const ExtractCommand& options, const std::optional<Range>& range) {
+  if (!range) return misuse("'" + options.file + "' has every range: say which with --range LO HI");
+  const auto volume = load_values(options.file, on_all_cores);
+  if (!volume) return tl::unexpected(volume.error());
+  const FieldDescription& d = (*volume)->description();
+  auto made =
+      extract(**volume, {*range, options.refine.value_or("boundary") == "uniform" ? Refine::uniform : Refine::boundary, options.lod}, on_all_cores);
+  if (!made) return tl::unexpected(made.error());
+  return Extracted{d.name, d.grid, std::move(*made)};
+}
+
+Result<Extracted> extract_one_range(const ExtractCommand& options, const std::optional<Range>& range) {
+  const auto volume = load_ivm(options.file);
+  if (!volume) return tl::unexpected(volume.error());
+  const Description& d = (*volume)->description();
+  if (range && *range != d.range) {
+    return misuse(fmt::format("--range: '{}' was built for the range [{:g}, {:g}] alone: build it without --range for every range", options.file,
+                              d.range.alpha, d.range.beta));
+  }
+  if (options.refine) return misuse("--refine: '" + options.file + "' was refined when it was built: build it without --range for both");
+  Progress progress("extracting " + printable(d.name));
+  auto made = extract(
+      **volume, options.lod, [&progress](double done) { progress.fraction(done); }, on_all_cores);
+  if (!made) return tl::unexpected(made.error());
+  return Extracted{d.name, d.grid, std::move(*made)};
 }
 
 Result<void> run(const ExtractCommand& options) {
+  const auto range = parse_range(options.range);
+  if (!range) return tl::unexpected(range.error());
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
   if (options.picture) {
     if (auto possible = check_picture(*options.picture, options.lod.camera); !possible) return possible;
   }
-  const auto volume = load_ivm(options.file);
-  if (!volume) return tl::unexpected(volume.error());
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   const auto start = std::chrono::steady_clock::now();
-  const auto extracted = extract_with_progress(**volume, options.lod);
+  const auto extracted = is_value_file(options.file) ? extract_values(options, *range) : extract_one_range(options, *range);
   if (!extracted) return tl::unexpected(extracted.error());
-  const Mesh mesh = extracted->front.mesh(on_all_cores);
+  const std::uint64_t updates = extracted->extraction.updates;
+  const Mesh mesh = extracted->extraction.front.mesh(on_all_cores);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (options.output) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
   }
   if (options.picture) {
-    const Box box = box_of((*volume)->description().grid);
-    if (auto drawn = write_picture(*options.picture, mesh, box, options.lod.camera); !drawn) return drawn;
+    if (auto drawn = write_picture(*options.picture, mesh, box_of(extracted->grid), options.lod.camera); !drawn) return drawn;
   }
   const double enclosed = volume_of(mesh);
   if (options.json) {
     nlohmann::ordered_json json{
-        {"updates", extracted->updates}, {"vertices", mesh.points.size()}, {"tets", mesh.tets.size()}, {"volume", enclosed}, {"seconds", seconds}};
+        {"updates", updates}, {"vertices", mesh.points.size()}, {"tets", mesh.tets.size()}, {"volume", enclosed}, {"seconds", seconds}};
     if (options.digest) json["digest"] = mesh_digest(mesh);
     return print_json(json);
   }
-  std::string text =
-      fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", printable((*volume)->description().name),
-                  extracted->updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
+  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", printable(extracted->name),
+                                 updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
   if (options.digest) text += "digest " + mesh_digest(mesh) + "\n";
   if (options.output) text += "wrote " + options.output->string() + "\n";
   if (options.picture) text += "drew " + options.picture->file.string() + "\n";
@@ -85,6 +117,11 @@ void add_extract_command(Program& program) {
   command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
   command.add_option("-o,--output", options->output, "Mesh to write: .vtu (tetrahedra), .vtp, .ply, .stl, .obj or .glb (boundary triangles)")
       ->type_name("MESH");
+  add_range_option(command, options->range, "Closed range of values: numbers, -inf or inf; needed if the file has every range");
+  command
+      .add_option("--refine", options->refine,
+                  "Every range: what to refine: boundary (default): the surfaces of the range only; uniform: the inside too")
+      ->check(CLI::IsMember({"boundary", "uniform"}));
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);
   command.add_option("--threads", options->threads, "Number of threads; 0: one for each core")->capture_default_str();

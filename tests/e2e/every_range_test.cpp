@@ -1,0 +1,76 @@
+// Data sets of every range, as users of the programs have them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/support/complaints.h"
+#include "tests/support/programs.h"
+#include "tests/support/temp_dir.h"
+
+namespace intervale {
+namespace {
+
+using testing::HasSubstr;
+
+class EveryRange : public testing::Test {
+ public:
+  EveryRange() {
+    EXPECT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "20", "-o", volume}).status, 0);
+    built = json_of(run({program("intervale"), "build", volume, "-o", every, "--step", "0.001", "--json"}));
+  }
+  const TempDir folder;
+  const std::string volume = folder / "volume.nrrd", every = folder / "every.ivm", one = folder / "one.ivm";
+  nlohmann::json built;
+};
+
+TEST_F(EveryRange, InfoSaysWhatIsInIt) {
+  const auto info = json_of(run({program("intervale"), "info", every, "--json"}));
+  EXPECT_EQ(info.at("scope"), "every");
+  EXPECT_EQ(info.at("dims"), nlohmann::json({20, 20, 20}));
+  EXPECT_EQ(info.at("step"), 0.001);
+  EXPECT_EQ(info.at("file_bytes"), std::filesystem::file_size(every));
+  EXPECT_FALSE(info.contains("range") || info.contains("full"));
+  for (const char* key : {"values", "max_error", "updates", "supercubes", "memory_bytes", "histogram"}) EXPECT_EQ(info.at(key), built.at(key)) << key;
+  std::uint64_t samples = 0;
+  for (const auto& bin : info.at("histogram")) samples += bin.get<std::uint64_t>();
+  EXPECT_EQ(samples, 8000u);
+  EXPECT_THAT(run({program("intervale"), "info", every}).out, HasSubstr("off by 0.0005 at most"));
+  EXPECT_EQ(run({program("intervale"), "verify", every}).status, 0);
+}
+
+TEST_F(EveryRange, AnyRangeGivesTheMeshOfADataSetOfThatRange) {
+  // Whole numbers, so that both have the same values.
+  ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "20", "-o", volume}).status, 0);
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", every, "--step", "0"}).status, 0);
+  for (const auto& [low, high] : {std::pair{"20", "60"}, std::pair{"-inf", "40"}, std::pair{"100", "100"}, std::pair{"900", "inf"}}) {
+    ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", low, high}).status, 0);
+    const auto expected = json_of(run({program("intervale"), "extract", one, "--json", "--digest"}));
+    const auto got = json_of(run({program("intervale"), "extract", every, "--range", low, high, "--json", "--digest"}));
+    for (const char* key : {"updates", "vertices", "tets", "digest"}) EXPECT_EQ(got.at(key), expected.at(key)) << low << " " << key;
+  }
+}
+
+TEST_F(EveryRange, WrongUsageIsSaid) {
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", "0", "1"}).status, 0);
+  const auto complains = [](const std::vector<std::string>& arguments, const std::string& about, int status = 2) {
+    std::vector<std::string> all{program("intervale")};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    expect_complaint(run(all), status, about, "intervale: ");
+  };
+  complains({"extract", every}, "--range LO HI");
+  complains({"extract", every, "--range", "1", "0"}, "is greater than HI");
+  complains({"extract", every, "--range", "0", "1", "--eye", "3", "3", "3", "--look-at", "0", "0", "0"}, "--eye");
+  complains({"extract", one, "--range", "0", "0.5"}, "was built for the range [0, 1] alone");
+  complains({"extract", one, "--refine", "uniform"}, "--refine");
+  complains({"build", volume, "-o", every, "--range", "0", "1", "--step", "1"}, "--step");
+  complains({"build", volume, "-o", every, "--refine", "uniform"}, "--refine");
+  for (const char* step : {"-1", "nan", "1e-300"}) complains({"build", volume, "-o", every, "--step", step}, "step");
+  complains({"serve", every, "--listen", "127.0.0.1:0"}, "every range", 1);
+}
+
+}  // namespace
+}  // namespace intervale
