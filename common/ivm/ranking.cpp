@@ -13,28 +13,11 @@ Ranking::Ranking(const IntervalVolume& volume, const Lod& lod) : volume_(volume)
   const auto steps = volume.error_steps();
   while (threshold > 0 && least_step_ < steps.size() && steps[least_step_] <= threshold) ++least_step_;
   const Grid& g = volume.description().grid;
-  if (lod.roi) {
-    roi_.emplace();
-    for (int i = 0; i < 3; ++i) {
-      roi_->min[i] = (lod.roi->min[i] - g.origin[i]) / g.spacing[i];
-      roi_->max[i] = (lod.roi->max[i] - g.origin[i]) / g.spacing[i];
-      // Beyond the samples there is nothing to refine.
-      if (roi_->min[i] > g.dims[i] - 1) roi_->min[i] = std::numeric_limits<double>::infinity();
-      if (roi_->max[i] < 0) roi_->max[i] = -std::numeric_limits<double>::infinity();
-    }
-  }
+  if (lod.roi) roi_ = in_samples(*lod.roi, g);
   if (lod.camera) {
     screen_.emplace(*lod.camera, g);
     pixel_error_ = float(lod.camera->pixel_error);
   }
-}
-
-bool Ranking::meets_roi(const Diamond& d) const {
-  const double c[3] = {double(d.centre.x), double(d.centre.y), double(d.centre.z)};
-  for (int i = 0; i < 3; ++i) {
-    if (c[i] + d.h < roi_->min[i] || c[i] - d.h > roi_->max[i]) return false;
-  }
-  return true;
 }
 
 Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_error) const {

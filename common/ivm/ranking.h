@@ -49,7 +49,9 @@ class Ranking {
     // No lower than the rank of any update here whose error step is no higher.
     [[nodiscard]] Rank bound(unsigned step) const { return rank(importance(step)); }
     // Whether the diamond in a slot meets the region of interest.
-    [[nodiscard]] bool meets_roi(Slot slot) const { return !ranking_->roi_ || ranking_->meets_roi(Diamond(centre_of(key_, slot))); }
+    [[nodiscard]] bool meets_roi(Slot slot) const {
+      return !ranking_->roi_ || ranking_->roi_->meets(centre_of(key_, slot), std::int32_t(1) << scale_);
+    }
     // The rank of update i, in this slot.
     [[nodiscard]] Rank operator()(UpdateIndex i, Slot slot) const {
       return meets_roi(slot) ? rank(importance(ranking_->volume_.error_step(i))) : Rank(0);
@@ -102,14 +104,10 @@ class Ranking {
   }
   // The least pixels of a rank in the middle of the picture.
   [[nodiscard]] static float pixels_of(int rank) { return std::bit_cast<float>(std::uint32_t(rank + kRankFrom) << kRankShift); }
-  [[nodiscard]] bool meets_roi(const Diamond& d) const;
 
   const IntervalVolume& volume_;
   unsigned least_step_ = 0;  // the lowest error step that is wanted
-  struct SampleBox {
-    std::array<double, 3> min, max;
-  };
-  std::optional<SampleBox> roi_;  // in samples
+  std::optional<SampleBox> roi_;
   std::optional<ScreenError> screen_;
   float pixel_error_ = 0;
 };

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <optional>
 
 #include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/block_lattice.h"
@@ -24,15 +24,7 @@ class Wanted {
         refine_(wanted.refine),
         threshold_(error_of(wanted.lod, parts_.description.max_error)) {
     while (threshold_ > 0 && least_level_ < kErrorLevels && volume.error(ErrorLevel(least_level_)) <= threshold_) ++least_level_;
-    if (!wanted.lod.roi) return;
-    const Grid& g = parts_.description.grid;
-    for (std::size_t i = 0; i < 3; ++i) {
-      least_[i] = (wanted.lod.roi->min[i] - g.origin[i]) / g.spacing[i];
-      greatest_[i] = (wanted.lod.roi->max[i] - g.origin[i]) / g.spacing[i];
-      // Beyond the samples there is nothing to refine.
-      if (least_[i] > g.dims[i] - 1) least_[i] = std::numeric_limits<double>::infinity();
-      if (greatest_[i] < 0) greatest_[i] = -std::numeric_limits<double>::infinity();
-    }
+    if (wanted.lod.roi) roi_ = in_samples(*wanted.lod.roi, parts_.description.grid);
   }
 
   // Adds the wanted slots of the supercubes of one block: bricks [first, end).
@@ -57,7 +49,7 @@ class Wanted {
               spine_error(parts_.description.format, around[0], around[1], lattice.key(centre)) <= threshold_) {
             continue;
           }
-          if (meets_region(d)) slots[s] |= std::uint64_t(1) << slot;
+          if (!roi_ || roi_->meets(d.centre, d.h)) slots[s] |= std::uint64_t(1) << slot;
         }
       });
     }
@@ -74,13 +66,6 @@ class Wanted {
     const Side low = sides_.side(least), high = sides_.side(greatest);
     return low != high || (refine_ == Refine::uniform && low == Side::inside);
   }
-  [[nodiscard]] bool meets_region(const Diamond& d) const {
-    const std::array<double, 3> c{double(d.centre.x), double(d.centre.y), double(d.centre.z)};
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (c[i] + d.h < least_[i] || c[i] - d.h > greatest_[i]) return false;
-    }
-    return true;
-  }
 
   const ValueVolume::Parts& parts_;
   const Domain& domain_;
@@ -88,8 +73,7 @@ class Wanted {
   Refine refine_;
   double threshold_;
   int least_level_ = 0;
-  static constexpr double kAll = std::numeric_limits<double>::infinity();
-  std::array<double, 3> least_{-kAll, -kAll, -kAll}, greatest_{kAll, kAll, kAll};  // the region, in samples
+  std::optional<SampleBox> roi_;
 };
 
 // Adds all ancestors.

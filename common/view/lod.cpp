@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 namespace intervale {
 namespace {
@@ -26,6 +27,18 @@ Box box_of(const Grid& grid) {
   for (std::size_t i = 0; i < 3; ++i) {
     box.min[i] = grid.origin[i];
     box.max[i] = grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1);
+  }
+  return box;
+}
+
+SampleBox in_samples(const Box& roi, const Grid& grid) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  SampleBox box;
+  for (std::size_t i = 0; i < 3; ++i) {
+    box.min[i] = (roi.min[i] - grid.origin[i]) / grid.spacing[i];
+    box.max[i] = (roi.max[i] - grid.origin[i]) / grid.spacing[i];
+    if (box.min[i] > grid.dims[i] - 1) box.min[i] = kInfinity;
+    if (box.max[i] < 0) box.max[i] = -kInfinity;
   }
   return box;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
 #include "common/util/result.h"
 #include "common/util/vec3.h"
@@ -45,6 +46,19 @@ struct Lod {
   std::optional<std::uint64_t> max_updates;  // nor more updates than this
   friend bool operator==(const Lod&, const Lod&) = default;
 };
+
+// A closed box in units of samples, from the first sample on.
+struct SampleBox {
+  Vec3 min{}, max{};
+  // Whether the box around a diamond touches it. centre: of the diamond; h: 2^scale.
+  [[nodiscard]] bool meets(Vertex centre, std::int32_t h) const {
+    return centre.x + h >= min[0] && centre.x - h <= max[0] && centre.y + h >= min[1] && centre.y - h <= max[1] && centre.z + h >= min[2] &&
+           centre.z - h <= max[2];
+  }
+};
+
+// A region of interest in samples. Beyond the samples there is nothing to refine: one that lies there meets nothing.
+[[nodiscard]] SampleBox in_samples(const Box& roi, const Grid& grid);
 
 // Misuse if a number is out of range or not finite; the message says what is valid.
 [[nodiscard]] Result<void> check_lod(const Lod& lod);

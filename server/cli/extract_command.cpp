@@ -37,10 +37,13 @@ struct ExtractCommand {
   bool json = false;
 };
 
+using Clock = std::chrono::steady_clock;
+
 // What was extracted, and of what.
 struct Extracted {
   std::string name;
   Grid grid;
+  Clock::time_point start;  // when the file was read
   Extraction extraction;
 };
 
@@ -49,10 +52,11 @@ Result<Extracted> extract_values(const ExtractCommand& options, const std::optio
   const auto volume = load_values(options.file, on_all_cores);
   if (!volume) return tl::unexpected(volume.error());
   const FieldDescription& d = (*volume)->description();
+  const auto start = Clock::now();
   auto made =
       extract(**volume, {*range, options.refine.value_or("boundary") == "uniform" ? Refine::uniform : Refine::boundary, options.lod}, on_all_cores);
   if (!made) return tl::unexpected(made.error());
-  return Extracted{d.name, d.grid, std::move(*made)};
+  return Extracted{d.name, d.grid, start, std::move(*made)};
 }
 
 Result<Extracted> extract_one_range(const ExtractCommand& options, const std::optional<Range>& range) {
@@ -64,11 +68,12 @@ Result<Extracted> extract_one_range(const ExtractCommand& options, const std::op
                               d.range.alpha, d.range.beta));
   }
   if (options.refine) return misuse("--refine: '" + options.file + "' was refined when it was built: build it without --range for both");
+  const auto start = Clock::now();
   Progress progress("extracting " + printable(d.name));
   auto made = extract(
       **volume, options.lod, [&progress](double done) { progress.fraction(done); }, on_all_cores);
   if (!made) return tl::unexpected(made.error());
-  return Extracted{d.name, d.grid, std::move(*made)};
+  return Extracted{d.name, d.grid, start, std::move(*made)};
 }
 
 Result<void> run(const ExtractCommand& options) {
@@ -82,12 +87,11 @@ Result<void> run(const ExtractCommand& options) {
   }
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  const auto start = std::chrono::steady_clock::now();
   const auto extracted = is_value_file(options.file) ? extract_values(options, *range) : extract_one_range(options, *range);
   if (!extracted) return tl::unexpected(extracted.error());
   const std::uint64_t updates = extracted->extraction.updates;
   const Mesh mesh = extracted->extraction.front.mesh(on_all_cores);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = std::chrono::duration<double>(Clock::now() - extracted->start).count();
   if (options.output) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
   }

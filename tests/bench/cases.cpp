@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <exception>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -98,6 +99,15 @@ Result<Case> sample_case(std::string_view name, int size) {
   const auto range = kSampleRanges.find(name);
   return Case{std::string(name), std::make_shared<const Volume>(std::move(*made)), range == kSampleRanges.end() ? Range{0, 1} : range->second,
               Refine::boundary};
+}
+
+int run_or_report(const char* program, int (*run)(int argc, char** argv), int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}: {}\n", program, error.what());
+    return 1;
+  }
 }
 
 std::string range_text(const Case& c) {

@@ -37,6 +37,9 @@ T or_throw(Result<T> result) {
   return std::move(*result);
 }
 
+// What main() of a measurement does: run(argc, argv), or one line on stderr and status 1.
+int run_or_report(const char* program, int (*run)(int argc, char** argv), int argc, char** argv);
+
 // "[59.1, 124.1]", with ", uniform" after it where that is so.
 [[nodiscard]] std::string range_text(const Case& c);
 

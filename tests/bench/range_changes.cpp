@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
-#include <exception>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "common/util/bits.h"
 #include "server/builder/border_shape.h"
 #include "server/builder/relevance.h"
+#include "server/builder/value_steps.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/timing.h"
 
@@ -32,13 +32,11 @@ struct Field {
 
   explicit Field(Case of) : c(std::move(of)), domain(c.volume->grid.dims) {
     for (int scale = 0; scale < domain.levels(); ++scale) shapes.emplace_back(domain, scale);
-    visit_samples(*c.volume, [this](auto samples) {
-      const auto [least, greatest] = std::minmax_element(samples.begin(), samples.end());
-      format.type = c.volume->type;
-      format.step = is_float(c.volume->type) ? (double(*greatest) - double(*least)) / 65535 : 1;
-      format.first = std::int64_t(double(*least) / format.step);
-      format.last = ValueKey(double(*greatest) / format.step - double(format.first) + 1);
-    });
+    // Relevance is found from the samples: they are the values of their keys.
+    auto rounded = std::make_shared<Volume>(*c.volume);
+    format = choose_value_format(*rounded, {}).value();
+    round_samples(*rounded, format);
+    c.volume = std::move(rounded);
   }
   [[nodiscard]] ValueKey key(Vertex v) const {
     const Vertex at = domain.clamp(v);
@@ -152,11 +150,4 @@ int run(int argc, char** argv) {
 }  // namespace intervale::bench
 
 // bench_range [CASE...]: cases as of cases.h; without any, samples of the product's own.
-int main(int argc, char** argv) {
-  try {
-    return intervale::bench::run(argc, argv);
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "bench_range: {}\n", e.what());
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return intervale::bench::run_or_report("bench_range", intervale::bench::run, argc, argv); }

@@ -300,11 +300,4 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace intervale::bench
 
-int main(int argc, char** argv) {
-  try {
-    return intervale::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "bench_tables: {}\n", error.what());
-    return 1;
-  }
-}
+int main(int argc, char** argv) { return intervale::bench::run_or_report("bench_tables", intervale::bench::run, argc, argv); }
