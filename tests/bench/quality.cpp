@@ -341,6 +341,7 @@ int run(int argc, char** argv) {
   app.add_option("--svg", picture, "Where to draw the curves")->type_name("FILE");
   CLI11_PARSE(app, argc, argv);
   std::vector<Case> cases;
+  cases.reserve(volumes.size() + samples.size());
   for (const auto& text : volumes) cases.push_back(or_throw(read_case(text)));
   for (const auto& name : samples) cases.push_back(or_throw(sample_case(name, size)));
   std::vector<Row> rows;

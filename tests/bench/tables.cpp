@@ -285,6 +285,7 @@ int run(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   if (samples == std::vector<std::string>{"none"}) samples.clear();
   std::vector<Row> rows;
+  rows.reserve(volumes.size() + samples.size());
   std::shared_ptr<const Delta> delta;
   std::shared_ptr<const Volume> delta_of;
   for (const auto& text : volumes) rows.push_back(measure(or_throw(read_case(text)), delta, delta_of, runs));
