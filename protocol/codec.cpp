@@ -1,10 +1,12 @@
 #include "protocol/codec.h"
 
+#include <algorithm>
 #include <cstring>
 #include <string>
 #include <utility>
 
 #include "common/codec/split_names.h"
+#include "common/diamond/domain.h"
 #include "protocol/stream_generated.h"
 
 namespace intervale::protocol {
@@ -16,12 +18,21 @@ using Bytes = std::span<const std::uint8_t>;
 fbs::Vector to_vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 std::array<double, 3> to_array(const fbs::Vector& v) { return {v.x(), v.y(), v.z()}; }
 
+// How many weights the description of a data set with this grid has; 0 for a grid that cannot be.
+std::size_t weight_count(const Grid& grid) { return check_grid(grid) ? std::size_t(Domain(grid.dims).levels()) * 3 * kPredictors : 0; }
+
+// The i-th of them: scale by scale from the finest, class by class.
+template <class Weights>
+auto& weight_at(Weights& weights, std::size_t i) {
+  return weights.of[i / (3 * kPredictors)][i / kPredictors % 3][i % kPredictors];
+}
+
 // Encoding: each message to its table.
 
 Offset<fbs::Open> encode_body(FlatBufferBuilder& out, const Open& message) {
   const auto dataset = out.CreateString(message.dataset);
   const auto client = out.CreateString(message.client);
-  return fbs::CreateOpen(out, dataset, client, message.credit, message.resume);
+  return fbs::CreateOpen(out, dataset, client, message.credit, message.resume, message.payload);
 }
 
 Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
@@ -42,17 +53,25 @@ Offset<fbs::Have> encode_body(FlatBufferBuilder& out, const Have& message) {
   return fbs::CreateHave(out, out.CreateVector(encode_splits(message.splits)));
 }
 
-Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
-  const Description& d = message.description;
+Offset<fbs::Description> encode_description(FlatBufferBuilder& out, const Description& d) {
   const auto name = out.CreateString(d.name);
-  const auto root_patch = out.CreateVector(d.root_patch);
+  const auto corners = out.CreateVector(d.corners.data(), d.corners.size());
+  std::vector<std::int16_t> flat(weight_count(d.grid));
+  for (std::size_t i = 0; i < flat.size(); ++i) flat[i] = weight_at(d.weights, i);
+  const auto weights = out.CreateVector(flat);
   const fbs::Dims dims(d.grid.dims[0], d.grid.dims[1], d.grid.dims[2]);
   const fbs::Vector spacing = to_vector(d.grid.spacing);
   const fbs::Vector origin = to_vector(d.grid.origin);
-  const auto description = fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine),
-                                                  d.max_error, d.updates, d.coefficients, d.full.vertices, d.full.tets, d.content_hash, root_patch);
+  const ValueFormat& format = d.format;
+  return fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine), d.max_error, d.updates,
+                                d.coefficients, d.full.vertices, d.full.tets, d.content_hash, std::uint8_t(format.type), format.step, format.first,
+                                format.last, d.is_exact, corners, weights);
+}
+
+Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
+  const auto description = encode_description(out, message.description);
   const SessionLimits& limits = message.limits;
-  return fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message, message.resumed);
+  return fbs::CreateOpened(out, description, limits.max_window, limits.min_credit, limits.max_message, message.resumed, message.payload);
 }
 
 Offset<fbs::Batch> encode_body(FlatBufferBuilder& out, const Batch& message) {
@@ -79,7 +98,7 @@ tl::unexpected<Error> malformed(const std::string& what) { return fail("malforme
 Result<ClientMessage> decode_body(const fbs::Open& table) {
   if (VectorLength(table.dataset()) > kMaxName) return malformed("the data set's name is too long");
   if (VectorLength(table.client()) > kMaxText) return malformed("the client's name is too long");
-  return Open{table.dataset()->str(), flatbuffers::GetString(table.client()), table.credit(), table.resume()};
+  return Open{table.dataset()->str(), flatbuffers::GetString(table.client()), table.credit(), table.resume(), table.payload()};
 }
 
 Result<ClientMessage> decode_body(const fbs::View& table) {
@@ -112,10 +131,22 @@ Result<ClientMessage> decode_body(const fbs::Have& table) {
   return Have{std::move(*splits)};
 }
 
+// The part of a description that depends on the version of payloads. d: has its grid.
+Result<void> decode_values(const fbs::Description& wire, Description& d) {
+  if (wire.type() >= kSampleTypes) return malformed("an unknown type of samples");
+  if (VectorLength(wire.corners()) != d.corners.size()) return malformed("a description does not have 8 corners");
+  const std::size_t weights = weight_count(d.grid);
+  if (VectorLength(wire.weights()) != weights) return malformed("a description does not have the weights of its levels");
+  d.format = {SampleType(wire.type()), wire.step(), wire.first(), wire.last()};
+  d.is_exact = wire.is_exact();
+  std::copy(wire.corners()->begin(), wire.corners()->end(), d.corners.begin());
+  for (std::size_t i = 0; i < weights; ++i) weight_at(d.weights, i) = wire.weights()->Get(flatbuffers::uoffset_t(i));
+  return {};
+}
+
 Result<ServerMessage> decode_body(const fbs::Opened& table) {
   const fbs::Description& wire = *table.description();
   if (VectorLength(wire.name()) > kMaxName) return malformed("the data set's name is too long");
-  if (VectorLength(wire.base()) > kMaxRootPatch) return malformed("the root patch is too long");
   if (wire.refine() > std::uint8_t(Refine::uniform)) return malformed("an unknown refinement (neither boundary nor uniform)");
   Description d;
   d.name = wire.name()->str();
@@ -127,8 +158,10 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
   d.coefficients = wire.coefficients();
   d.full = {wire.full_vertices(), wire.full_tets()};
   d.content_hash = wire.content_hash();
-  d.root_patch.assign(wire.base()->begin(), wire.base()->end());
-  return Opened{std::move(d), {table.max_window(), table.min_credit(), table.max_message()}, table.resumed()};
+  if (table.payload() == kPayloadVersion) {
+    if (auto values = decode_values(wire, d); !values) return tl::unexpected(values.error());
+  }
+  return Opened{std::move(d), {table.max_window(), table.min_credit(), table.max_message()}, table.resumed(), table.payload()};
 }
 
 Result<ServerMessage> decode_body(const fbs::Batch& table) {

@@ -16,8 +16,9 @@ namespace intervale::protocol {
 
 // Untrusted bytes. The FlatBuffers verifier checks the structure; then the values are checked: strings and arrays
 // against limits.h, levels of detail (errors finite and not negative, percentages in [0, 100], boxes with min <=
-// max), the sizes of a batch. Not checked here: descriptions beyond that (see StreamClient::start) and payloads (see
-// apply_batch). Allocates no more than the size of the bytes.
+// max), the sizes of a batch. A description has as many corners and
+// weights as its grid needs. Not checked here: descriptions beyond that (see StreamClient::start), versions of payloads
+// and payloads (see apply_batch). Allocates no more than the size of the bytes.
 [[nodiscard]] Result<ClientMessage> decode_client_message(std::span<const std::uint8_t> bytes);
 [[nodiscard]] Result<ServerMessage> decode_server_message(std::span<const std::uint8_t> bytes);
 

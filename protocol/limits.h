@@ -43,9 +43,6 @@ inline constexpr std::size_t kMaxName = 255;
 // Longest free text: the client's name, the text of a Fault.
 inline constexpr std::size_t kMaxText = 200;
 
-// Largest root patch: the sides of 8 corners and up to two cuts on each of 19 edges take far fewer bytes.
-inline constexpr std::size_t kMaxRootPatch = 1024;
-
 // Limits of the FlatBuffers verifier. The deepest message nests 3 tables, and has 3 in all.
 inline constexpr std::uint32_t kMaxDepth = 8;
 inline constexpr std::uint32_t kMaxTables = 16;

@@ -21,6 +21,10 @@ inline constexpr const char* kTokenSubprotocol = "intervale.token.";
 inline constexpr const char* kPath = "/v1/stream";       // the path of the WebSocket
 inline constexpr const char* kServerName = "intervale";  // how the HTTP field Server begins
 
+// The version of the layout of batches' payloads. 1: updates are sides and cuts; peers that do not say their version
+// have it. 2: updates are values.
+inline constexpr std::uint32_t kPayloadVersion = 2;
+
 // Why a session ended: WebSocket close codes.
 enum class CloseCode : std::uint16_t {
   normal = 1000,
@@ -34,6 +38,7 @@ enum class CloseCode : std::uint16_t {
   timed_out = 4408,     // no Open, or no credit, in time
   out_of_order = 4409,  // a message that is not allowed in this state
   too_large = 4413,     // a message or the credit exceeds its limit
+  other_version = 4426  // the client reads batches of another version than the server sends
 };
 
 // Client to server.
@@ -43,6 +48,7 @@ struct Open {
   std::uint64_t credit = 0;  // first grant; see Credit
   // Content_hash of the data set whose updates the client holds and will list in Have.
   std::optional<std::uint64_t> resume = {};
+  std::uint32_t payload = kPayloadVersion;  // the version of batches that the client reads; 0: it does not say
   friend bool operator==(const Open&, const Open&) = default;
 };
 // The updates that a resuming client holds. Between Open and the first View, in as many messages as needed.
@@ -77,6 +83,9 @@ struct Opened {
   Description description;
   SessionLimits limits;
   bool resumed = false;  // the server does not send the updates in Have again; false: the client must discard them
+  // The version of batches that the server sends; 0: it does not say. If it is not kPayloadVersion, the description's
+  // format, is_exact, corners and weights mean nothing.
+  std::uint32_t payload = kPayloadVersion;
   friend bool operator==(const Opened&, const Opened&) = default;
 };
 struct Batch {

@@ -74,8 +74,8 @@ class Balance {
   }
 
   void show_what_fits() {
-    for (std::size_t g = 0; g < end_ && front_.shown_count() < front_.split_count(); ++g) {
-      const std::uint64_t hidden = groups_[g].slots & ~front_.shown_slots(groups_[g].key);
+    for (std::size_t g = 0; g < end_ && front_.withheld_count() > 0; ++g) {
+      const std::uint64_t hidden = counting_slots(groups_[g].key) & ~front_.shown_slots(groups_[g].key);
       for (const Slot slot : set_bits<Slot>(hidden)) {
         wanted_.clear();
         if (!show({groups_[g].key, slot}, groups_[g].importance / kHysteresis)) return;
@@ -83,18 +83,27 @@ class Balance {
     }
   }
 
-  // Shows a split and its ancestors. Splits less important than `worth` that are not among these make room. False if
-  // there is not enough room.
+  // The splits of a supercube that count for the range. The others follow them.
+  [[nodiscard]] std::uint64_t counting_slots(SupercubeKey key) const {
+    const FrontState::Block* const block = front_.state().find_block(scale_of_key(key), position_of_key(key));
+    return block == nullptr ? 0 : block->counts;
+  }
+
+  // Shows a split that counts, and its ancestors. Splits less important than `worth` that are not among these make
+  // room. False if there is not enough room.
   bool show(Front::Handle handle, double worth) {
-    wanted_.push_back(handle);
-    if (!front_.is_hidden(handle)) return true;
-    bool all = true;
-    for_each_parent(handle, [&](Front::Handle parent) { all = all && show(parent, worth); });
-    if (!all) return false;
+    want(handle);
     while (!front_.show(handle, max_tets_)) {
       if (!hide_least(worth)) return false;
     }
     return true;
+  }
+
+  // Of the ancestors, those that are shown keep theirs shown.
+  void want(Front::Handle handle) {
+    if (std::find(wanted_.begin(), wanted_.end(), handle) != wanted_.end()) return;
+    wanted_.push_back(handle);
+    if (front_.is_hidden(handle)) for_each_parent(handle, [this](Front::Handle parent) { want(parent); });
   }
 
   // Hides a split if none of its children is shown; then its parents, if they are less important and only this child
@@ -127,7 +136,7 @@ class Balance {
   std::vector<Group> groups_;                                   // the most important first
   boost::unordered_flat_map<SupercubeKey, std::size_t> place_;  // of a supercube in groups_
   std::size_t end_ = 0;                                         // everything from here on that can be hidden is hidden
-  // The split to be shown, and its ancestors seen so far: not to be hidden.
+  // The split to be shown, and those of its ancestors that are hidden or first above these: not to be hidden.
   std::vector<Front::Handle> wanted_;
 };
 

@@ -63,6 +63,7 @@ std::optional<StreamClient> ClientSession::take_mesh() && {
 
 Result<ClientSession::Event> ClientSession::take(protocol::Opened& opened, Clock::time_point now) {
   if (state_ != State::greeted) return violation("a second Opened");
+  if (opened.payload != protocol::kPayloadVersion) return other_version(opened.payload);
   const bool resumes = mesh_ && opened.resumed;
   if (!resumes) {
     description_ = std::move(opened.description);
@@ -176,6 +177,12 @@ void ClientSession::send_view() {
 
 void ClientSession::send_credit() {
   while (const std::uint64_t bytes = credit_.grant_more()) send(protocol::Credit{bytes});
+}
+
+tl::unexpected<Error> ClientSession::other_version(std::uint32_t payload) const {
+  const std::uint32_t theirs = std::max(payload, 1u);  // 0: a server that does not say it, of version 1
+  return fail(options_.server + " sends batches of version " + std::to_string(theirs) + ", and this client reads version " +
+              std::to_string(protocol::kPayloadVersion) + (theirs < protocol::kPayloadVersion ? ": update the server" : ": update the client"));
 }
 
 tl::unexpected<Error> ClientSession::violation(const std::string& what) const { return fail(options_.server + " violated the protocol: " + what); }

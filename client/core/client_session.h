@@ -126,6 +126,7 @@ class ClientSession {
   void send_view();
   void send_credit();
   [[nodiscard]] bool is_open() const { return state_ == State::viewing || state_ == State::idle; }
+  [[nodiscard]] tl::unexpected<Error> other_version(std::uint32_t payload) const;
   [[nodiscard]] tl::unexpected<Error> violation(const std::string& what) const;
 
   Options options_;

@@ -2,16 +2,13 @@
 
 #include <algorithm>
 
-#include "common/codec/root_patch.h"
 #include "common/front/batch_decoder.h"
 
 namespace intervale {
 
 Result<StreamClient> StreamClient::start(Description description, const Budget& budget) {
   if (auto ok = check_description(description); !ok) return tl::unexpected(ok.error());
-  const auto root_patch = decode_root_patch(description.root_patch, Domain(description.grid.dims));
-  if (!root_patch) return tl::unexpected(root_patch.error());
-  Front front(description.grid, *root_patch);
+  Front front(description.grid, description.format, description.corners, description.range, description.refine);
   return StreamClient(std::move(description), std::move(front), budget);
 }
 
@@ -19,7 +16,7 @@ Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uin
   keep_to_budget(epoch);
   forget(epoch);
   const std::uint64_t before = updates();
-  const auto applied = apply_batch(front_, payload, budget_.max_tets);
+  const auto applied = apply_batch(front_, description_, payload, budget_.max_tets);
   if (!applied) return tl::unexpected(applied.error());
   if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than the room that the view names");
   rebalance();

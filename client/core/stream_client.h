@@ -49,11 +49,14 @@ class StreamClient {
   // A Done or a Batch of this epoch has arrived. apply() does the same.
   void arrived(std::uint64_t epoch);
 
-  // Some updates are hidden, or the patch of the root alone exceeds max_tets.
-  [[nodiscard]] bool over_budget() const { return front_.shown_count() < front_.split_count() || front_.tet_count() > budget_.max_tets; }
+  // Some updates have no room in the mesh, or the patch of the root alone exceeds max_tets.
+  [[nodiscard]] bool over_budget() const { return updates_left_out() > 0 || front_.tet_count() > budget_.max_tets; }
   [[nodiscard]] std::uint64_t updates() const { return front_.split_count(); }  // in the mesh or hidden
+  // Of those, the ones that the mesh is made with: those that count for the range, as far as there is room, and their
+  // ancestors.
   [[nodiscard]] std::uint64_t updates_in_mesh() const { return front_.shown_count(); }
-  [[nodiscard]] std::uint64_t tet_count() const { return front_.tet_count(); }  // O(1)
+  [[nodiscard]] std::uint64_t updates_left_out() const { return front_.withheld_count(); }  // for want of room
+  [[nodiscard]] std::uint64_t tet_count() const { return front_.tet_count(); }              // O(1)
   [[nodiscard]] const Description& description() const { return description_; }
   // The updates that another session resumes with; see Front::splits. None of them is given up any more.
   [[nodiscard]] std::vector<SlotGroup> resume() {

@@ -1,17 +1,22 @@
 // The layout of a batch: updates on the wire. batch_encoder.h writes it and batch_decoder.h applies it.
 //
 // A batch names supercubes. For each diamond in them that can be split, a flag says whether it is; both sides know
-// which diamonds those are. If the diamond is split, the residuals of its side and its cuts follow. Everything is range
-// coded, with contexts that both sides know. Updates stand in the order in which they are applied: scale by scale from
-// coarse to fine; within one scale all of class 0, then class 1, then class 2; then by supercube and slot. PROTOCOL.md
-// has the layout.
+// which diamonds those are. If the diamond is split, the residual of the value at its centre follows. Both sides know
+// the values at its vertices, which give the prediction of the value and the context of the flag. Everything is range
+// coded. Updates stand in the order in which they are applied: scale by scale from coarse to fine; within one scale all
+// of class 0, then class 1, then class 2; then by supercube and slot. PROTOCOL.md has the layout.
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 
 #include "common/codec/range_coder.h"
+#include "common/codec/value_coder.h"
 #include "common/diamond/supercube.h"
+#include "common/patch/description.h"
+#include "common/patch/key_sides.h"
 
 namespace intervale {
 
@@ -32,19 +37,45 @@ void for_each_class(std::size_t groups, const Key& key, Visit&& visit) {
   }
 }
 
-// The flag whether a diamond that can be split is split. Its model depends on the diamond's class, on whether its
-// vertices lie on different sides (then it is relevant, and hardly ever left out), and on the flags of the last three
-// such diamonds.
+// What the keys at a diamond's vertices tell of its chance to be relevant to a range: 0 if it is for sure; otherwise how
+// far its values are from the range's bounds, in comparison with how much they differ, from 1 to kNearness - 1.
+inline constexpr int kNearness = 8;
+[[nodiscard]] int nearness(const KeySides& sides, Refine refine, const VertexKeys& around, int vertices);
+
+// The flag whether a diamond that can be split is split. Its model depends on the diamond's class, on nearness(), and on
+// the flags of the last three such diamonds.
 struct FlagModel {
-  std::array<std::array<std::array<BitModel, 8>, 2>, 3> model;
-  std::array<std::array<unsigned, 2>, 3> before{};
+  std::array<std::array<std::array<BitModel, 8>, kNearness>, 3> model;
+  std::array<std::array<unsigned, kNearness>, 3> before{};
 
   template <class Coder>
-  bool code(Coder& coder, int cls, bool mixed, bool is_plain, bool value = false) {
-    unsigned& last = before[cls][mixed];
-    const bool flag = is_plain ? coder.raw_bits(1, unsigned(value)) != 0 : coder.bit(model[cls][mixed][last], value);
+  bool code(Coder& coder, int cls, int near, bool value = false) {
+    unsigned& last = before[std::size_t(cls)][std::size_t(near)];
+    const bool flag = coder.bit(model[std::size_t(cls)][std::size_t(near)][last], value);
     last = (2 * last + unsigned(flag)) & 7;
     return flag;
+  }
+};
+
+// The flags and values of a batch.
+struct BatchModels {
+  // Without models: a bit a flag, and as many bits a value as the greatest key has. This bounds what an update takes,
+  // however unlike those before it is.
+  bool is_plain = false;
+  FlagModel flags;
+  ValueModels values;
+
+  template <class Coder>
+  bool code_flag(Coder& coder, int cls, int near, bool value = false) {
+    return is_plain ? coder.raw_bits(1, unsigned(value)) != 0 : flags.code(coder, cls, near, value);
+  }
+  // Like ValueModels::code.
+  template <class Coder>
+  ValueKey code_key(Coder& coder, int cls, int scale, const PredictedValue& predicted, ValueKey last, ValueKey key = 0) {
+    if (!is_plain) return values.code(coder, cls, scale, predicted, key);
+    const int bits = std::bit_width(last), low = bits < 16 ? bits : 16;
+    const ValueKey high = coder.raw_bits(bits - low, unsigned(std::uint64_t(key) >> low));
+    return ValueKey(std::uint64_t(high) << low) | coder.raw_bits(low, key & ((1u << low) - 1));
   }
 };
 

@@ -149,18 +149,4 @@ struct SmallNumberModel {
   }
 };
 
-// A residual modulo 256 that is mostly near 0.
-struct ResidualModel {
-  BitModel differs, negative;
-  SmallNumberModel size;  // of what is beyond 1
-
-  template <class Coder>
-  std::uint8_t code(Coder& coder, std::uint8_t value = 0) {
-    if (!coder.bit(differs, value != 0)) return 0;
-    const bool down = coder.bit(negative, value >= 128);
-    const unsigned by = 1 + size.code(coder, (down ? 256u - value : value) - 1u);
-    return std::uint8_t(down ? 256 - by : by);
-  }
-};
-
 }  // namespace intervale

@@ -48,6 +48,17 @@ struct SignedModel {
   }
 };
 
+// What is known of a value before it is coded.
+struct PredictedValue {
+  ValueKey key = 0;        // the prediction
+  std::uint8_t level = 0;  // of activity
+};
+// cls, scale: of the diamond. around: the keys at its vertices, none of which is kNoKey.
+[[nodiscard]] inline PredictedValue predict_value(int cls, int scale, const VertexKeys& around, const ValueWeights& weights, ValueKey last) {
+  const PredictorValues values = predictor_values(cls, around);
+  return {predict(values, weights.of[std::size_t(scale)][std::size_t(cls)], last), std::uint8_t(activity_level(values.activity))};
+}
+
 // All models of values.
 struct ValueModels {
   std::array<std::array<std::array<SignedModel, kActivityLevels>, 2>, 3> of;  // by class, whether the scale is 0, activity
@@ -56,10 +67,13 @@ struct ValueModels {
   // only. A decoder may return a key that is greater than `last`, or wrap, if its bytes are damaged.
   template <class Coder>
   ValueKey code(Coder& coder, int cls, int scale, const VertexKeys& around, const ValueWeights& weights, ValueKey last, ValueKey key = 0) {
-    const PredictorValues values = predictor_values(cls, around);
-    const std::int64_t predicted = predict(values, weights.of[std::size_t(scale)][std::size_t(cls)], last);
-    SignedModel& model = of[std::size_t(cls)][scale == 0][std::size_t(activity_level(values.activity))];
-    const std::int64_t coded = predicted + model.code(coder, std::int64_t(key) - predicted);
+    return code(coder, cls, scale, predict_value(cls, scale, around, weights, last), key);
+  }
+  // The same, after the prediction.
+  template <class Coder>
+  ValueKey code(Coder& coder, int cls, int scale, const PredictedValue& predicted, ValueKey key = 0) {
+    SignedModel& model = of[std::size_t(cls)][scale == 0][predicted.level];
+    const std::int64_t coded = std::int64_t(predicted.key) + model.code(coder, std::int64_t(key) - std::int64_t(predicted.key));
     return coded < 0 || coded > std::int64_t(kNoKey) ? kNoKey : ValueKey(coded);
   }
 };

@@ -14,6 +14,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/patch/value_format.h"
+#include "common/patch/value_weights.h"
 
 namespace intervale {
 
@@ -22,7 +23,6 @@ using VertexKeys = std::array<ValueKey, kMaxVertices>;
 inline constexpr ValueKey kNoKey = ~ValueKey(0);
 
 // Differences from the spine's mean, in 1/16 of a key: near belt, far belt, weighted pairs. Class 0 has no far belt.
-inline constexpr int kPredictors = 3;
 struct PredictorValues {
   std::int64_t spine = 0;                              // the spine's mean, in 1/16 of a key
   std::array<std::int64_t, kPredictors> difference{};  // in 1/16 of a key
@@ -30,13 +30,6 @@ struct PredictorValues {
 };
 // cls: the diamond's class, 0 to 2.
 [[nodiscard]] PredictorValues predictor_values(int cls, const VertexKeys& keys);
-
-// Least-squares coefficients of one class and scale, in 1/256.
-using PredictorWeights = std::array<std::int16_t, kPredictors>;
-struct ValueWeights {
-  std::array<std::array<PredictorWeights, 3>, kMaxLevels> of{};  // by scale and class
-  friend bool operator==(const ValueWeights&, const ValueWeights&) = default;
-};
 
 // The predicted key, in [0, last].
 [[nodiscard]] ValueKey predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last);

@@ -14,6 +14,7 @@
 
 namespace intervale {
 
+inline constexpr int kRootVertices = 8;
 inline constexpr int kMaxLevels = 20;  // N at most
 
 struct Vertex {

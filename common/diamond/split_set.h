@@ -46,6 +46,9 @@ class SplittableSlots {
 
   void move_to(SupercubeKey key);
 
+  // At the supercube that it moved to.
+  [[nodiscard]] SetNeighbours& around() { return around_; }
+
   // The slots of diamonds that exist, whose split would not be a no-op, and whose parents are split, whether they are
   // split themselves or not.
   [[nodiscard]] std::uint64_t slots();

@@ -1,10 +1,10 @@
 #include "common/front/batch_decoder.h"
 
+#include <memory>
 #include <string>
 
 #include "common/codec/batch.h"
 #include "common/codec/byte_planes.h"
-#include "common/codec/residual_coder.h"
 #include "common/codec/split_names.h"
 #include "common/util/bits.h"
 
@@ -13,62 +13,80 @@ namespace {
 
 tl::unexpected<Error> damaged(const char* what) { return fail(std::string("a batch is damaged: ") + what); }
 
+// Reads the flags and values of a batch, and splits diamonds of a front.
+class BatchDecoder {
+ public:
+  BatchDecoder(Front& front, const Description& description, std::span<const std::uint8_t> bytes, std::uint64_t max_tets)
+      : front_(front),
+        description_(description),
+        sides_(description.format, description.range),
+        max_tets_(max_tets),
+        coder_(bytes),
+        cursor_(front.state()) {
+    models_.is_plain = coder_.raw_bits(1) != 0;
+  }
+
+  // The diamonds of one class in a supercube. False if the batch is damaged.
+  bool take(SupercubeKey key, int cls) {
+    cursor_.move_to(key);
+    for (const Slot slot : set_bits<Slot>(kSlotsOfClass[std::size_t(cls)] & ~cursor_.here().split)) {
+      if (cursor_.find_unsplit(slot) && !take_found(cls)) return false;
+    }
+    return true;
+  }
+  [[nodiscard]] const char* wrong() const { return wrong_; }  // or null
+  [[nodiscard]] bool is_spent() const { return coder_.is_spent(); }
+  [[nodiscard]] std::uint64_t updates() const { return updates_; }
+
+ private:
+  // Reads the flag of the diamond that the cursor found, and splits it if the flag is set.
+  bool take_found(int cls) {
+    around_ = cursor_.vertex_keys();
+    const int vertices = cursor_.diamond().row->vertices;
+    fill_missing(around_, vertices);
+    const bool is_split = models_.code_flag(coder_, cls, nearness(sides_, description_.refine, around_, vertices));
+    if (coder_.is_overdrawn()) return stop("it has fewer flags than its supercubes call for");
+    if (!is_split) return true;
+    if (updates_ == kBatchUpdatesMost) return stop("it has too many updates");
+    const ValueKey last = description_.format.last;
+    const ValueKey key =
+        models_.code_key(coder_, cls, cursor_.scale(), predict_value(cls, cursor_.scale(), around_, description_.weights, last), last);
+    if (coder_.is_overdrawn()) return stop("it has fewer bytes than its updates call for");
+    if (key > last) return stop("a value is out of range");
+    front_.split(cursor_, key, max_tets_);
+    ++updates_;
+    return true;
+  }
+  bool stop(const char* why) {
+    wrong_ = why;
+    return false;
+  }
+
+  Front& front_;
+  const Description& description_;
+  const KeySides sides_;
+  const std::uint64_t max_tets_;
+  RangeDecoder coder_;
+  BatchModels models_;
+  FrontCursor cursor_;
+  VertexKeys around_{};
+  std::uint64_t updates_ = 0;
+  const char* wrong_ = nullptr;
+};
+
 }  // namespace
 
-Result<std::uint64_t> apply_batch(Front& front, std::span<const std::uint8_t> bytes, std::uint64_t max_tets) {
+Result<std::uint64_t> apply_batch(Front& front, const Description& description, std::span<const std::uint8_t> bytes, std::uint64_t max_tets) {
   const auto keys = take_supercubes(bytes, kBatchUpdatesMost);
   if (!keys) return damaged(keys.error().message.c_str());
   const auto length = take_varint(bytes);
   if (!length || *length != bytes.size()) return damaged("its length is wrong");
-
-  std::uint64_t updates = 0;
-  const char* wrong = nullptr;
-  RangeDecoder coder(bytes);
-  FlagModel flags;
-  ResidualCoder residuals;
-  residuals.is_plain = coder.raw_bits(1) != 0;
-  FrontCursor cursor(front.state());
-  // Reads the flag of the diamond that the cursor found, and splits it if the flag is set. False if the batch is
-  // damaged.
-  const auto take = [&](int cls) {
-    const bool is_split = flags.code(coder, cls, cursor.context().is_mixed(), residuals.is_plain);
-    if (coder.is_overdrawn()) {
-      wrong = "it has fewer flags than its supercubes call for";
-      return false;
-    }
-    if (!is_split) return true;
-    if (updates == kBatchUpdatesMost) {
-      wrong = "it has too many updates";
-      return false;
-    }
-    const DiamondContext& context = cursor.gather_cuts();
-    Prediction prediction(context);
-    const unsigned side_residual = residuals.code_side(coder);
-    const Side side = Side((unsigned(prediction.side()) + side_residual) % 3);
-    const auto count = context.count_cuts(side);
-    std::array<std::uint8_t, kMaxCuts> coded{}, cuts;
-    residuals.code_cuts(coder, cls, side_residual, unsigned(count.all), unsigned(count.first), coded.data());
-    if (coder.is_overdrawn()) {
-      wrong = "it has fewer bytes than its updates call for";
-      return false;
-    }
-    prediction.decode(side, std::span(coded).first(std::size_t(count.all)), cuts.data());
-    front.split(cursor, side, std::span(cuts).first(std::size_t(count.all)), max_tets);
-    ++updates;
-    return true;
-  };
+  const auto decoder = std::make_unique<BatchDecoder>(front, description, bytes, max_tets);
   for_each_class(
-      keys->size(), [&](std::size_t g) { return (*keys)[g]; },
-      [&](std::size_t g, int cls) {
-        cursor.move_to((*keys)[g]);
-        for (const Slot slot : set_bits<Slot>(kSlotsOfClass[cls] & ~cursor.here().split)) {
-          if (cursor.find(slot) && !take(cls)) return false;
-        }
-        return true;
-      });
-  if (wrong != nullptr) return damaged(wrong);
-  if (!coder.is_spent()) return damaged("it has more than its updates call for");
-  return updates;
+      keys->size(), [&](std::size_t g) { return (*keys)[g]; }, [&](std::size_t g, int cls) { return decoder->take((*keys)[g], cls); });
+  if (decoder->wrong() != nullptr) return damaged(decoder->wrong());
+  if (!decoder->is_spent()) return damaged("it has more than its updates call for");
+  return decoder->updates();
 }
 
 }  // namespace intervale

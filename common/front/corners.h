@@ -5,8 +5,8 @@
 
 #include <array>
 
-#include "common/codec/root_patch.h"
 #include "common/front/front_state.h"
+#include "common/patch/root_patch.h"
 
 namespace intervale {
 

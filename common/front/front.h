@@ -29,15 +29,14 @@
 #include <string>
 #include <vector>
 
-#include "common/codec/prediction.h"
-#include "common/codec/root_patch.h"
-#include "common/codec/update.h"
 #include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
 #include "common/front/front_cursor.h"
 #include "common/front/front_state.h"
 #include "common/mesh/mesh.h"
+#include "common/patch/diamond_context.h"
+#include "common/patch/root_patch.h"
 #include "common/patch/value_format.h"
 #include "common/util/parallel.h"
 
@@ -77,7 +76,7 @@ class Front {
 
   // Splits a diamond, and shows the split if all splits so far are shown. cuts: q (see Cuts) of each cut on the
   // subdivision edges, centre to vertex, in order of local vertices, alpha before beta:
-  // context(handle).count_cuts(side).all of them.
+  // context(handle).count_cuts(side) of them.
   void split(Handle handle, Side side, std::span<const std::uint8_t> cuts);
   // The same for the diamond that a cursor over state() found last, after gather_cuts(); the cursor sees the split. The
   // split stays hidden if the mesh would have more than max_tets tetrahedra.
@@ -135,21 +134,13 @@ class Front {
   // Checks every invariant; returns the first violation. For tests; O(front).
   [[nodiscard]] std::optional<std::string> validate() const;
 
-  // The updates of one supercube: fills updates[slot] for the group's slots, at least. Called from many threads if
-  // `parallel` uses them.
-  using GroupUpdates = std::function<void(const SlotGroup& group, std::span<UpdateView, kSlots> updates)>;
-
-  // Splits many diamonds of a front without splits. groups: keys strictly ascending; together closed under parents.
-  // Returns the centre of an update that does not fit its diamond, and the front must then not be used any more.
-  std::optional<Vertex> split_all(std::span<const SlotGroup> groups, const GroupUpdates& updates_of, const ParallelFor& parallel = serial,
-                                  const OnProgress& progress = {});
-
   // The keys of one supercube: fills keys[slot] for the group's slots, at least. Called from many threads if `parallel`
   // uses them.
   using GroupKeys = std::function<void(const SlotGroup& group, std::span<ValueKey, kSlots> keys)>;
 
-  // The same, by values. Returns the centre of a diamond that cannot be split, because it does not exist, a parent is
-  // not split, or its split would change nothing. Shows what the rule says.
+  // Splits many diamonds of a front without splits, by values. groups: keys strictly ascending. Returns the centre of a
+  // diamond that cannot be split, because it does not exist, a parent is not split, or its split would change nothing.
+  // Shows what the rule says.
   std::optional<Vertex> split_all(std::span<const SlotGroup> groups, const GroupKeys& keys_of, const ParallelFor& parallel = serial);
 
   // Makes the mesh that of another range, from the values that are there: that of a new front with the same splits. All

@@ -32,7 +32,7 @@ void Front::split(Handle handle, Side side, std::span<const std::uint8_t> cuts) 
 }
 
 void Front::split(FrontCursor& at, Side side, std::span<const std::uint8_t> cuts, std::uint64_t max_tets) {
-  assert(int(cuts.size()) == at.context().count_cuts(side).all && "the caller counted");
+  assert(int(cuts.size()) == at.context().count_cuts(side) && "the caller counted");
   Block& block = state_.obtain_block(at.scale(), at.position());
   at.set_here(block);
   Split& s = block.of[at.slot()];

@@ -41,6 +41,7 @@ void FrontCursor::move_to(const Diamond& d) {
 
 bool FrontCursor::gather_parts(Slot slot) {
   slot_ = slot;
+  has_keys_ = false;
   const DiamondType& row = diamond_type(kTypeOfSlot[std::size_t(slot)]);
   if (scale() >= state_.domain.levels()) return false;
   diamond_ = Diamond(centre_of(scale(), position(), slot), scale(), kTypeOfSlot[std::size_t(slot)]);
@@ -68,6 +69,42 @@ bool FrontCursor::gather_sides(Slot slot) {
   }
   context_.sides = sides;
   return true;
+}
+
+bool FrontCursor::gather_keys_and_sides(Slot slot) {
+  if (!gather_parts(slot)) return false;
+  const KeySides& side = state_.values->sides;
+  const Links& links = this->links();
+  const int vertices = context_.row->vertices;
+  std::uint32_t sides = 0;
+  for (int v = 0; v < vertices; ++v) {
+    if (!(parts_.vertices >> v & 1)) {
+      keys_[std::size_t(v)] = kNoKey;
+      continue;
+    }
+    const Neighbour vertex = at(links.vertex[std::size_t(v)]);
+    if (!vertex.is_split()) return false;
+    const ValueKey key = vertex.block.key[std::size_t(vertex.slot)];
+    keys_[std::size_t(v)] = key;
+    sides |= std::uint32_t(side.side(key)) << (2 * v);
+  }
+  context_.sides = sides;
+  has_keys_ = true;
+  return true;
+}
+
+void FrontCursor::gather_keys() {
+  const Links& links = this->links();
+  const int vertices = diamond_->row->vertices;
+  for (int v = 0; v < vertices; ++v) {
+    if (!(parts_.vertices >> v & 1)) {
+      keys_[std::size_t(v)] = kNoKey;
+      continue;
+    }
+    const Neighbour vertex = at(links.vertex[std::size_t(v)]);
+    keys_[std::size_t(v)] = vertex.block.key[std::size_t(vertex.slot)];
+  }
+  has_keys_ = true;
 }
 
 bool FrontCursor::gather_splits() {

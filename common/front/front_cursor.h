@@ -8,11 +8,12 @@
 #include <span>
 #include <type_traits>
 
-#include "common/codec/prediction.h"
+#include "common/codec/value_prediction.h"
 #include "common/diamond/diamond.h"
 #include "common/diamond/supercube_neighbours.h"
 #include "common/front/diamond_parts.h"
 #include "common/front/front_state.h"
+#include "common/patch/diamond_context.h"
 
 namespace intervale {
 
@@ -59,7 +60,11 @@ class FrontCursor {
   // Finds the diamond in a slot whose own split is there, with its cuts. Its vertices' sides follow from those; split_of
   // is left as it is.
   void gather_own(Slot slot);
+  // Like gather_sides(), of a front split by values, with the keys of the vertices.
+  bool gather_keys_and_sides(Slot slot);
   // The same, if it can be split now.
+  bool find_unsplit(Slot slot) { return parents_are_split(slot) && gather_keys_and_sides(slot) && !is_split() && !is_noop(); }
+  // Like gather(), if it can be split now.
   bool find(Slot slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
 
   [[nodiscard]] const Diamond& diamond() const { return *diamond_; }
@@ -70,9 +75,11 @@ class FrontCursor {
   [[nodiscard]] const Split& split_of(int vertex) const { return split_[std::size_t(vertex)]; }
   // Of a front split by values: the key of the value at a vertex that exists, and at the centre of a diamond that is
   // split.
-  [[nodiscard]] ValueKey key_of(int vertex) {
-    const Neighbour found = at(links().vertex[std::size_t(vertex)]);
-    return found.block.key[std::size_t(found.slot)];
+  [[nodiscard]] ValueKey key_of(int vertex) { return vertex_keys()[std::size_t(vertex)]; }
+  // Those of all its vertices, or kNoKey for one that does not exist.
+  [[nodiscard]] const VertexKeys& vertex_keys() {
+    if (!has_keys_) gather_keys();
+    return keys_;
   }
   [[nodiscard]] ValueKey centre_key() { return here().key[std::size_t(slot_)]; }
   // Its cuts may be those of another diamond
@@ -112,6 +119,8 @@ class FrontCursor {
   [[nodiscard]] std::span<const Link> children(Slot slot) const { return neighbours_.children(slot); }
   [[nodiscard]] int scale() const { return neighbours_.scale(); }
   [[nodiscard]] Vertex position() const { return neighbours_.position(); }
+  // Whether the supercube has a block.
+  [[nodiscard]] bool has_block() { return &here() != BlockFinder::none(); }
   // Takes note of the supercube's block, which was added since the cursor moved there.
   void set_here(const Block& block) { neighbours_.set_here(&block); }
 
@@ -119,6 +128,7 @@ class FrontCursor {
   [[nodiscard]] bool parents_are_split(Slot slot);
   bool gather_splits();
   bool gather_parts(Slot slot);
+  void gather_keys();
 
   const FrontState& state_;
   SupercubeNeighbours<BlockFinder> neighbours_;
@@ -128,6 +138,8 @@ class FrontCursor {
   DiamondParts parts_;
   std::array<Split, kMaxVertices> split_;  // of each vertex that exists
   DiamondContext context_;
+  bool has_keys_ = false;
+  VertexKeys keys_{};
 };
 
 }  // namespace intervale

@@ -85,10 +85,11 @@ class BlockKeys {
   BlockKeys() = default;
   BlockKeys(const BlockKeys& other) : keys_(other.keys_ ? std::make_unique<Keys>(*other.keys_) : nullptr) {}
   BlockKeys(BlockKeys&&) noexcept = default;
-  BlockKeys& operator=(BlockKeys other) noexcept {
-    keys_ = std::move(other.keys_);
+  BlockKeys& operator=(const BlockKeys& other) {
+    if (this != &other) keys_ = other.keys_ ? std::make_unique<Keys>(*other.keys_) : nullptr;
     return *this;
   }
+  BlockKeys& operator=(BlockKeys&&) noexcept = default;
   ~BlockKeys() = default;
   // Of a slot whose key was set.
   [[nodiscard]] ValueKey operator[](std::size_t slot) const { return (*keys_)[slot]; }
@@ -164,6 +165,8 @@ struct FrontState {
     return number == kNone ? nullptr : &blocks[number];
   }
   Block& obtain_block(int scale, Vertex position);
+  // One of this state's blocks, found by a cursor, to be changed.
+  [[nodiscard]] static Block& own(const Block& block) { return const_cast<Block&>(block); }  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   [[nodiscard]] std::span<const std::uint8_t> cuts_of(const Split& split) const {
     return std::span(q).subspan(split.first, split.centre() - split.first);
   }

@@ -1,96 +1,94 @@
 #include "common/ivm/batch_encoder.h"
 
-#include <algorithm>
 #include <bit>
-#include <utility>
+#include <memory>
 
 #include "common/codec/byte_planes.h"
-#include "common/codec/residual_coder.h"
 #include "common/codec/split_names.h"
+#include "common/ivm/vertex_keys.h"
 
 namespace intervale {
 namespace {
 
-// Whether the vertices of an update's diamond lie on different sides. If they do not, all of them or none are across a
-// surface from the centre.
-bool is_mixed(UpdateCode code, int vertices) {
-  const int cuts = int(code.coefficients());
-  return cuts != 0 && cuts != 2 * vertices && !(cuts == vertices && code.first_cuts() == 1);
-}
+// A diamond that can be split when its turn comes.
+struct Candidate {
+  ValueKey key = 0;  // if it is split
+  PredictedValue predicted;
+  std::uint8_t near = 0;
+};
 
-}  // namespace
-
-std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) {
-  const SupercubeSet& set = volume.set();
-  // Of each group: what can be split when its turn comes, and what of that has vertices on different sides.
-  struct Candidates {
-    std::uint64_t ready = 0, mixed = 0;
-    std::array<UpdateIndex, 3> update{};      // of each class, the first one
-    std::array<std::uint32_t, 3> residual{};  // and its first residual
-  };
-  std::vector<Candidates> candidates;
-  candidates.reserve(groups.size());
-  SplittableSlots splittable(set, volume.domain(), split);
-  for (const SlotGroup& g : groups) {
-    splittable.move_to(g.key);
-    Candidates& c = candidates.emplace_back();
-    c.ready = splittable.slots() & (~split.slots(set.first(g.brick, g.supercube), set.occupancy()[g.supercube]) | g.slots);
-    const bool interior = is_interior(volume.domain(), scale_of_key(g.key), position_of_key(g.key));
-    UpdateIndex i = set.first(g.brick, g.supercube);
-    std::uint32_t residual = volume.first_residual(g.brick, g.supercube);
-    for (int cls = 0; cls < 3; ++cls) {
-      c.update[cls] = i;
-      c.residual[cls] = residual;
-      for (std::uint64_t left = set.occupancy()[g.supercube] & kSlotsOfClass[cls]; left != 0; left &= left - 1, ++i) {
-        const UpdateCode code = volume.codes()[i];
-        residual += code.coefficients();
-        const Slot slot(std::countr_zero(left));
-        if (!(c.ready >> slot & 1)) continue;
-        int vertices = diamond_type(kTypeOfSlot[slot]).vertices;
-        if (!interior) {
-          const Diamond d(centre_of(g.key, slot));
-          vertices = std::popcount(Domain::vertices(*d.row, volume.domain().tets(d)));
-        }
-        c.mixed |= std::uint64_t(is_mixed(code, vertices)) << slot;
+class BatchEncoder {
+ public:
+  BatchEncoder(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) : volume_(volume), groups_(groups) {
+    const SupercubeSet& set = volume.set();
+    const Description& d = volume.description();
+    const KeySides sides(d.format, d.range);
+    SplittableSlots splittable(set, volume.domain(), split);
+    VertexKeys around{};
+    ready_.reserve(groups.size());
+    first_.reserve(groups.size());
+    for (const SlotGroup& g : groups) {
+      splittable.move_to(g.key);
+      const std::uint64_t occupancy = set.occupancy()[g.supercube];
+      const UpdateIndex first = set.first(g.brick, g.supercube);
+      ready_.push_back(splittable.slots() & (~split.slots(first, occupancy) | g.slots));
+      first_.push_back(candidates_.size());
+      for (const Slot slot : set_bits<Slot>(ready_.back())) {
+        gather_vertex_keys(volume, splittable.around(), slot, around);
+        Candidate& c = candidates_.emplace_back();
+        c.near = std::uint8_t(nearness(sides, d.refine, around, diamond_type(kTypeOfSlot[slot]).vertices));
+        if ((g.slots >> slot & 1) == 0) continue;
+        ++updates_;
+        c.key = volume.key(first + count_below(occupancy, slot));
+        c.predicted = predict_value(class_of_slot(slot), scale_of_key(g.key), around, d.weights, d.format.last);
       }
     }
   }
-  const auto coded = [&](bool is_plain, std::size_t& plain_bytes) {
+
+  // The flags and values, range coded: without models if that is shorter.
+  [[nodiscard]] std::vector<std::uint8_t> code() const {
+    const std::size_t plain_bits = candidates_.size() + updates_ * std::size_t(std::bit_width(volume_.description().format.last));
+    std::vector<std::uint8_t> bytes = coded(false);
+    return bytes.size() > sizeof(std::uint64_t) + plain_bits / 8 ? coded(true) : bytes;
+  }
+
+ private:
+  [[nodiscard]] std::vector<std::uint8_t> coded(bool is_plain) const {
     RangeEncoder coder;
-    FlagModel flags;
-    ResidualCoder residuals;
-    residuals.is_plain = is_plain;
+    const auto models = std::make_unique<BatchModels>();
+    models->is_plain = is_plain;
     coder.raw_bits(1, unsigned(is_plain));
+    const ValueKey last = volume_.description().format.last;
     for_each_class(
-        groups.size(), [&](std::size_t g) { return groups[g].key; },
-        [&](std::size_t k, int cls) {
-          const SlotGroup& g = groups[k];
-          const Candidates& c = candidates[k];
-          const std::uint64_t occupancy = set.occupancy()[g.supercube];
-          UpdateIndex i = c.update[cls];
-          std::uint32_t residual = c.residual[cls];
-          for (std::uint64_t left = (c.ready | occupancy) & kSlotsOfClass[cls]; left != 0; left &= left - 1) {
-            const std::uint64_t bit = left & (~left + 1);
-            const bool is_named = (g.slots & bit) != 0;
-            if ((c.ready & bit) != 0) flags.code(coder, cls, (c.mixed & bit) != 0, is_plain, is_named);
-            if ((occupancy & bit) == 0) continue;
-            if (is_named) {
-              const UpdateView u = volume.update(i, residual);
-              std::array<std::uint8_t, kMaxCuts> cuts;
-              std::copy(u.residuals.begin(), u.residuals.end(), cuts.begin());
-              residuals.code_side(coder, u.side_residual);
-              residuals.code_cuts(coder, cls, u.side_residual, unsigned(u.residuals.size()), u.first_cuts, cuts.data());
-              plain_bytes += 1 + u.residuals.size();
-            }
-            residual += volume.codes()[i++].coefficients();
+        groups_.size(), [&](std::size_t g) { return groups_[g].key; },
+        [&](std::size_t g, int cls) {
+          const int scale = scale_of_key(groups_[g].key);
+          const std::uint64_t slots = ready_[g] & kSlotsOfClass[std::size_t(cls)];
+          if (slots == 0) return true;
+          const Candidate* candidate = &candidates_[first_[g] + std::size_t(count_below(ready_[g], std::countr_zero(slots)))];
+          for (const Slot slot : set_bits<Slot>(slots)) {
+            const bool is_named = (groups_[g].slots >> slot & 1) != 0;
+            models->code_flag(coder, cls, candidate->near, is_named);
+            if (is_named) models->code_key(coder, cls, scale, candidate->predicted, last, candidate->key);
+            ++candidate;
           }
           return true;
         });
     return coder.finish();
-  };
-  std::size_t plain_bytes = sizeof(std::uint64_t);
-  std::vector<std::uint8_t> diamonds = coded(false, plain_bytes);
-  if (diamonds.size() > plain_bytes) diamonds = coded(true, plain_bytes);
+  }
+
+  const IntervalVolume& volume_;
+  std::span<const SlotGroup> groups_;
+  std::vector<std::uint64_t> ready_;   // by group: the slots of its candidates
+  std::vector<std::size_t> first_;     // by group: the number of its first candidate
+  std::vector<Candidate> candidates_;  // by group and slot
+  std::size_t updates_ = 0;
+};
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) {
+  const std::vector<std::uint8_t> diamonds = BatchEncoder(volume, split, groups).code();
   std::vector<std::uint8_t> out;
   append_supercubes(out, groups);
   append_varint(out, diamonds.size());

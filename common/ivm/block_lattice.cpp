@@ -14,11 +14,11 @@ std::vector<BrickRun> blocks_of(const SupercubeSet& set) {
   return blocks;
 }
 
-BlockLattice::BlockLattice(const FieldDescription& description, const SupercubeSet& set, const ValueKeys& keys)
-    : description_(description),
-      set_(set),
-      values_(keys),
-      levels_(Domain(description.grid.dims).levels()),
+BlockLattice::BlockLattice(const PagedValues& values)
+    : corners_(values.corners),
+      set_(values.set),
+      values_(values.keys),
+      levels_(Domain(values.grid.dims).levels()),
       keys_(std::size_t(kSide) * kSide * kSide, kNoKey) {}
 
 BlockLattice::Offsets BlockLattice::make_offsets() {
@@ -51,7 +51,7 @@ void BlockLattice::move_to(BlockKey block, Load load) {
   for (int v = 0; v < kRootVertices; ++v) {
     const Vertex c = root.vertex(v), p{(c.x >> scale_) - first_.x, (c.y >> scale_) - first_.y, (c.z >> scale_) - first_.z};
     if (std::min({p.x, p.y, p.z}) < 0 || std::max({p.x, p.y, p.z}) > kSide - 2) continue;
-    keys_[std::size_t(point_of(p.x, p.y, p.z))] = description_.corners[std::size_t(v)];
+    keys_[std::size_t(point_of(p.x, p.y, p.z))] = corners_[std::size_t(v)];
   }
   for (int scale = levels_ - 1; scale > scale_; --scale) load_scale(scale, false);
   if (load != Load::coarser) load_scale(scale_, load == Load::own);

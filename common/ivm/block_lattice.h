@@ -12,7 +12,7 @@
 
 #include "common/codec/value_prediction.h"
 #include "common/diamond/supercube.h"
-#include "common/ivm/value_volume.h"
+#include "common/ivm/paged_values.h"
 
 namespace intervale {
 
@@ -32,8 +32,8 @@ class BlockLattice {
  public:
   static constexpr int kSide = 66;  // points on an axis, from -1 to 64
 
-  // All must outlive it; the keys may change.
-  BlockLattice(const FieldDescription& description, const SupercubeSet& set, const ValueKeys& keys);
+  // What the values refer to must outlive it; the keys may change.
+  explicit BlockLattice(const PagedValues& values);
 
   enum class Load {
     coarser,  // the points of coarser scales
@@ -53,7 +53,7 @@ class BlockLattice {
 
   [[nodiscard]] ValueKey key(Point point) const { return keys_[std::size_t(point)]; }
   void set_key(Point point, ValueKey key) { keys_[std::size_t(point)] = key; }
-  // The keys of a diamond's vertices, or kNoKey.
+  // The keys of a diamond's vertices, or kNoKey: for those that the set lacks, or that are not loaded.
   void gather(Point centre, Slot slot, VertexKeys& keys) const {
     const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
     const auto& offset = offsets().vertex[slot];
@@ -73,7 +73,7 @@ class BlockLattice {
   static constexpr Point point_of(std::int32_t x, std::int32_t y, std::int32_t z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
   void load_scale(int scale, bool own_only);
 
-  const FieldDescription& description_;
+  const std::array<ValueKey, kRootVertices>& corners_;
   const SupercubeSet& set_;
   const ValueKeys& values_;
   int levels_, scale_ = 0;

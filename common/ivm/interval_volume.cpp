@@ -7,8 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "common/codec/root_patch.h"
-
 namespace intervale {
 namespace {
 
@@ -26,14 +24,19 @@ std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& pa
   h = hash(std::span<const double>(d.grid.origin), h);
   const double range[2] = {d.range.alpha, d.range.beta};
   h = hash(range, sizeof range, h);
-  h = hash(std::span<const std::uint8_t>(d.root_patch), h);
+  const double step = d.format.step;
+  h = hash(&step, sizeof step, h);
+  const std::uint64_t format[4] = {std::uint64_t(d.format.type), std::uint64_t(d.format.first), d.format.last, std::uint64_t(d.is_exact)};
+  h = hash(format, sizeof format, h);
+  h = hash(std::span<const ValueKey>(d.corners), h);
+  h = hash(&d.weights, sizeof d.weights, h);
   for (const SupercubeSet::Brick& b : parts.set.bricks()) {
     const std::uint64_t brick[2] = {b.key, b.mask};
     h = hash(brick, sizeof brick, h);
   }
   h = hash(parts.set.occupancy(), h);
-  h = hash(std::span<const UpdateCode>(parts.codes), h);
-  h = hash(std::span<const std::uint8_t>(parts.residuals), h);
+  h = hash(parts.keys.bytes(), h);
+  h = hash(std::span<const std::uint8_t>(parts.steps), h);
   h = hash(std::span<const float>(parts.error_steps), h);
   return hash(std::span<const ErrorToDistance>(parts.error_to_distance), h);
 }
@@ -71,32 +74,24 @@ IntervalVolume::IntervalVolume(Parts parts)
     : description_(std::move(parts.description)),
       domain_(description_.grid.dims),
       set_(std::move(parts.set)),
-      codes_(std::move(parts.codes)),
-      residuals_(std::move(parts.residuals)),
+      keys_(std::move(parts.keys)),
+      steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
       error_to_distance_(std::move(parts.error_to_distance)),
       reach_(float(diamond_width(description_.grid) / 2)) {
   const auto unit = float(error_to_distance_unit(description_.grid, error_steps_.empty() ? 0.0 : double(error_steps_.back())));
   for (unsigned code = 0; code < factor_.size(); ++code) factor_[code] = ErrorToDistance(std::uint8_t(code)).ratio(unit);
   brick_object_error_.resize(set_.bricks().size());
-  supercube_half_step_.reserve(set_.supercubes());
-  brick_first_.reserve(set_.bricks().size());
-  first_in_brick_.reserve(set_.supercubes());
+  supercube_step_.reserve(set_.supercubes());
   brick_step_.reserve(set_.bricks().size());
-  std::uint32_t n = 0;
   for (BrickIndex b{0}; b < set_.bricks().size(); ++b) {
-    brick_first_.push_back(n);
     brick_step_.push_back(0);
     set_.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
-      first_in_brick_.push_back(std::uint16_t(n - brick_first_[b]));
       const UpdateIndex first = set_.first(b, s), end = first + std::popcount(set_.occupancy()[s]);
-      unsigned most = 0;
-      for (UpdateIndex i = first; i < end; ++i) {
-        n += codes_[i].coefficients();
-        most = std::max(most, codes_[i].error_step());
-      }
-      supercube_half_step_.push_back(half_of_step(most));
-      brick_step_[b] = std::max(brick_step_[b], std::uint16_t(most));
+      std::uint8_t most = 0;
+      for (UpdateIndex i = first; i < end; ++i) most = std::max(most, steps_[i]);
+      supercube_step_.push_back(most);
+      brick_step_[b] = std::max(brick_step_[b], most);
       brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
     });
   }
@@ -105,9 +100,9 @@ IntervalVolume::IntervalVolume(Parts parts)
 Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
-  if (parts.codes.size() != parts.set.size() || parts.error_to_distance.size() != parts.set.supercubes())
-    return fail("the numbers of codes or supercubes do not match the set");
-  if (parts.error_steps.size() > kMaxErrorSteps || (parts.error_steps.empty() && !parts.codes.empty()))
+  if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.error_to_distance.size() != parts.set.supercubes())
+    return fail("the numbers of values, errors or supercubes do not match the set");
+  if (parts.error_steps.size() > kMaxErrorSteps || (parts.error_steps.empty() && !parts.steps.empty()))
     return fail("the number of errors is out of range");
   for (std::size_t i = 0; i < parts.error_steps.size(); ++i) {
     if (!std::isfinite(parts.error_steps[i]) || parts.error_steps[i] < (i == 0 ? 0.0f : parts.error_steps[i - 1]))
@@ -117,32 +112,20 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   for (const SupercubeSet::Brick& brick : parts.set.bricks()) {
     if (scale_of_key(brick.key) >= levels) return fail("a brick is coarser than the box");
   }
-  std::uint64_t coefficients = 0;
-  for (UpdateCode c : parts.codes) {
-    if (c.side_residual() > 2 || c.coefficients() > kMaxCuts || c.error_step() >= parts.error_steps.size())
-      return fail("an update's code is invalid");
-    coefficients += c.coefficients();
+  for (const std::uint16_t step : parts.steps) {
+    if (step >= parts.error_steps.size()) return fail("an update's error is out of range");
   }
-  if (coefficients != parts.residuals.size()) return fail("the codes require another number of coefficients");
-  if (coefficients > std::numeric_limits<std::uint32_t>::max()) return fail("more than 2^32 coefficients");
-  const Domain domain(d.grid.dims);
-  if (auto root_patch = decode_root_patch(d.root_patch, domain); !root_patch) return tl::unexpected(root_patch.error());
-  parts.description.updates = parts.codes.size();
-  parts.description.coefficients = coefficients;
+  for (std::size_t i = 0; i < parts.keys.size(); ++i) {
+    if (parts.keys[i] > d.format.last) return fail("an update's value is out of range");
+  }
+  parts.description.updates = parts.set.size();
   parts.description.content_hash = content_hash(d, parts);
   return IntervalVolume(std::move(parts));
 }
 
-UpdateView IntervalVolume::update(const Place& p) const {
-  std::uint32_t residual = first_residual(p.brick, p.supercube);
-  for (UpdateIndex i = set_.first(p.brick, p.supercube); i < p.index; ++i) residual += codes_[i].coefficients();
-  return update(p.index, residual);
-}
-
 std::size_t IntervalVolume::memory_bytes() const {
-  return sizeof *this + description_.root_patch.size() + set_.memory_bytes() + codes_.size() * sizeof(UpdateCode) + brick_first_.size() * 4 +
-         brick_step_.size() * 2 + brick_object_error_.size() * 4 + error_to_distance_.size() + supercube_half_step_.size() +
-         first_in_brick_.size() * 2 + residuals_.size() + error_steps_.size() * sizeof(float);
+  return sizeof *this + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() + brick_step_.size() + brick_object_error_.size() * 4 +
+         error_to_distance_.size() + supercube_step_.size() + error_steps_.size() * sizeof(float);
 }
 
 }  // namespace intervale

@@ -1,35 +1,36 @@
-// Interval volumes as files (.ivm). FORMAT.md is the specification.
+// Interval volumes, data sets of one range, as files (.ivm). FORMAT.md is the specification.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
+#include "common/ivm/ivm_container.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 
 namespace intervale {
 
-inline constexpr std::uint32_t kIvmVersion = 4;
-
-// The file's bytes. Equal volumes give equal bytes; the name is not stored.
+// The file's bytes. Equal volumes give equal bytes, whatever `parallel` is; the name is not stored. Weights of scales that
+// the box has not are 0.
 [[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
 // The inverse, for bytes from outside: checks every checksum, and every count against the number of bytes before it
 // allocates.
-[[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name);
+[[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial);
 
 // Writes a temporary file and renames it.
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
-// The bytes of an .ivm file, for decode_ivm. Checks the header and the length first, and allocates nothing for another
-// file. Errors begin with the path.
+// The bytes of an .ivm file of one range, for decode_ivm. Checks the header and the length first, and allocates nothing
+// for another file. Errors begin with the path.
 [[nodiscard]] Result<std::vector<std::byte>> read_ivm(const std::filesystem::path& path);
 
 // read_ivm, then decode_ivm; the name is the file's, without folders and extension. Errors begin with the path.
-[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path);
+[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// The values of every range as a file: version 5 of the .ivm format. FORMAT-5.md is the specification.
+// Data sets of every range as files (.ivm). FORMAT.md is the specification.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +15,8 @@
 
 namespace intervale {
 
-inline constexpr std::uint32_t kValueFileVersion = 5;
-
-// Whether a file begins like one of this format, of whatever version from kValueFileVersion on. False if it cannot be
-// read: those who open it say why.
+// Whether a file is a data set of every range, from its beginning. False if it cannot be read, or is of another version:
+// those who open it say why.
 [[nodiscard]] bool is_value_file(const std::filesystem::path& path);
 
 // The file's bytes. Equal volumes give equal bytes, whatever `parallel` is; the name is not stored.
@@ -31,7 +29,8 @@ inline constexpr std::uint32_t kValueFileVersion = 5;
 // Writes a temporary file and renames it. Returns the number of bytes.
 [[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial);
 
-// The file's contents; the name is the file's, without folders and extension. Errors begin with the path.
+// Checks the header and the length before it allocates, then decode_values; the name is the file's, without folders and extension. Errors begin with
+// the path.
 [[nodiscard]] Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

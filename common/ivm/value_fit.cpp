@@ -58,16 +58,16 @@ struct NormalEquations {
 
 using ByClass = std::array<NormalEquations, 3>;
 
-ByClass equations_of(const ValueVolume::Parts& parts, BlockLattice& lattice, const BrickRun& block) {
+ByClass equations_of(const PagedValues& values, BlockLattice& lattice, const BrickRun& block) {
   ByClass equations;
   VertexKeys around{};
-  lattice.move_to(block_of(parts.set.bricks()[block.first].key), BlockLattice::Load::own);
+  lattice.move_to(block_of(values.set.bricks()[block.first].key), BlockLattice::Load::own);
   for (BrickIndex brick = block.first; brick < block.end; ++brick) {
-    parts.set.for_each_in_brick(brick, ~std::uint64_t(0), [&](const Place& p) {
+    values.set.for_each_in_brick(brick, ~std::uint64_t(0), [&](const Place& p) {
       lattice.gather(lattice.at(p.key) + BlockLattice::of_slot(p.slot), p.slot, around);
       fill_missing(around, diamond_type(kTypeOfSlot[p.slot]).vertices);
       const int cls = class_of_slot(p.slot);
-      equations[std::size_t(cls)].add(predictor_values(cls, around), parts.keys[p.index]);
+      equations[std::size_t(cls)].add(predictor_values(cls, around), values.keys[p.index]);
     });
   }
   return equations;
@@ -75,16 +75,16 @@ ByClass equations_of(const ValueVolume::Parts& parts, BlockLattice& lattice, con
 
 }  // namespace
 
-ValueWeights fit_weights(const ValueVolume::Parts& parts, const ParallelFor& parallel) {
-  const std::vector<BrickRun> blocks = blocks_of(parts.set);
+ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel) {
+  const std::vector<BrickRun> blocks = blocks_of(values.set);
   std::vector<ByClass> found(blocks.size());
   parallel(blocks.size(), [&](std::size_t i) {
-    BlockLattice lattice(parts.description, parts.set, parts.keys);
-    found[i] = equations_of(parts, lattice, blocks[i]);
+    BlockLattice lattice(values);
+    found[i] = equations_of(values, lattice, blocks[i]);
   });
   std::array<ByClass, kMaxLevels> sums{};
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    ByClass& sum = sums[std::size_t(scale_of_key(parts.set.bricks()[blocks[i].first].key))];
+    ByClass& sum = sums[std::size_t(scale_of_key(values.set.bricks()[blocks[i].first].key))];
     for (std::size_t cls = 0; cls < 3; ++cls) sum[cls].add(found[i][cls]);
   }
   ValueWeights weights;

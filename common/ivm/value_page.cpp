@@ -13,18 +13,23 @@ std::uint32_t first_of(const SupercubeSet& set, BrickIndex brick) {
   return brick < set.bricks().size() ? std::uint32_t(set.bricks()[brick].first) : set.size();
 }
 
-// Codes pages. Coder is a RangeEncoder, and Parts const; or a RangeDecoder, which sets keys and error levels.
-template <class Coder, class Parts>
+// What a coder works on, as values to be read.
+const PagedValues& read_only(const PagedValues& values) { return values; }
+const PagedValues& read_only(const DecodedValues& to) { return to.values; }
+
+// Codes pages. Coder is a RangeEncoder, and Values are PagedValues; or a RangeDecoder, and DecodedValues, which it sets.
+template <class Coder, class Values>
 class PageCoder {
  public:
-  PageCoder(Coder& coder, Parts& parts) : coder_(coder), parts_(parts), lattice_(parts.description, parts.set, parts.keys) {}
+  PageCoder(Coder& coder, const Values& values) : coder_(coder), to_(values), values_(read_only(values)), lattice_(values_) {}
 
   // False if what was decoded is not a page.
   [[nodiscard]] bool code(const ValuePage& page) {
     return std::all_of(page.begin(), page.end(), [this](const BrickRun& block) {
-      const SupercubeKey key = parts_.set.bricks()[block.first].key;
+      const SupercubeKey key = values_.set.bricks()[block.first].key;
       lattice_.move_to(block_of(key), BlockLattice::Load::coarser);
-      if (!code_keys(block) || (scale_of_key(key) != 0 && !code_error_levels(block))) return false;
+      const bool has_levels = values_.error_levels != nullptr && scale_of_key(key) != 0;
+      if (!code_keys(block) || (has_levels && !code_error_levels(block))) return false;
       if constexpr (kDecodes) return !coder_.is_overdrawn();
       return true;
     });
@@ -34,7 +39,7 @@ class PageCoder {
   // Calls visit(index, slot, point) for the diamonds of one class in a block.
   template <class Visit>
   void for_each_in_block(const BrickRun& block, int cls, Visit&& visit) {
-    const SupercubeSet& set = parts_.set;
+    const SupercubeSet& set = values_.set;
     for (BrickIndex brick = block.first; brick < block.end; ++brick) {
       set.for_each_supercube(brick, [&](SupercubeIndex supercube, SupercubeKey key) {
         const std::uint64_t occupancy = set.occupancy()[supercube], slots = occupancy & kSlotsOfClass[std::size_t(cls)];
@@ -48,8 +53,8 @@ class PageCoder {
 
   // The keys of a block, class by class.
   bool code_keys(const BrickRun& block) {
-    const ValueKey last = parts_.description.format.last;
-    const int scale = scale_of_key(parts_.set.bricks()[block.first].key);
+    const ValueKey last = values_.format.last;
+    const int scale = scale_of_key(values_.set.bricks()[block.first].key);
     VertexKeys around{};
     bool is_valid = true;
     for (int cls = 0; cls < 3; ++cls) {
@@ -57,10 +62,10 @@ class PageCoder {
         lattice_.gather(centre, slot, around);
         is_valid = is_valid && around[0] != kNoKey && around[1] != kNoKey;
         fill_missing(around, diamond_type(kTypeOfSlot[slot]).vertices);
-        const ValueKey key = models_.code(coder_, cls, scale, around, parts_.weights, last, kDecodes ? 0 : parts_.keys[i]);
+        const ValueKey key = models_.code(coder_, cls, scale, around, values_.weights, last, kDecodes ? 0 : values_.keys[i]);
         is_valid = is_valid && key <= last;
         lattice_.set_key(centre, key);
-        if constexpr (kDecodes) parts_.keys.set(i, key);
+        if constexpr (kDecodes) to_.keys.set(i, key);
       });
     }
     return is_valid;
@@ -69,20 +74,19 @@ class PageCoder {
   // The error levels of a block, children before parents: a level is no lower than those of the children, and mostly no
   // lower than that of the spine's error.
   bool code_error_levels(const BrickRun& block) {
-    const FieldDescription& d = parts_.description;
     least_.assign(std::size_t(BlockLattice::kSide) * BlockLattice::kSide * BlockLattice::kSide, 0);
     bool is_valid = true;
     std::int64_t last = 0;
     for (int cls = 2; cls >= 0; --cls) {
       for_each_in_block(block, cls, [&](UpdateIndex i, Slot slot, BlockLattice::Point centre) {
         const auto vertex = [&](int v) { return centre + BlockLattice::to_vertex(slot, v); };
-        const double error = spine_error(d.format, lattice_.key(vertex(0)), lattice_.key(vertex(1)), lattice_.key(centre));
-        const std::int64_t least = std::max(least_[std::size_t(centre)], ValueVolume::level_of_error(d.max_error, error));
+        const double error = spine_error(values_.format, lattice_.key(vertex(0)), lattice_.key(vertex(1)), lattice_.key(centre));
+        const std::int64_t least = std::max(least_[std::size_t(centre)], ValueVolume::level_of_error(values_.max_error, error));
         const std::int64_t near = cls < 2 ? 0 : std::clamp<std::int64_t>(last - least, 0, kNear - 1);
-        last = least + error_models_[std::size_t(cls)][std::size_t(near)].code(coder_, kDecodes ? 0 : parts_.error_levels[i] - least);
+        last = least + error_models_[std::size_t(cls)][std::size_t(near)].code(coder_, kDecodes ? 0 : (*values_.error_levels)[i] - least);
         is_valid = is_valid && last >= 0 && last < kErrorLevels;
         const auto level = ErrorLevel(last);
-        if constexpr (kDecodes) parts_.error_levels[i] = level;
+        if constexpr (kDecodes) (*to_.error_levels)[i] = level;
         for (int v = 0; v < diamond_type(kTypeOfSlot[slot]).vertices; ++v) {
           ErrorLevel& of_vertex = least_[std::size_t(vertex(v))];
           of_vertex = std::max(of_vertex, level);
@@ -92,10 +96,11 @@ class PageCoder {
     return is_valid;
   }
 
-  static constexpr bool kDecodes = !std::is_const_v<Parts>;
+  static constexpr bool kDecodes = std::is_same_v<Values, DecodedValues>;
   static constexpr int kNear = 7;  // how far the level coded before may lie above the least one, and make a difference
   Coder& coder_;
-  Parts& parts_;
+  const Values& to_;
+  const PagedValues& values_;
   BlockLattice lattice_;
   std::vector<ErrorLevel> least_;  // by point: the highest level of a child, so far
   ValueModels models_;
@@ -104,16 +109,16 @@ class PageCoder {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_page(const ValueVolume::Parts& parts, const ValuePage& page) {
+std::vector<std::uint8_t> encode_page(const PagedValues& values, const ValuePage& page) {
   RangeEncoder coder;
-  const auto pages = std::make_unique<PageCoder<RangeEncoder, const ValueVolume::Parts>>(coder, parts);
+  const auto pages = std::make_unique<PageCoder<RangeEncoder, PagedValues>>(coder, values);
   (void)pages->code(page);
   return coder.finish();
 }
 
-bool decode_page(ValueVolume::Parts& parts, const ValuePage& page, std::span<const std::uint8_t> bytes) {
+bool decode_page(const DecodedValues& to, const ValuePage& page, std::span<const std::uint8_t> bytes) {
   RangeDecoder coder(bytes);
-  const auto pages = std::make_unique<PageCoder<RangeDecoder, ValueVolume::Parts>>(coder, parts);
+  const auto pages = std::make_unique<PageCoder<RangeDecoder, DecodedValues>>(coder, to);
   return pages->code(page) && coder.is_spent();
 }
 

@@ -1,4 +1,4 @@
-// Pages: the values and errors of some diamonds, coded together. FORMAT-5.md is the specification.
+// Pages: the values and errors of some diamonds, coded together. FORMAT.md is the specification.
 //
 // A page is a run of blocks (block_lattice.h). What is predicted in a block reads only values of the block itself and of
 // coarser scales, so a page can be decoded as soon as the coarser pages are.
@@ -10,7 +10,7 @@
 
 #include "common/codec/value_coder.h"
 #include "common/ivm/block_lattice.h"
-#include "common/ivm/value_volume.h"
+#include "common/ivm/paged_values.h"
 #include "common/util/parallel.h"
 
 namespace intervale {
@@ -24,15 +24,16 @@ inline constexpr std::uint32_t kPageValuesMost = 1 << 18;  // in a page of more 
 // fit; each further one has blocks of one scale.
 [[nodiscard]] std::vector<ValuePage> pages_of(const SupercubeSet& set);
 
-// The bytes of a page: the keys and error levels of its diamonds. Needs 2 MB.
-[[nodiscard]] std::vector<std::uint8_t> encode_page(const ValueVolume::Parts& parts, const ValuePage& page);
+// The bytes of a page: the keys of its diamonds, and their error levels if the data set has them. Needs 2 MB.
+[[nodiscard]] std::vector<std::uint8_t> encode_page(const PagedValues& values, const ValuePage& page);
 
 // The inverse, for bytes from outside: sets the page's keys and error levels, in arrays that have their sizes; those of
-// all coarser scales are set. False if the bytes are not a page. Pages of one scale may be decoded at the same time.
-[[nodiscard]] bool decode_page(ValueVolume::Parts& parts, const ValuePage& page, std::span<const std::uint8_t> bytes);
+// all coarser scales are set. False if the bytes are not a page, or if the set lacks an end of a diamond's spine. Pages of
+// one scale may be decoded at the same time.
+[[nodiscard]] bool decode_page(const DecodedValues& to, const ValuePage& page, std::span<const std::uint8_t> bytes);
 
-// The least-squares coefficients that predict the values best, by class and scale. The keys are known. The same for any
-// number of threads.
-[[nodiscard]] ValueWeights fit_weights(const ValueVolume::Parts& parts, const ParallelFor& parallel = serial);
+// The least-squares coefficients that predict the values best, by class and scale. Set, keys and description are known;
+// the weights are not read. The same for any number of threads.
+[[nodiscard]] ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

@@ -109,7 +109,7 @@ std::vector<SlotGroup> select(const ValueVolume& volume, const RangeLod& wanted,
   const std::vector<BrickRun> blocks = blocks_of(set);
   Slots slots(set.supercubes());
   parallel(blocks.size(), [&](std::size_t i) {
-    BlockLattice lattice(parts.description, set, parts.keys);
+    BlockLattice lattice(parts);
     chosen.find(lattice, blocks[i].first, blocks[i].end, slots);
   });
   close(set, slots);

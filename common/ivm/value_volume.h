@@ -12,39 +12,17 @@
 #include <string>
 #include <vector>
 
-#include "common/codec/root_patch.h"
 #include "common/codec/value_prediction.h"
 #include "common/diamond/domain.h"
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
 #include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/value_keys.h"
 #include "common/ivm/volume_table.h"
 #include "common/patch/value_format.h"
 #include "common/util/result.h"
 
 namespace intervale {
-
-// Keys by number, in as many bytes each as the greatest one needs.
-class ValueKeys {
- public:
-  ValueKeys() = default;
-  ValueKeys(std::size_t size, ValueKey last) : width_(last < 1u << 8 ? 1 : last < 1u << 16 ? 2 : 4), bytes_(size * width_) {}
-  [[nodiscard]] std::size_t size() const { return bytes_.size() / width_; }
-  [[nodiscard]] ValueKey operator[](std::size_t i) const {
-    const std::uint8_t* const at = bytes_.data() + i * width_;
-    ValueKey key = at[0];
-    for (unsigned b = 1; b < width_; ++b) key |= ValueKey(at[b]) << (8 * b);
-    return key;
-  }
-  void set(std::size_t i, ValueKey key) {
-    for (unsigned b = 0; b < width_; ++b) bytes_[i * width_ + b] = std::uint8_t(key >> (8 * b));
-  }
-  [[nodiscard]] std::size_t memory_bytes() const { return bytes_.size(); }
-
- private:
-  unsigned width_ = 1;
-  std::vector<std::uint8_t> bytes_;
-};
 
 // Errors of diamonds of scale 1 and coarser, saturated over all children, are rounded up to one of 32 levels: 0, and the
 // largest error over powers of two. Those of scale 0 follow from the values.

@@ -3,9 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "common/codec/root_patch.h"
-#include "common/front/front.h"
-#include "common/front/split_update.h"
+#include "common/ivm/extraction.h"
 
 namespace intervale {
 namespace {
@@ -20,9 +18,7 @@ Result<void> validate(const IntervalVolume& volume) {
   const SupercubeSet& set = volume.set();
   const auto error_steps = volume.error_steps();
   if (description.max_error != (error_steps.empty() ? 0.0 : double(error_steps.back()))) return fail("the largest error is not that of any update");
-  const auto root_patch = decode_root_patch(description.root_patch, domain);
-  if (!root_patch) return tl::unexpected(root_patch.error());
-  Front front(description.grid, *root_patch);
+  Front front = root_front(description);
   std::optional<Error> wrong;
   set.for_each_down([&](const Place& p) {
     if (wrong) return;
@@ -39,7 +35,7 @@ Result<void> validate(const IntervalVolume& volume) {
       const auto parent = set.find(q);
       if (parent && volume.error_step(parent->index) < volume.error_step(p.index)) wrong = Error{"an error is greater than its parent's" + where(c)};
     }
-    if (!apply_update(front, *handle, volume.update(p))) wrong = Error{"an update's coefficients do not fit the sides around it" + where(c)};
+    front.split(*handle, volume.key(p.index));
   });
   if (wrong) return tl::unexpected(*wrong);
   if (const auto broken = front.validate()) return fail(*broken);

@@ -1,5 +1,6 @@
 #include "common/patch/description.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace intervale {
@@ -16,6 +17,9 @@ Result<void> check_grid(const Grid& grid) {
 Result<void> check_description(const Description& d) {
   if (auto grid = check_grid(d.grid); !grid) return grid;
   if (!(d.range.alpha <= d.range.beta)) return fail("invalid range: alpha is greater than beta");
+  if (auto format = check_value_format(d.format); !format) return format;
+  if (std::any_of(d.corners.begin(), d.corners.end(), [&d](ValueKey key) { return key > d.format.last; }))
+    return fail("a corner's value is out of range");
   if (!(d.max_error >= 0) || !std::isfinite(d.max_error)) return fail("the largest error is negative or not finite");
   return {};
 }

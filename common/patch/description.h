@@ -4,9 +4,11 @@
 #include <array>
 #include <cstdint>
 #include <string>
-#include <vector>
 
+#include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
+#include "common/patch/value_format.h"
+#include "common/patch/value_weights.h"
 #include "common/util/result.h"
 
 namespace intervale {
@@ -34,20 +36,23 @@ struct Description {
   Grid grid;
   Range range;
   Refine refine = Refine::boundary;
-  double max_error = 0;            // the largest error of a relevant diamond, in the field's units; 0 if there is none
-  std::uint64_t updates = 0;       // relevant diamonds
-  std::uint64_t coefficients = 0;  // cuts on their subdivision edges
+  ValueFormat format;                             // of the values
+  bool is_exact = true;                           // whether every sample is the value of its key
+  std::array<ValueKey, kRootVertices> corners{};  // at the root's vertices, in local order
+  ValueWeights weights;                           // of the prediction of values
+  double max_error = 0;                           // the largest error of a relevant diamond, in the field's units; 0 if there is none
+  std::uint64_t updates = 0;                      // relevant diamonds
+  std::uint64_t coefficients = 0;                 // cuts on their subdivision edges, at full detail
   FullMesh full;
-  std::uint64_t content_hash = 0;        // of the contents; the name does not count
-  std::vector<std::uint8_t> root_patch;  // the root patch, encoded: sides of the 8 corners, cuts on the root's edges (root_patch.h)
+  std::uint64_t content_hash = 0;  // of the contents; the name does not count
   friend bool operator==(const Description&, const Description&) = default;
 };
 
 // Checks a grid from outside: sides within bounds, a box that is finite and not flat.
 [[nodiscard]] Result<void> check_grid(const Grid& grid);
 
-// Checks a description from outside: sides within bounds, a box that is finite and not flat, a valid range, a finite
-// error. decode_root_patch checks the root patch.
+// Checks a description from outside: sides within bounds, a box that is finite and not flat, a valid range, a format
+// as check_value_format accepts it with the corners' keys in it, a finite error.
 [[nodiscard]] Result<void> check_description(const Description& description);
 
 }  // namespace intervale

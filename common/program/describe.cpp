@@ -18,11 +18,14 @@ nlohmann::ordered_json to_json(const Description& description) {
   const FullMesh& full = description.full;
   return {
       {"name", description.name},
+      {"scope", "one"},
       {"dims", grid.dims},
       {"spacing", grid.spacing},
       {"origin", grid.origin},
       {"range", nlohmann::ordered_json::array({number(description.range.alpha), number(description.range.beta)})},
       {"refine", description.refine == Refine::uniform ? "uniform" : "boundary"},
+      {"values", {{"least", description.format.least()}, {"greatest", description.format.greatest()}}},
+      {"step", description.is_exact ? 0.0 : description.format.step},
       {"max_error", number(description.max_error)},
       {"updates", description.updates},
       {"coefficients", description.coefficients},

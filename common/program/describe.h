@@ -7,8 +7,10 @@
 
 namespace intervale {
 
-// name dims spacing origin range refine max_error updates coefficients full{vertices tets indexed_bytes}. Infinite
-// ends of the range are the strings "-inf" and "inf", since JSON has no such numbers.
+// name scope dims spacing origin range refine values{least greatest} step max_error updates coefficients full{vertices
+// tets indexed_bytes}. scope is "one": the updates are those of one range. values: of the field. step: how far the kept
+// values are apart; 0 if they are exact. Infinite ends of the range are the strings "-inf" and "inf", since JSON has no
+// such numbers.
 [[nodiscard]] nlohmann::ordered_json to_json(const Description& description);
 
 }  // namespace intervale

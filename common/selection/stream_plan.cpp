@@ -51,8 +51,8 @@ StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(s
     pending_[b].error_step = std::uint16_t(volume_->brick_error_step(b));
     pending_[b].object_error = Up16(volume_->brick_object_error(b));
   }
-  const auto half_steps = volume_->supercube_half_steps();
-  half_steps_.assign(half_steps.begin(), half_steps.end());
+  const auto steps = volume_->supercube_error_steps();
+  supercube_steps_.assign(steps.begin(), steps.end());
 }
 
 bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
@@ -87,7 +87,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const unsigned error_step = volume_->error_step(i);
     pending.error_step = std::max(pending.error_step, std::uint16_t(error_step));
     pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(here.supercube, scale_of_key(g.key), error_step)));
-    half_steps_[here.supercube] = std::max(half_steps_[here.supercube], volume_->half_of_step(error_step));
+    supercube_steps_[here.supercube] = std::max(supercube_steps_[here.supercube], std::uint8_t(error_step));
   });
   return true;
 }
@@ -166,7 +166,7 @@ bool StreamPlan::add_with_ancestors(const Place& place, SetNeighbours& around, B
 }
 
 bool StreamPlan::add(const Place& place, BatchBuilder& builder) {
-  std::size_t bytes = 1 + volume_->codes()[place.index].coefficients();
+  std::size_t bytes = 1 + volume_->keys().width();
   SlotGroup* group = builder.find(place.supercube);
   const bool new_brick = group == nullptr && !builder.bricks.contains(place.brick);
   if (group == nullptr) bytes += kSupercubeBytes + (new_brick ? kBrickBytes : 0);
@@ -220,7 +220,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const SupercubeIndex s = first.supercube;
   const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
-  Unsent rest{.error_step = volume_->step_of_half(half_steps_[s])};
+  Unsent rest{.error_step = supercube_steps_[s]};
   if (candidates == 0) return rest;
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
@@ -237,7 +237,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
     rest.error_step = std::max(rest.error_step, volume_->error_step(first.index + std::countr_zero(others)));
   }
-  half_steps_[s] = volume_->half_of_step(rest.error_step);
+  supercube_steps_[s] = std::uint8_t(rest.error_step);
   return rest;
 }
 

@@ -105,9 +105,8 @@ class StreamPlan {
 
   std::shared_ptr<const IntervalVolume> volume_;
   SplitSet sent_;
-  std::vector<Pending> pending_;  // by brick
-  // By supercube: bound on the error step of the unsent updates, as half_of_step().
-  std::vector<std::uint8_t> half_steps_;
+  std::vector<Pending> pending_;               // by brick
+  std::vector<std::uint8_t> supercube_steps_;  // by supercube: bound on the error step of the unsent updates
   std::optional<Ranking> ranking_;
   std::optional<SplitSet> budget_;  // with max_updates: the updates within the budget
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);

@@ -9,9 +9,6 @@ namespace intervale {
 // Calls piece(i) for every i in [0, count), in any order, possibly on several threads. Returns when all calls are done.
 using ParallelFor = std::function<void(std::size_t count, const std::function<void(std::size_t)>& piece)>;
 
-// Called from time to time with the fraction done, 0 to 1, by the thread that called the computation.
-using OnProgress = std::function<void(double)>;
-
 // A ParallelFor that runs on the calling thread.
 inline void serial(std::size_t count, const std::function<void(std::size_t)>& piece) {
   for (std::size_t i = 0; i < count; ++i) piece(i);

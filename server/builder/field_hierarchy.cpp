@@ -11,13 +11,17 @@
 #include <tuple>
 
 #include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/value_page.h"
 #include "common/patch/tet_cases.h"
 #include "common/util/bits.h"
+#include "server/builder/all_cores.h"
 #include "server/builder/error_steps.h"
+#include "server/builder/find_keys.h"
 #include "server/builder/interpolation_error.h"
 #include "server/builder/relevance.h"
 #include "server/builder/supercube_family.h"
 #include "server/builder/surface_deviation.h"
+#include "server/builder/value_steps.h"
 
 namespace intervale {
 namespace {
@@ -241,7 +245,7 @@ std::vector<ErrorToDistance> FieldHierarchy::error_to_distance(const IntervalVol
       const double width = diamond_width(volume_.grid) * double(1 << scale_of_key(key));
       double furthest = 0, ratio = 0;
       for (UpdateIndex i = first; i < end; ++i) {
-        const double error = double(parts.error_steps[parts.codes[i].error_step()]);
+        const double error = double(parts.error_steps[parts.steps[i]]);
         if (error == 0) continue;
         furthest = std::max(furthest, double(deviation.largest[i]));
         ratio = std::max(ratio, double(deviation.largest[i]) / error);
@@ -289,39 +293,34 @@ std::vector<std::uint8_t> FieldHierarchy::cuts(const Diamond& d) const {
   return cuts;
 }
 
-// What one brick's updates add to the interval volume, besides their codes.
+// What one brick's updates add to the interval volume, besides their values and errors.
 struct FieldHierarchy::BrickPart {
-  std::vector<std::uint8_t> residuals;
+  std::uint64_t coefficients = 0;
   FullMesh full;              // vertices: only samples that are centres
   std::vector<Vertex> moved;  // samples inside the range to which clamping moves centres outside the box
 };
 
-// Encodes one brick's updates into `codes`.
+// Counts what one brick's updates add.
 template <class T>
-FieldHierarchy::BrickPart FieldHierarchy::encode_brick(const Field<T>& field, BrickIndex brick, const ErrorStepFinder& step_of,
-                                                       std::vector<UpdateCode>& codes) const {
+FieldHierarchy::BrickPart FieldHierarchy::count_brick(const Field<T>& field, BrickIndex brick) const {
   const TetCases& cases = tet_cases();
   BrickPart part;
   SetNeighbours neighbours(set_);
   set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     const SupercubeDiamonds diamonds(shapes_, key);
     neighbours.move_to(key);
-    UpdateIndex next = set_.first(brick, s);
     for (const Slot slot : set_bits<Slot>(set_.occupancy()[s])) {
       const Diamond diamond = diamonds.diamond(slot);
       const BorderShape& shape = diamonds.shape(slot);
       const Around f = around(field, domain_, diamond, shape);
       const Side centre = side_of(f[kCentre], range_);
-      const DiamondContext c = context_of(f, shape, range_);
-      std::array<std::uint8_t, kMaxCuts> cuts, coded;
-      const std::size_t n = cuts_of(f, c, range_, cuts.data());
-      Prediction prediction(c);
-      prediction.encode(centre, std::span(cuts).first(n), coded.data());
-      part.residuals.insert(part.residuals.end(), coded.begin(), coded.begin() + std::ptrdiff_t(n));
-      codes[next] = UpdateCode((unsigned(centre) + 3 - unsigned(prediction.side())) % 3, unsigned(n), unsigned(c.count_cuts(centre).first),
-                               unsigned(step_of(errors_[next])));
-      ++next;
-      part.full.tets += leaves(cases, domain_, diamond, shape, c.sides | std::uint32_t(centre) << (2 * kCentre), children_in_set(neighbours, slot));
+      std::uint32_t sides = std::uint32_t(centre) << (2 * kCentre);
+      for (const int v : set_bits(shape.vertices)) {
+        const Side side = side_of(f[std::size_t(v)], range_);
+        sides |= std::uint32_t(side) << (2 * v);
+        part.coefficients += std::uint64_t(cut_count(centre, side));
+      }
+      part.full.tets += leaves(cases, domain_, diamond, shape, sides, children_in_set(neighbours, slot));
       if (centre != Side::inside) continue;
       if (domain_.contains(diamond.centre))
         ++part.full.vertices;
@@ -360,34 +359,35 @@ FullMesh FieldHierarchy::full_mesh(const std::vector<BrickPart>& parts) const {
   return full;
 }
 
-Result<IntervalVolume> FieldHierarchy::compact() const {
+Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>& wanted, bool is_exact) const {
+  const auto format = wanted ? Result<ValueFormat>(*wanted) : choose_value_format(volume_, 0.0);
+  if (!format) return tl::unexpected(format.error());
   IntervalVolume::Parts parts;
   Description& d = parts.description;
   d.name = volume_.name;
   d.grid = volume_.grid;
   d.range = range_;
   d.refine = refine_;
-  d.root_patch = encode_root_patch(root_patch());
+  d.format = *format;
+  d.is_exact = is_exact;
+  d.corners = corner_keys(volume_, *format);
   parts.set = set_;
   parts.error_steps = choose_error_steps(errors_, kMaxErrorSteps);
   d.max_error = parts.error_steps.empty() ? 0.0 : double(parts.error_steps.back());
-  parts.codes.resize(set_.size());
   const ErrorStepFinder step_of(parts.error_steps);
+  parts.steps.reserve(set_.size());
+  for (const float error : errors_) parts.steps.push_back(std::uint8_t(step_of(error)));
+  parts.keys = ValueKeys(set_.size(), format->last);
+  find_keys(volume_, *format, set_, parts.keys);
+  d.weights = fit_weights(parts, on_all_cores);
   std::vector<BrickPart> by_brick(set_.bricks().size());
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain_.last()};
-    tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()),
-                      [&](std::uint32_t b) { by_brick[b] = encode_brick(field, BrickIndex(b), step_of, parts.codes); });
+    tbb::parallel_for(std::uint32_t(0), std::uint32_t(by_brick.size()), [&](std::uint32_t b) { by_brick[b] = count_brick(field, BrickIndex(b)); });
   });
-  parts.error_to_distance = error_to_distance(parts);
+  for (const BrickPart& part : by_brick) d.coefficients += part.coefficients;
   d.full = full_mesh(by_brick);
-  std::size_t total = 0;
-  for (const BrickPart& part : by_brick) total += part.residuals.size();
-  parts.residuals.reserve(total);
-  for (BrickPart& part : by_brick) {
-    parts.residuals.insert(parts.residuals.end(), part.residuals.begin(), part.residuals.end());
-    part = {};  // frees it: two copies of everything would be the peak of memory
-  }
+  parts.error_to_distance = error_to_distance(parts);
   return IntervalVolume::assemble(std::move(parts));
 }
 

@@ -9,13 +9,15 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
-#include "common/codec/root_patch.h"
 #include "common/diamond/domain.h"
 #include "common/diamond/supercube.h"
 #include "common/ivm/interval_volume.h"
 #include "common/patch/description.h"
+#include "common/patch/diamond_context.h"
+#include "common/patch/root_patch.h"
 #include "server/builder/border_shape.h"
 #include "server/volume/volume.h"
 
@@ -27,7 +29,6 @@ struct BuildOptions {
   std::function<void(double)> progress = {};  // called with the fraction done, 0 to 1, from any thread, one call at a time
 };
 
-class ErrorStepFinder;
 template <class T>
 struct Field;
 
@@ -48,8 +49,10 @@ class FieldHierarchy {
   [[nodiscard]] DiamondContext context(const Diamond& d) const;
   [[nodiscard]] std::vector<std::uint8_t> cuts(const Diamond& d) const;
 
-  // Builds Sigma. The description's name is the volume's.
-  [[nodiscard]] Result<IntervalVolume> compact() const;
+  // Builds Sigma. The description's name is the volume's. format: one whose values all samples are (round_samples());
+  // without it, an exact one, which may fail (choose_value_format() with step 0). is_exact: whether the samples are
+  // those of the input.
+  [[nodiscard]] Result<IntervalVolume> compact(const std::optional<ValueFormat>& format = {}, bool is_exact = true) const;
 
  private:
   [[nodiscard]] double value(Vertex v) const;  // of any vertex: the sample it clamps to
@@ -58,7 +61,7 @@ class FieldHierarchy {
   [[nodiscard]] std::vector<ErrorToDistance> error_to_distance(const IntervalVolume::Parts& parts) const;
   struct BrickPart;
   template <class T>
-  [[nodiscard]] BrickPart encode_brick(const Field<T>& field, BrickIndex brick, const ErrorStepFinder& step_of, std::vector<UpdateCode>& codes) const;
+  [[nodiscard]] BrickPart count_brick(const Field<T>& field, BrickIndex brick) const;
   [[nodiscard]] FullMesh full_mesh(const std::vector<BrickPart>& parts) const;
 
   const Volume& volume_;

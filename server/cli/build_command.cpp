@@ -14,6 +14,7 @@
 #include "common/program/range_option.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/builder/find_keys.h"
 #include "server/builder/value_builder.h"
 #include "server/builder/value_steps.h"
 #include "server/cli/commands.h"
@@ -72,12 +73,16 @@ std::string text_of_values(const Volume& volume) {
 // Of one range: frees the samples once they are not needed any more.
 Result<nlohmann::ordered_json> build_range(const BuildCommand& options, Volume& volume, const Range& range, std::string& text) {
   const std::string values = text_of_values(volume);
+  const auto format = choose_value_format(volume, options.step);
+  if (!format) return tl::unexpected(format.error());
+  const bool is_exact = has_exact_values(volume, *format);
+  round_samples(volume, *format);
   Result<IntervalVolume> made = fail("");
   {
     Progress progress("building " + volume.name);
     const FieldHierarchy hierarchy(
         volume, {range, options.refine == "uniform" ? Refine::uniform : Refine::boundary, [&](double done) { progress.fraction(done); }});
-    made = hierarchy.compact();
+    made = hierarchy.compact(*format, is_exact);
   }
   if (!made) return tl::unexpected(made.error());
   volume.bytes = std::vector<std::byte>();  // the compression runs on several threads
@@ -105,7 +110,6 @@ Result<void> run(const BuildCommand& options) {
   const auto start = std::chrono::steady_clock::now();
   const auto range = parse_range(options.range);
   if (!range) return tl::unexpected(range.error());
-  if (*range && options.step) return misuse("--step is for data sets of every range: leave out --range or --step");
   if (!*range && options.refine != "boundary") return misuse("--refine belongs to a range: give --range too, or --refine to extract");
   const auto layout = parse_layout(options);
   if (!layout) return tl::unexpected(layout.error());
@@ -145,10 +149,9 @@ void add_build_command(Program& program) {
       command, o->range,
       "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range, and cannot be served yet");
   command
-      .add_option(
-          "--step", o->step,
-          "Every range: distance of the values that floats are rounded to; 0: exact. Default: exact if 65536 steps are enough, else a power of "
-          "two")
+      .add_option("--step", o->step,
+                  "Distance of the values that floats are rounded to; 0: exact. Default: exact if 65536 steps are enough, else a power of "
+                  "two")
       ->type_name("S");
   command.add_option("--refine", o->refine, "What to refine: boundary: the surfaces of the range only; uniform: the inside too")
       ->check(CLI::IsMember({"boundary", "uniform"}))

@@ -59,20 +59,37 @@ Result<Extracted> extract_values(const ExtractCommand& options, const std::optio
   return Extracted{d.name, d.grid, start, std::move(*made)};
 }
 
-Result<Extracted> extract_one_range(const ExtractCommand& options, const std::optional<Range>& range) {
-  const auto volume = load_ivm(options.file);
-  if (!volume) return tl::unexpected(volume.error());
-  const Description& d = (*volume)->description();
-  if (range && *range != d.range) {
+// Whether a data set of one range holds what is asked for: its own range, or if it was refined uniformly any range
+// within it.
+Result<void> check_held(const ExtractCommand& options, const Description& d, const std::optional<Range>& range) {
+  const bool is_uniform = d.refine == Refine::uniform;
+  if (range && is_uniform && (range->alpha < d.range.alpha || range->beta > d.range.beta)) {
+    return misuse(fmt::format("--range: '{}' has the ranges within [{:g}, {:g}]: build it without --range for every range", options.file,
+                              d.range.alpha, d.range.beta));
+  }
+  if (range && !is_uniform && *range != d.range) {
     return misuse(fmt::format("--range: '{}' was built for the range [{:g}, {:g}] alone: build it without --range for every range", options.file,
                               d.range.alpha, d.range.beta));
   }
-  if (options.refine) return misuse("--refine: '" + options.file + "' was refined when it was built: build it without --range for both");
+  if (options.refine && !is_uniform) {
+    return misuse("--refine: '" + options.file + "' was refined when it was built: build it without --range for both");
+  }
+  return {};
+}
+
+Result<Extracted> extract_one_range(const ExtractCommand& options, const std::optional<Range>& range) {
+  const auto volume = load_ivm(options.file, on_all_cores);
+  if (!volume) return tl::unexpected(volume.error());
+  const Description& d = (*volume)->description();
+  if (auto held = check_held(options, d, range); !held) return tl::unexpected(held.error());
   const auto start = Clock::now();
-  Progress progress("extracting " + printable(d.name));
-  auto made = extract(
-      **volume, options.lod, [&progress](double done) { progress.fraction(done); }, on_all_cores);
+  auto made = extract(**volume, options.lod, on_all_cores);
   if (!made) return tl::unexpected(made.error());
+  if (const Range shown = range.value_or(d.range); shown != d.range || options.refine) {
+    made->front.set_range(shown, options.refine.value_or("boundary") == "uniform" ? Refine::uniform : Refine::boundary,
+                          options.lod.max_tets.value_or(~std::uint64_t(0)), on_all_cores);
+    made->updates = made->front.shown_count();
+  }
   return Extracted{d.name, d.grid, start, std::move(*made)};
 }
 
@@ -124,7 +141,8 @@ void add_extract_command(Program& program) {
   add_range_option(command, options->range, "Closed range of values: numbers, -inf or inf; needed if the file has every range");
   command
       .add_option("--refine", options->refine,
-                  "Every range: what to refine: boundary (default): the surfaces of the range only; uniform: the inside too")
+                  "Another range than the file's, or of every range: what to refine: boundary (default): the surfaces of the range only; uniform: "
+                  "the inside too")
       ->check(CLI::IsMember({"boundary", "uniform"}));
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);

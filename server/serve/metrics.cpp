@@ -19,7 +19,7 @@ using prometheus::MetricType;
 using prometheus::Registry;
 
 // The codes with a series of their own. A client may send any code, and must not create series without limit.
-constexpr std::array<unsigned, 13> kCodes{1000, 1001, 1002, 1003, 1005, 1011, 4400, 4401, 4403, 4404, 4408, 4409, 4413};
+constexpr std::array<unsigned, 14> kCodes{1000, 1001, 1002, 1003, 1005, 1011, 4400, 4401, 4403, 4404, 4408, 4409, 4413, 4426};
 
 // In Refusal's order.
 constexpr std::array<const char*, 6> kReasons{"connections", "address", "sessions", "memory", "origin", "token"};

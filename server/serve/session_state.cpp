@@ -7,12 +7,25 @@ namespace intervale {
 using protocol::CloseCode;
 using protocol::Fault;
 
+namespace {
+
+// A client that reads batches of another version.
+Fault other_version(std::uint32_t payload) {
+  const std::uint32_t theirs = std::max(payload, 1u);  // 0: a client that does not say it, of version 1
+  return {CloseCode::other_version, "the client reads batches of version " + std::to_string(theirs) + ", and this server sends version " +
+                                        std::to_string(protocol::kPayloadVersion) +
+                                        (theirs < protocol::kPayloadVersion ? ": update the client" : ": update the server")};
+}
+
+}  // namespace
+
 std::optional<Fault> SessionState::receive(const protocol::ClientMessage& message) {
   return std::visit([this](const auto& m) { return on(m); }, message);
 }
 
 std::optional<Fault> SessionState::on(const protocol::Open& open) {
   if (opened()) return Fault{CloseCode::out_of_order, "a second Open"};
+  if (open.payload != protocol::kPayloadVersion) return other_version(open.payload);
   // Before the lookup: the client must not learn whether a data set exists that its token does not grant.
   if (!scope_ || !scope_->allows(open.dataset)) return Fault{CloseCode::forbidden, "the token does not grant this data set"};
   const auto catalogue = catalogue_.load();

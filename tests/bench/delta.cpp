@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/codec/root_patch.h"
 #include "common/diamond/supercube.h"
+#include "common/patch/root_patch.h"
 #include "server/builder/border_shape.h"
 #include "server/builder/interpolation_error.h"
 

@@ -4,13 +4,13 @@
 #include <memory>
 #include <vector>
 
-#include "common/codec/prediction.h"
-#include "common/codec/root_patch.h"
+#include "common/codec/value_coder.h"
 #include "common/front/batch_decoder.h"
 #include "common/ivm/batch_encoder.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/refinement.h"
+#include "common/ivm/vertex_keys.h"
 #include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
 #include "server/builder/field_hierarchy.h"
@@ -26,7 +26,6 @@ struct Fixture {
   Case c = *sample_case("gyroid", kSize);
   FieldHierarchy hierarchy{*c.volume, {c.range, c.refine, {}}};
   std::shared_ptr<const IntervalVolume> sigma = std::make_shared<const IntervalVolume>(*hierarchy.compact());
-  RootPatch root_patch = *decode_root_patch(sigma->description().root_patch, sigma->domain());
   std::vector<Place> places;                        // of all updates, coarse to fine
   std::vector<std::vector<std::uint8_t>> payloads;  // of the whole stream
 
@@ -54,37 +53,47 @@ void find_update(benchmark::State& state) {
 }
 BENCHMARK(find_update);
 
+// The keys at the vertices of each update's diamond, and at its centre.
 void look_up_update(benchmark::State& state) {
   const auto& f = fixture();
+  VertexKeys around{};
   for (auto _ : state) {
-    for (const Place& p : f.places) benchmark::DoNotOptimize(f.sigma->update(p));
-  }
-  count_items(state, f.places.size());
-}
-BENCHMARK(look_up_update);
-
-void decode_prediction(benchmark::State& state) {
-  const auto& f = fixture();
-  std::vector<DiamondContext> contexts;
-  for (const Place& p : f.places) contexts.push_back(f.hierarchy.context(Diamond(SupercubeSet::centre(p))));
-  std::array<std::uint8_t, kMaxCuts> cuts;
-  for (auto _ : state) {
-    for (std::size_t i = 0; i < f.places.size(); ++i) {
-      const UpdateView u = f.sigma->update(f.places[i]);
-      Prediction prediction(contexts[i]);
-      prediction.decode(Side((unsigned(prediction.side()) + u.side_residual) % 3), u.residuals, cuts.data());
-      benchmark::DoNotOptimize(cuts);
+    SetNeighbours neighbours(f.sigma->set());
+    for (const Place& p : f.places) {
+      neighbours.move_to(p.key);
+      gather_vertex_keys(*f.sigma, neighbours, p.slot, around);
+      benchmark::DoNotOptimize(around);
+      benchmark::DoNotOptimize(f.sigma->key(p.index));
     }
   }
   count_items(state, f.places.size());
 }
-BENCHMARK(decode_prediction)->Unit(benchmark::kMillisecond);
+BENCHMARK(look_up_update)->Unit(benchmark::kMillisecond);
+
+void predict_values(benchmark::State& state) {
+  const auto& f = fixture();
+  const Description& d = f.sigma->description();
+  SetNeighbours neighbours(f.sigma->set());
+  std::vector<VertexKeys> around(f.places.size());
+  for (std::size_t i = 0; i < f.places.size(); ++i) {
+    neighbours.move_to(f.places[i].key);
+    gather_vertex_keys(*f.sigma, neighbours, f.places[i].slot, around[i]);
+  }
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < f.places.size(); ++i) {
+      const Place& p = f.places[i];
+      benchmark::DoNotOptimize(predict_value(class_of_slot(p.slot), scale_of_key(p.key), around[i], d.weights, d.format.last));
+    }
+  }
+  count_items(state, f.places.size());
+}
+BENCHMARK(predict_values)->Unit(benchmark::kMillisecond);
 
 void apply_batches(benchmark::State& state) {
   const auto& f = fixture();
   for (auto _ : state) {
-    Front front(f.c.volume->grid, f.root_patch);
-    for (const auto& payload : f.payloads) benchmark::DoNotOptimize(apply_batch(front, payload).has_value());
+    Front front = root_front(f.sigma->description());
+    for (const auto& payload : f.payloads) benchmark::DoNotOptimize(apply_batch(front, f.sigma->description(), payload).has_value());
   }
   count_items(state, f.places.size());
 }

@@ -70,7 +70,7 @@ struct Extracted {
 Extracted extract_mesh(const IntervalVolume& volume, double error, const ParallelFor& parallel = serial) {
   Lod lod;
   lod.error = error;
-  const auto extraction = or_throw(extract(volume, lod, {}, parallel));
+  const auto extraction = or_throw(extract(volume, lod, parallel));
   return {extraction.front.mesh(parallel), extraction.updates};
 }
 Extracted extract_mesh(const Delta& delta, const Case& c, double error, Delta::Walk walk) {
@@ -211,8 +211,9 @@ void print_sizes(const std::vector<Row>& rows) {
       "\nIndexed: 12 bytes a vertex, 16 bytes a tetrahedron. In memory, as a file: `memory_bytes` and `file_bytes` of\n"
       "`intervale build --json`. On the wire: the payloads of all batches of a session that is never held up, which ends with\n"
       "the full mesh. `bytes_received` of `intervale-client fetch` is a few percent more, because a busy network or server\n"
-      "makes smaller batches. The wire is smaller than the file because a client needs no errors. The rows of the paper are its\n"
-      "own coding, in memory, of its own copies of the volumes.\n");
+      "makes smaller batches. The wire is smaller than the file because a client needs no errors. Coefficients: the cuts of all\n"
+      "updates. An update here holds the value at the centre and no cuts: they are computed from the values when they are asked\n"
+      "for. The rows of the paper are its own coding, in memory, of its own copies of the volumes.\n");
 }
 
 void print_queries(const std::vector<Row>& rows) {
@@ -248,7 +249,8 @@ void print_queries(const std::vector<Row>& rows) {
       "\nError: percent of the largest. One core; from the query to the indexed mesh. Δ descends diamond by diamond, as the\n"
       "paper's queries do. Δ by supercubes descends and looks up neighbours in the front as Σ does: the part of Σ's advantage\n"
       "that comes from supercubes. Δ saturates errors over all children. Σ saturates them over relevant children and rounds\n"
-      "them up to one of {} levels: hence the few updates that differ. At error 0 both produce the same mesh.\n",
+      "them up to one of {} levels. Σ counts the updates that its mesh shows: not those whose vertices and centre lie on one\n"
+      "side, unless a finer one is shown. Hence the updates that differ. At error 0 both produce the same mesh.\n",
       kMaxErrorSteps);
 }
 

@@ -83,6 +83,7 @@ std::vector<Attack> attacks() {
        [](RawClient& c) {
          c.send(Open{"../buckyball", "", 0});
        }},
+      {"AnOlderVersion", CloseCode::other_version, [](RawClient& c) { c.send(Open{.dataset = "buckyball", .payload = 0}); }},
       {"ViewBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(kEverything); }},
       {"CreditBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(Credit{1}); }},
       {"HaveBeforeOpen", CloseCode::out_of_order, [](RawClient& c) { c.send(protocol::Have{}); }},

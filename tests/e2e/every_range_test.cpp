@@ -47,11 +47,23 @@ TEST_F(EveryRange, AnyRangeGivesTheMeshOfADataSetOfThatRange) {
   ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "20", "-o", volume}).status, 0);
   ASSERT_EQ(run({program("intervale"), "build", volume, "-o", every, "--step", "0"}).status, 0);
   for (const auto& [low, high] : {std::pair{"20", "60"}, std::pair{"-inf", "40"}, std::pair{"100", "100"}, std::pair{"900", "inf"}}) {
-    ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", low, high}).status, 0);
+    ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", low, high, "--step", "0"}).status, 0);
     const auto expected = json_of(run({program("intervale"), "extract", one, "--json", "--digest"}));
     const auto got = json_of(run({program("intervale"), "extract", every, "--range", low, high, "--json", "--digest"}));
     for (const char* key : {"updates", "vertices", "tets", "digest"}) EXPECT_EQ(got.at(key), expected.at(key)) << low << " " << key;
   }
+}
+
+TEST_F(EveryRange, ADataSetThatIsRefinedUniformlyHasEveryRangeWithinItsOwn) {
+  const std::string sheet = one + ".sheet.ivm";
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", "0", "60", "--refine", "uniform"}).status, 0);
+  for (const auto& [low, high] : {std::pair{"20", "40"}, std::pair{"0", "10"}, std::pair{"33", "33"}}) {
+    ASSERT_EQ(run({program("intervale"), "build", volume, "-o", sheet, "--range", low, high}).status, 0);
+    const auto expected = json_of(run({program("intervale"), "extract", sheet, "--json", "--digest"}));
+    const auto got = json_of(run({program("intervale"), "extract", one, "--range", low, high, "--json", "--digest"}));
+    for (const char* key : {"updates", "vertices", "tets", "digest"}) EXPECT_EQ(got.at(key), expected.at(key)) << low << " " << key;
+  }
+  expect_complaint(run({program("intervale"), "extract", one, "--range", "20", "61"}), 2, "within [0, 60]", "intervale: ");
 }
 
 TEST_F(EveryRange, WrongUsageIsSaid) {
@@ -66,7 +78,6 @@ TEST_F(EveryRange, WrongUsageIsSaid) {
   complains({"extract", every, "--range", "0", "1", "--eye", "3", "3", "3", "--look-at", "0", "0", "0"}, "--eye");
   complains({"extract", one, "--range", "0", "0.5"}, "was built for the range [0, 1] alone");
   complains({"extract", one, "--refine", "uniform"}, "--refine");
-  complains({"build", volume, "-o", every, "--range", "0", "1", "--step", "1"}, "--step");
   complains({"build", volume, "-o", every, "--refine", "uniform"}, "--refine");
   for (const char* step : {"-1", "nan", "1e-300"}) complains({"build", volume, "-o", every, "--step", step}, "step");
   complains({"serve", every, "--listen", "127.0.0.1:0"}, "every range", 1);

@@ -76,6 +76,7 @@ void add_nrrds(const Corpus& corpus) {
 void add_messages(const Corpus& corpus) {
   using namespace protocol;
   corpus.add("protocol", "open", {0}, encode(ClientMessage(Open{"buckyball", "fuzz 1", 262144})));
+  corpus.add("protocol", "open-older", {0}, encode(ClientMessage(Open{.dataset = "buckyball", .client = {}, .payload = 0})));
   corpus.add("protocol", "view", {0}, encode(ClientMessage(View{7, {0.5, 10.0, Box{{-1, 0, 1}, {2, 0, 3}}, Camera{.eye = {9, 9, 9}}, 5, 6}})));
   corpus.add("protocol", "view-all", {0}, encode(ClientMessage(View{1, {}})));
   corpus.add("protocol", "view-forget", {0},
@@ -84,6 +85,7 @@ void add_messages(const Corpus& corpus) {
              encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));
   corpus.add("protocol", "credit", {0}, encode(ClientMessage(Credit{65536})));
   corpus.add("protocol", "opened", {1}, encode(ServerMessage(Opened{testing::small_volumes()[1].description(), {}})));
+  corpus.add("protocol", "opened-older", {1}, encode(ServerMessage(Opened{testing::small_volumes()[1].description(), {}, true, 1})));
   const IntervalVolume& v = testing::small_volumes()[0];
   const auto queue = in_order(v, select(v, {}), {});
   const auto payload = testing::batch_of(v, std::span(queue).first(30));

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "common/front/batch_decoder.h"
+#include "common/ivm/extraction.h"
 #include "common/ivm/refinement.h"
 #include "tests/fuzz/small_volumes.h"
 #include "tests/support/batches.h"
@@ -22,8 +23,8 @@ const std::vector<std::vector<Front>>& clients() {
       const auto queue = in_order(v, select(v, {}), {});
       auto& stages = made.emplace_back();
       for (std::size_t stage = 0; stage < kStages; ++stage) {
-        Front& front = stages.emplace_back(v.description().grid, *decode_root_patch(v.description().root_patch, v.domain()));
-        if (!apply_batch(front, testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages)))) std::abort();
+        Front& front = stages.emplace_back(root_front(v.description()));
+        if (!apply_batch(front, v.description(), testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages)))) std::abort();
       }
     }
     return made;
@@ -35,10 +36,11 @@ const std::vector<std::vector<Front>>& clients() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size < 2) return 0;
-  Front front = clients()[data[0] % clients().size()][data[1] % kStages];
+  const std::size_t volume = data[0] % clients().size();
+  Front front = clients()[volume][data[1] % kStages];
   std::uint64_t max_tets = ~std::uint64_t(0);
   if (data[1] & 0x80) max_tets = front.tet_count() + (data[1] >> 3 & 15);
-  const auto applied = apply_batch(front, {data + 2, size - 2}, max_tets);
+  const auto applied = apply_batch(front, testing::small_volumes()[volume].description(), {data + 2, size - 2}, max_tets);
   if (!applied) {
     if (applied.error().message.empty()) std::abort();
     return 0;

@@ -1,4 +1,5 @@
-// Properties of the front: the mesh depends only on which diamonds are split, and merging undoes splitting.
+// Properties of a front that is split by cuts: the mesh depends only on which diamonds are split, and merging undoes
+// splitting. value_front_test.cpp has those of fronts that are split by values.
 #include "common/front/front.h"
 
 #include <gtest/gtest.h>
@@ -7,17 +8,20 @@
 #include <random>
 #include <set>
 
-#include "common/front/split_update.h"
 #include "common/ivm/extraction.h"
 #include "server/builder/field_hierarchy.h"
+#include "tests/support/fronts_by_cuts.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
 
 namespace intervale {
 namespace {
 
+using testing::all_of;
 using testing::broken_law;
 using testing::canonical;
+using testing::front_by_cuts;
+using testing::split_by_cuts;
 
 class FrontLaws : public ::testing::TestWithParam<unsigned> {
  protected:
@@ -34,30 +38,31 @@ class FrontLaws : public ::testing::TestWithParam<unsigned> {
       range = {-0.3, equal ? -0.3 : 0.2};
     }
   }
+  [[nodiscard]] FieldHierarchy hierarchy() const { return {volume, {.range = range}}; }
   Volume volume;
   Range range;
 };
 
 TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
-  const IntervalVolume sigma = testing::build(volume, {.range = range});
-  const RootPatch root_patch = *decode_root_patch(sigma.description().root_patch, sigma.domain());
-  const testing::Canonical expected = canonical(extract(sigma, {})->front.mesh());
+  const FieldHierarchy delta = hierarchy();
+  const testing::Canonical expected = canonical(extract(testing::build(volume, {.range = range}), {})->front.mesh());
   for (unsigned trial = 0; trial < 3; ++trial) {
     std::mt19937 random(GetParam() * 10 + trial);
-    Front front(volume.grid, root_patch);
+    Front front(volume.grid, delta.root_patch());
     std::vector<Place> waiting;
-    sigma.set().for_each_down([&](const Place& p) { waiting.push_back(p); });
+    delta.set().for_each_down([&](const Place& p) { waiting.push_back(p); });
     std::size_t steps = 0;
     while (!waiting.empty()) {
       std::shuffle(waiting.begin(), waiting.end(), random);
       std::vector<Place> later;
       for (const Place& p : waiting) {
-        const auto handle = front.find(sigma.set().centre(p));
+        const Vertex c = SupercubeSet::centre(p);
+        const auto handle = front.find(c);
         if (!handle) {
           later.push_back(p);
           continue;
         }
-        ASSERT_TRUE(apply_update(front, *handle, sigma.update(p)));
+        split_by_cuts(front, *handle, delta, c);
         if (++steps % 97 == 0) {
           ASSERT_EQ(front.validate(), std::nullopt);
           ASSERT_EQ(broken_law(front.mesh(), volume.grid, range.alpha == range.beta), "");
@@ -71,33 +76,30 @@ TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
 }
 
 TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
-  const IntervalVolume sigma = testing::build(volume, {.range = range});
-  const RootPatch root_patch = *decode_root_patch(sigma.description().root_patch, sigma.domain());
+  const FieldHierarchy delta = hierarchy();
   std::mt19937 random(GetParam());
-  Front front(volume.grid, root_patch);
+  Front front(volume.grid, delta.root_patch());
   const testing::Canonical coarse = canonical(front.mesh());
   std::set<UpdateIndex> split;
   std::vector<Place> places;
-  sigma.set().for_each_down([&](const Place& p) { places.push_back(p); });
+  delta.set().for_each_down([&](const Place& p) { places.push_back(p); });
   if (places.empty()) return;
   const auto afresh = [&] {  // the mesh of this split set, made afresh
-    SplitSet set(sigma.size());
+    SplitSet set(delta.set().size());
     for (UpdateIndex i : split) set.insert(i);
-    return canonical(extract(volume.grid, root_patch, sigma.set(), set, [&](Front& fresh, Front::Handle handle, const Place& p) {
-                       return apply_update(fresh, handle, sigma.update(p));
-                     })->front.mesh());
+    return canonical(front_by_cuts(delta, volume.grid, set).mesh());
   };
   for (int round = 0; round < 12; ++round) {
     // Some splits, then some merges, of whatever can be.
     for (int i = 0; i < 400; ++i) {
       const Place p = places[random() % places.size()];
-      const Vertex c = sigma.set().centre(p);
+      const Vertex c = SupercubeSet::centre(p);
       const bool split_now = round % 3 == 2 ? random() % 3 == 0 : random() % 3 != 0;
       if (split_now) {
         const auto handle = front.find(c);
         EXPECT_FALSE(handle && split.contains(p.index));
         if (!handle) continue;
-        ASSERT_TRUE(apply_update(front, *handle, sigma.update(p)));
+        split_by_cuts(front, *handle, delta, c);
         split.insert(p.index);
       } else {
         if (front.merge(c)) {
@@ -113,7 +115,7 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
   for (bool any = true; any;) {
     any = false;
     for (const Place& p : places) {
-      if (split.contains(p.index) && front.merge(sigma.set().centre(p))) split.erase(p.index), any = true;
+      if (split.contains(p.index) && front.merge(SupercubeSet::centre(p))) split.erase(p.index), any = true;
     }
   }
   EXPECT_TRUE(split.empty());
@@ -123,25 +125,19 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
 
 // What is hidden is no part of the mesh; what comes back is as it was.
 TEST_P(FrontLaws, HidingIsLeavingOut) {
-  const IntervalVolume sigma = testing::build(volume, {.range = range});
-  const RootPatch root_patch = *decode_root_patch(sigma.description().root_patch, sigma.domain());
-  Front front = extract(sigma, {})->front;
+  const FieldHierarchy delta = hierarchy();
+  Front front = front_by_cuts(delta, volume.grid, all_of(delta.set()));
   const testing::Canonical full = canonical(front.mesh());
   std::vector<Place> all;
-  sigma.set().for_each_down([&](const Place& p) { all.push_back(p); });
-  SplitSet shown(sigma.size());
-  for (const Place& p : all) shown.insert(p.index);
-  const auto afresh = [&] {
-    return canonical(extract(volume.grid, root_patch, sigma.set(), shown, [&](Front& fresh, Front::Handle handle, const Place& p) {
-                       return apply_update(fresh, handle, sigma.update(p));
-                     })->front.mesh());
-  };
+  delta.set().for_each_down([&](const Place& p) { all.push_back(p); });
+  SplitSet shown = all_of(delta.set());
+  const auto afresh = [&] { return canonical(front_by_cuts(delta, volume.grid, shown).mesh()); };
   const auto may_hide = [&](const Place& p) {
     if (!shown.contains(p.index)) return false;
     return std::none_of(all.begin(), all.end(), [&](const Place& child) {
       bool is_child = false;
       if (!shown.contains(child.index)) return false;
-      for_each_parent(sigma.set(), child, [&](UpdateIndex parent) { is_child = is_child || parent == p.index; });
+      for_each_parent(delta.set(), child, [&](UpdateIndex parent) { is_child = is_child || parent == p.index; });
       return is_child;
     });
   };
@@ -157,7 +153,7 @@ TEST_P(FrontLaws, HidingIsLeavingOut) {
       if (may) shown.erase(p.index);
     } else {
       bool may = !shown.contains(p.index);
-      for_each_parent(sigma.set(), p, [&](UpdateIndex parent) { may = may && shown.contains(parent); });
+      for_each_parent(delta.set(), p, [&](UpdateIndex parent) { may = may && shown.contains(parent); });
       if (may && random() % 4 == 0) {
         const bool fits = front.show(handle, before);  // no more than it had
         ASSERT_EQ(fits, !front.is_hidden(handle));
@@ -187,8 +183,7 @@ INSTANTIATE_TEST_SUITE_P(Random, FrontLaws, ::testing::Range(1u, 25u));
 
 TEST(Front, RefusesWhatCannotBeSplit) {
   const Volume volume = testing::gyroid({9, 9, 9});
-  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
-  const Front front(volume.grid, *decode_root_patch(sigma.description().root_patch, sigma.domain()));
+  const Front front(volume.grid, FieldHierarchy(volume, {.range = {-0.3, 0.2}}).root_patch());
   EXPECT_TRUE(front.find({4, 4, 4}));
   for (const Vertex v : {Vertex{0, 0, 0}, Vertex{8, 8, 8}, Vertex{2, 2, 2}, Vertex{-4, 4, 4}, Vertex{4, 4, 1 << 30}}) EXPECT_FALSE(front.find(v));
 }
@@ -201,8 +196,7 @@ TEST(Front, TheBudgetIsNeverPassed) {
     lod.max_tets = most;
     const auto extracted = extract(sigma, lod);
     ASSERT_TRUE(extracted);
-    EXPECT_LE(extracted->front.tet_count(),
-              std::max<std::uint64_t>(most, Front(volume.grid, *decode_root_patch(sigma.description().root_patch, sigma.domain())).tet_count()));
+    EXPECT_LE(extracted->front.tet_count(), std::max<std::uint64_t>(most, root_front(sigma.description()).tet_count()));
     EXPECT_EQ(broken_law(extracted->front.mesh(), volume.grid), "");
     Lod updates;
     updates.max_updates = most;

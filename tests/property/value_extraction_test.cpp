@@ -37,6 +37,31 @@ TEST_P(ValueExtraction, EqualsADataSetOfOneRange) {
   }
 }
 
+TEST_P(ValueExtraction, ADataSetRefinedUniformlyHasEveryRangeWithinItsOwn) {
+  for (int i = 0; i < 4; ++i) {
+    const Range outer = testing::random_range(field, random);
+    const auto uniform = FieldHierarchy(field.volume, {outer, Refine::uniform}).compact();
+    ASSERT_TRUE(uniform);
+    const auto full = extract(*uniform, Lod{});
+    ASSERT_TRUE(full);
+    for (int k = 0; k < 4; ++k) {
+      const Range other = testing::random_range(field, random);
+      const Range inner{std::max(outer.alpha, other.alpha), std::min(outer.beta, other.beta)};
+      if (inner.alpha > inner.beta) continue;
+      const Refine refine = random() % 2 == 0 ? Refine::boundary : Refine::uniform;
+      SCOPED_TRACE(testing::text_of(outer, Refine::uniform) + " " + testing::text_of(inner, refine));
+      const auto one = FieldHierarchy(field.volume, {inner, refine}).compact();
+      ASSERT_TRUE(one);
+      const auto expected = extract(*one, Lod{});
+      ASSERT_TRUE(expected);
+      Front front = full->front;
+      front.set_range(inner, refine);
+      EXPECT_EQ(front.shown_count(), expected->updates);
+      EXPECT_EQ(mesh_digest(front.mesh()), mesh_digest(expected->front.mesh()));
+    }
+  }
+}
+
 TEST_P(ValueExtraction, KeepsTheGuaranteeOfItsError) {
   for (int i = 0; i < 3; ++i) {
     const Range range = testing::random_range(field, random);

@@ -56,7 +56,7 @@ inline Volume specks(const std::array<std::int32_t, 3>& dims, unsigned seed) {
   return volume_of_type(SampleType::u8, dims, f);
 }
 
-// A smooth bump and a little noise: some regions full, some empty.
+// A smooth bump and a little noise, in steps of 2^-12: some regions full, some empty.
 inline Volume bump(const std::array<std::int32_t, 3>& dims, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> noise(-2, 2), place(0.2, 0.8);
@@ -64,7 +64,7 @@ inline Volume bump(const std::array<std::int32_t, 3>& dims, unsigned seed) {
   std::vector<double> f;
   for (int z = 0; z < dims[2]; ++z) {
     for (int y = 0; y < dims[1]; ++y) {
-      for (int x = 0; x < dims[0]; ++x) f.push_back(100 - 6 * std::hypot(x - cx, y - cy, z - cz) + noise(random));
+      for (int x = 0; x < dims[0]; ++x) f.push_back(std::round(0x1p12 * (100 - 6 * std::hypot(x - cx, y - cy, z - cz) + noise(random))) / 0x1p12);
     }
   }
   return volume_of_type(SampleType::f64, dims, f);

@@ -8,8 +8,8 @@ namespace intervale::testing {
 inline IntervalVolume::Parts parts_of(const IntervalVolume& v) {
   return {v.description(),
           v.set(),
-          {v.codes().begin(), v.codes().end()},
-          {v.residuals().begin(), v.residuals().end()},
+          v.keys(),
+          {v.steps().begin(), v.steps().end()},
           {v.error_steps().begin(), v.error_steps().end()},
           {v.error_to_distance().begin(), v.error_to_distance().end()}};
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <memory>
 
 #include "protocol/codec.h"
@@ -116,6 +117,43 @@ TEST(ClientSession, FaultsTellWhetherConnectingAgainMayHelp) {
   }
 }
 
+TEST(ClientSession, TellsBothVersionsOfBatches) {
+  const struct {
+    std::uint32_t payload;
+    const char* error;
+  } cases[] = {{0, "the server sends batches of version 1, and this client reads version 2: update the server"},
+               {1, "the server sends batches of version 1, and this client reads version 2: update the server"},
+               {3, "the server sends batches of version 3, and this client reads version 2: update the client"}};
+  for (const auto& c : cases) {
+    ClientSession session(kOptions);
+    session.look({});
+    session.connected({});
+    const auto event = session.receive(protocol::encode(protocol::ServerMessage(Opened{.description = {}, .limits = {}, .payload = c.payload})), {});
+    ASSERT_FALSE(event);
+    EXPECT_EQ(event.error().message, c.error);
+    EXPECT_EQ(session.state(), State::closed);
+  }
+}
+
+// The server's side of the same.
+TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
+  const AtomicSharedPtr<Catalogue> catalogue;
+  const struct {
+    std::uint32_t payload;
+    const char* text;
+  } cases[] = {{0, "the client reads batches of version 1, and this server sends version 2: update the client"},
+               {1, "the client reads batches of version 1, and this server sends version 2: update the client"},
+               {3, "the client reads batches of version 3, and this server sends version 2: update the server"}};
+  for (const auto& c : cases) {
+    SessionState state(catalogue, Scope::everything());
+    const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});
+    ASSERT_TRUE(fault);
+    EXPECT_EQ(fault->code, CloseCode::other_version);
+    EXPECT_EQ(fault->text, c.text);
+    EXPECT_FALSE(state.opened());
+  }
+}
+
 // A session that has received Opened, all within a credit of 5120 bytes.
 struct ClientSessionRefuses : ::testing::Test {
   std::shared_ptr<const IntervalVolume> volume = volume_of(9);
@@ -151,6 +189,18 @@ TEST_F(ClientSessionRefuses, ASecondOpened) {
 }
 TEST_F(ClientSessionRefuses, AnImpossibleDescription) {
   opened.description.max_error = -1;
+  expect_refused(opened);
+}
+TEST_F(ClientSessionRefuses, ACornerBeyondTheLastValue) {
+  opened.description.corners[3] = opened.description.format.last + 1;
+  expect_refused(opened);
+}
+TEST_F(ClientSessionRefuses, AStepThatIsNoNumber) {
+  opened.description.format.step = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(opened);
+}
+TEST_F(ClientSessionRefuses, BatchesOfAnotherVersion) {
+  opened.payload = 1;
   expect_refused(opened);
 }
 TEST_F(ClientSessionRefuses, ABatchIsMissing) {

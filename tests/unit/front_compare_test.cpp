@@ -3,10 +3,10 @@
 
 #include <random>
 
-#include "common/codec/root_patch.h"
 #include "common/front/front.h"
 #include "common/ivm/extraction.h"
 #include "server/builder/field_hierarchy.h"
+#include "tests/support/fronts_by_cuts.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
 
@@ -65,7 +65,7 @@ TEST_P(FrontParts, CoarsenedIsTheSameMesh) {
     Front coarsened = full;
     ASSERT_TRUE(coarsened.coarsen_to(part));
     EXPECT_EQ(coarsened.validate(), std::nullopt);
-    EXPECT_EQ(coarsened.split_count(), part.split_count());
+    EXPECT_EQ(coarsened.split_count(), part.shown_count());
     EXPECT_TRUE(coarsened.is_part_of(part));  // what was merged counts no more
     EXPECT_EQ(canonical(coarsened.mesh()), canonical(part.mesh()));
   }
@@ -75,16 +75,15 @@ INSTANTIATE_TEST_SUITE_P(Random, FrontParts, ::testing::Range(1u, 13u));
 
 TEST(FrontCompare, OneOtherCutIsAnotherFront) {
   const Volume volume = testing::gyroid({9, 9, 9});
-  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
-  const RootPatch root_patch = decode_root_patch(sigma.description().root_patch, sigma.domain()).value();
-  Front one(volume.grid, root_patch), other(volume.grid, root_patch);
+  const FieldHierarchy delta(volume, {.range = {-0.3, 0.2}});
+  Front one(volume.grid, delta.root_patch()), other(volume.grid, delta.root_patch());
   ASSERT_TRUE(one.is_part_of(other));
   bool differs = false;
-  sigma.set().for_each_down([&](const Place& place) {
-    const auto handle = one.find(sigma.set().centre(place));
+  delta.set().for_each_down([&](const Place& place) {
+    const auto handle = one.find(SupercubeSet::centre(place));
     if (differs || !handle) return;
     const Side side = Side::inside;
-    const auto count = std::size_t(one.context(*handle).count_cuts(side).all);
+    const auto count = std::size_t(one.context(*handle).count_cuts(side));
     std::vector<std::uint8_t> cuts(count, 100);
     one.split(*handle, side, cuts);
     if (count > 0) cuts.back() = 101;
@@ -96,22 +95,50 @@ TEST(FrontCompare, OneOtherCutIsAnotherFront) {
   EXPECT_TRUE(differs);
 }
 
+TEST(FrontCompare, OneOtherValueIsAnotherFront) {
+  const IntervalVolume sigma = testing::build(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}});
+  const Front full = front_of(sigma, {});
+  for (const UpdateIndex changed : {UpdateIndex(0), UpdateIndex(sigma.size() / 2), UpdateIndex(sigma.size() - 1)}) {
+    Front other = root_front(sigma.description());
+    sigma.set().for_each_down([&](const Place& p) {
+      const auto handle = other.find(SupercubeSet::centre(p));
+      ASSERT_TRUE(handle);
+      other.split(*handle, p.index == changed ? sigma.key(p.index) ^ 1 : sigma.key(p.index));
+    });
+    EXPECT_FALSE(other.is_part_of(full));
+    EXPECT_FALSE(full.is_part_of(other));
+  }
+}
+
 TEST(FrontCompare, OtherGridsAndRootPatchesAreOtherFronts) {
   const Volume volume = testing::gyroid({9, 9, 9});
-  const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
-  const Front front = front_of(sigma, {});
+  const FieldHierarchy delta(volume, {.range = {-0.3, 0.2}});
+  const Front front = testing::front_by_cuts(delta, volume.grid, testing::all_of(delta.set()));
+  EXPECT_TRUE(Front(volume.grid, delta.root_patch()).is_part_of(front));
   Grid moved = volume.grid;
   moved.origin[0] += 1;
-  const RootPatch root_patch = decode_root_patch(sigma.description().root_patch, sigma.domain()).value();
-  EXPECT_FALSE(Front(moved, root_patch).is_part_of(front));
-  const IntervalVolume wider = testing::build(volume, {.range = {-10, 10}});  // all of it is inside
-  EXPECT_FALSE(Front(volume.grid, decode_root_patch(wider.description().root_patch, wider.domain()).value()).is_part_of(front));
+  EXPECT_FALSE(Front(moved, delta.root_patch()).is_part_of(front));
+  const FieldHierarchy wider(volume, {.range = {-10, 10}});  // all of it is inside
+  EXPECT_FALSE(Front(volume.grid, wider.root_patch()).is_part_of(front));
+}
+
+TEST(FrontCompare, OtherGridsRangesAndCornersAreOtherFronts) {
+  const IntervalVolume sigma = testing::build(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}});
+  const Front front = front_of(sigma, {});
+  const Description& same = sigma.description();
+  EXPECT_TRUE(root_front(same).is_part_of(front));
+  std::vector<Description> others(4, same);
+  others[0].grid.origin[0] += 1;
+  others[1].range.beta = 0.25;
+  others[2].corners[7] ^= 1;
+  others[3].format.first += 1;
+  for (const Description& other : others) EXPECT_FALSE(root_front(other).is_part_of(front));
 }
 
 TEST(FrontCompare, WhatTheCoarserNeedsIsNotMerged) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const IntervalVolume sigma = testing::build(volume, {.range = {-0.3, 0.2}});
-  Front root(volume.grid, decode_root_patch(sigma.description().root_patch, sigma.domain()).value());
+  Front root = root_front(sigma.description());
   const Front full = front_of(sigma, {});
   EXPECT_TRUE(root.coarsen_to(full));  // nothing to merge
   EXPECT_EQ(root.split_count(), 0u);

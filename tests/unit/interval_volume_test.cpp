@@ -1,5 +1,6 @@
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/verify.h"
+#include "common/patch/key_sides.h"
 
 #include <gtest/gtest.h>
 
@@ -49,20 +50,19 @@ TEST_F(IntervalVolumeValidate, FindsAFullMeshOfAnotherSize) {
 
 TEST_F(IntervalVolumeValidate, FindsAnErrorGreaterThanItsParents) {
   auto parts = testing::parts_of(*made_);
-  UpdateCode& last = parts.codes.back();
-  last = UpdateCode(std::uint16_t((last.bits() & 127) | (parts.error_steps.size() - 1) << 7));
-  UpdateCode& root = parts.codes.front();
-  root = UpdateCode(std::uint16_t(root.bits() & 127));
+  parts.steps.back() = std::uint8_t(parts.error_steps.size() - 1);
+  parts.steps.front() = 0;
   EXPECT_FALSE(validate(*IntervalVolume::assemble(std::move(parts))));
 }
 
-TEST_F(IntervalVolumeValidate, FindsASideThatDoesNotFitItsCoefficients) {
-  // Most updates change their number of cuts when their side changes: one of the first few does.
+TEST_F(IntervalVolumeValidate, FindsAValueOnAnotherSide) {
+  // Nearly every mesh changes its size when a vertex changes its side.
+  const Description& d = made_->description();
+  const KeySides sides(d.format, d.range);
   int found = 0;
-  for (std::size_t i = 0; i < 20; ++i) {
+  for (UpdateIndex i{0}; i < 20; ++i) {
     auto parts = testing::parts_of(*made_);
-    const std::uint16_t bits = parts.codes[i].bits();
-    parts.codes[i] = UpdateCode(std::uint16_t((bits & ~3u) | ((bits & 3u) + 1) % 3));
+    parts.keys.set(i, sides.side(made_->key(i)) == Side::above ? 0 : d.format.last);
     found += !validate(*IntervalVolume::assemble(std::move(parts)));
   }
   EXPECT_GT(found, 15);
@@ -166,7 +166,7 @@ TEST_P(ObjectErrors, OfABrickAreThoseOfOneOfItsUpdates) {
 
 INSTANTIATE_TEST_SUITE_P(Fields, ObjectErrors, ::testing::Range(0u, 12u));
 
-TEST(IntervalVolumeAssemble, RefusesYieldsThatAreNotOneForEachSupercube) {
+TEST(IntervalVolumeSet, RefusesYieldsThatAreNotOneForEachSupercube) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const auto made = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
   ASSERT_TRUE(made);
@@ -178,7 +178,7 @@ TEST(IntervalVolumeAssemble, RefusesYieldsThatAreNotOneForEachSupercube) {
 }
 
 // The set of a larger box is no set of this one.
-TEST(IntervalVolumeAssemble, RefusesScalesThatTheBoxHasNot) {
+TEST(IntervalVolumeSet, RefusesScalesThatTheBoxHasNot) {
   const auto large = FieldHierarchy(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}}).compact();
   ASSERT_TRUE(large);
   auto parts = testing::parts_of(*large);
@@ -186,13 +186,110 @@ TEST(IntervalVolumeAssemble, RefusesScalesThatTheBoxHasNot) {
   EXPECT_FALSE(IntervalVolume::assemble(std::move(parts)));
 }
 
-TEST(IntervalVolumeAssemble, AnotherYieldIsAnotherContent) {
-  const Volume volume = testing::gyroid({9, 9, 9});
-  const auto made = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
-  ASSERT_TRUE(made);
-  auto parts = testing::parts_of(*made);
-  parts.error_to_distance.back() = ErrorToDistance(std::uint8_t(parts.error_to_distance.back().code() ^ 1));
-  EXPECT_NE(IntervalVolume::assemble(std::move(parts))->description().content_hash, made->description().content_hash);
+class IntervalVolumeAssemble : public ::testing::TestWithParam<unsigned> {
+ protected:
+  IntervalVolumeAssemble()
+      : volume_(GetParam() == 0 ? testing::gyroid({9, 9, 9}) : testing::digits({7, 4, 11}, 3)),
+        made_(with_half_the_errors(FieldHierarchy(volume_, {GetParam() == 0 ? Range{-0.3, 0.2} : Range{3, 5.5}}).compact().value())) {}
+  // Fewer distinct errors than there may be.
+  static IntervalVolume with_half_the_errors(const IntervalVolume& volume) {
+    auto parts = testing::parts_of(volume);
+    const std::size_t half = parts.error_steps.size() / 2;
+    parts.error_steps.erase(parts.error_steps.begin(), parts.error_steps.begin() + std::ptrdiff_t(half));
+    for (auto& step : parts.steps) step = std::uint8_t(std::max<std::size_t>(step, half) - half);
+    return IntervalVolume::assemble(std::move(parts)).value();
+  }
+  template <class Change>
+  [[nodiscard]] Result<IntervalVolume> changed(Change change) const {
+    auto parts = testing::parts_of(made_);
+    change(parts);
+    return IntervalVolume::assemble(std::move(parts));
+  }
+  Volume volume_;
+  IntervalVolume made_;
+};
+
+using Parts = IntervalVolume::Parts;
+
+TEST_P(IntervalVolumeAssemble, RefusesNumbersThatAreNotTheSets) {
+  const std::size_t size = made_.size();
+  for (const std::size_t other : {std::size_t(0), size - 1, size + 1}) {
+    EXPECT_FALSE(changed([&](Parts& p) { p.keys = ValueKeys(other, p.description.format.last); }));
+    EXPECT_FALSE(changed([&](Parts& p) { p.steps.resize(other); }));
+  }
+}
+
+TEST_P(IntervalVolumeAssemble, RefusesKeysBeyondTheLast) {
+  const ValueKey last = made_.description().format.last;
+  for (const std::size_t i : {std::size_t(0), std::size_t(made_.size() / 2), std::size_t(made_.size() - 1)}) {
+    EXPECT_TRUE(changed([&](Parts& p) { p.keys.set(i, last); }));
+    EXPECT_FALSE(changed([&](Parts& p) { p.keys.set(i, last + 1); }));
+  }
+  for (std::size_t corner = 0; corner < kRootVertices; ++corner) {
+    EXPECT_TRUE(changed([&](Parts& p) { p.description.corners[corner] = last; }));
+    EXPECT_FALSE(changed([&](Parts& p) { p.description.corners[corner] = last + 1; }));
+  }
+}
+
+TEST_P(IntervalVolumeAssemble, RefusesErrorStepsThatAreOutOfRange) {
+  const std::size_t steps = made_.error_steps().size();
+  for (const std::size_t i : {std::size_t(0), std::size_t(made_.size() - 1)}) {
+    EXPECT_TRUE(changed([&](Parts& p) { p.steps[i] = std::uint8_t(steps - 1); }));
+    for (const std::size_t step : {steps, std::size_t(kMaxErrorSteps - 1)}) {
+      EXPECT_FALSE(changed([&](Parts& p) { p.steps[i] = std::uint8_t(step); }));
+    }
+  }
+}
+
+TEST_P(IntervalVolumeAssemble, RefusesErrorsThatDescendOrAreTooManyOrNone) {
+  EXPECT_FALSE(changed([](Parts& p) { p.error_steps.clear(); }));
+  EXPECT_FALSE(changed([](Parts& p) { p.error_steps.resize(kMaxErrorSteps + 1, p.error_steps.back()); }));
+  EXPECT_FALSE(changed([](Parts& p) { std::swap(p.error_steps.front(), p.error_steps.back()); }));
+  EXPECT_FALSE(changed([](Parts& p) { p.error_steps.front() = -1; }));
+  for (const float no_number : {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    EXPECT_FALSE(changed([&](Parts& p) { p.error_steps.back() = no_number; }));
+  }
+}
+
+TEST_P(IntervalVolumeAssemble, RefusesAFormatThatIsNone) {
+  for (const double step : {-1.0, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_FALSE(changed([&](Parts& p) { p.description.format.step = step; }));
+  }
+  EXPECT_FALSE(changed([](Parts& p) { p.description.format = {SampleType::f64, 0, 0, p.description.format.last}; }));
+}
+
+TEST_P(IntervalVolumeAssemble, AnotherPartIsAnotherContent) {
+  const auto hash_after = [&](auto change) { return changed(change)->description().content_hash; };
+  const std::uint64_t hash = made_.description().content_hash;
+  EXPECT_EQ(hash_after([](Parts& p) { p.description.name += "'"; }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { p.error_to_distance.back() = ErrorToDistance(std::uint8_t(p.error_to_distance.back().code() ^ 1)); }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { p.keys.set(0, p.keys[0] == 0 ? 1 : p.keys[0] - 1); }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { p.steps.back() = std::uint8_t(p.steps.back() == 0 ? 1 : 0); }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { p.description.is_exact = false; }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { --p.description.format.first; }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { p.description.corners[3] = p.description.corners[3] == 0 ? 1 : 0; }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { p.description.weights.of[0][1][2] ^= 1; }), hash);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fields, IntervalVolumeAssemble, ::testing::Range(0u, 2u));
+
+TEST(ValueKeys, HoldWhatWasSetInAsFewBytesAsTheGreatestNeeds) {
+  std::mt19937 random(5);
+  const std::array<std::pair<ValueKey, unsigned>, 8> widths{
+      {{0, 1}, {255, 1}, {256, 2}, {65535, 2}, {65536, 3}, {(1u << 24) - 1, 3}, {1u << 24, 4}, {~ValueKey(0) - 1, 4}}};
+  for (const auto& [last, width] : widths) {
+    ValueKeys keys(100, last);
+    ASSERT_EQ(keys.width(), width);
+    ASSERT_EQ(keys.bytes().size(), 100 * width);
+    std::vector<ValueKey> model(100);
+    for (int i = 0; i < 1000; ++i) {
+      const std::size_t at = random() % 100;
+      const auto key = ValueKey(random() % (std::uint64_t(last) + 1));
+      keys.set(at, key), model[at] = key;
+    }
+    for (std::size_t i = 0; i < 100; ++i) ASSERT_EQ(keys[i], model[i]);
+    EXPECT_EQ(keys.size(), 100u);
+  }
 }
 
 }  // namespace

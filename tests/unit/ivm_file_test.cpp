@@ -1,15 +1,22 @@
 #include "common/ivm/ivm_file.h"
-#include "common/ivm/verify.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <xxhash.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <random>
 
+#include "common/ivm/value_file.h"
+#include "common/ivm/value_page.h"
+#include "common/ivm/verify.h"
+#include "server/builder/all_cores.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/builder/value_builder.h"
+#include "server/builder/value_steps.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/parts.h"
 #include "tests/support/temp_dir.h"
@@ -33,20 +40,24 @@ Result<IntervalVolume> decode_exact(std::span<const std::byte> bytes) {
 
 bool is_one_line(const std::string& message) { return !message.empty() && message.find('\n') == std::string::npos; }
 
+std::vector<std::uint8_t> codes_of(const IntervalVolume& v) {
+  std::vector<std::uint8_t> codes;
+  for (const ErrorToDistance c : v.error_to_distance()) codes.push_back(c.code());
+  return codes;
+}
+
 void expect_equal(const IntervalVolume& a, const IntervalVolume& b) {
   Description described = b.description();
   described.name = a.description().name;
   EXPECT_EQ(a.description(), described);
   EXPECT_TRUE(std::ranges::equal(a.set().occupancy(), b.set().occupancy()));
   EXPECT_TRUE(std::ranges::equal(a.error_steps(), b.error_steps()));
+  EXPECT_TRUE(std::ranges::equal(codes_of(a), codes_of(b)));
   ASSERT_EQ(a.size(), b.size());
   a.set().for_each_down([&](const Place& p) {
     const auto q = b.set().find(a.set().centre(p));
     ASSERT_TRUE(q);
-    const UpdateView u = a.update(p), v = b.update(*q);
-    EXPECT_EQ(u.side_residual, v.side_residual);
-    EXPECT_EQ(u.first_cuts, v.first_cuts);
-    EXPECT_TRUE(std::ranges::equal(u.residuals, v.residuals));
+    EXPECT_EQ(a.key(p.index), b.key(q->index));
     EXPECT_EQ(a.error(p.index), b.error(q->index));
   });
 }
@@ -67,6 +78,7 @@ TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
     Volume volume = c.kind == 0 ? testing::gyroid(c.dims) : c.kind == 1 ? testing::digits(c.dims, 1) : testing::bump(c.dims, 2);
     volume.grid.spacing = {0.5, 1, 3};
     volume.grid.origin = {-4, 0, 7};
+    round_samples(volume, choose_value_format(volume, {}).value());
     const IntervalVolume sigma = testing::build(volume, {.range = c.range, .refine = c.refine});
     const auto path = folder / "first.second.ivm";
     ASSERT_TRUE(save_ivm(path, sigma));
@@ -122,11 +134,109 @@ TEST(IvmFile, EveryTruncationAndAdditionIsRefused) {
 // The version is the little-endian word after the 8 bytes of magic, now and in any version to come.
 TEST(IvmFile, AnotherVersionIsRefusedByNameOfBoth) {
   auto bytes = encode_ivm(small_volume());
-  bytes[8] = std::byte{77};
-  const auto decoded = decode_exact(bytes);
+  for (const unsigned version : {1u, 4u, 6u, 77u}) {
+    bytes[8] = std::byte(version);
+    const auto decoded = decode_exact(bytes);
+    ASSERT_FALSE(decoded);
+    EXPECT_THAT(decoded.error().message, HasSubstr("version " + std::to_string(version)));
+    EXPECT_THAT(decoded.error().message, HasSubstr("version " + std::to_string(kIvmVersion)));
+    EXPECT_THAT(decoded.error().message, HasSubstr(version > kIvmVersion ? "use a newer program" : "build the file again"));
+    EXPECT_TRUE(is_one_line(decoded.error().message));
+  }
+}
+
+TEST(IvmFile, AFileOfTheOtherScopeIsRefused) {
+  const TempDir folder;
+  const auto one = folder / "one.ivm", every = folder / "every.ivm";
+  ASSERT_TRUE(save_ivm(one, small_volume()));
+  Volume volume = testing::digits({5, 4, 6}, 1);
+  const auto format = choose_value_format(volume, {});
+  ASSERT_TRUE(format);
+  ASSERT_TRUE(save_values(every, build_value_volume(volume, *format)));
+  EXPECT_FALSE(is_value_file(one));
+  EXPECT_TRUE(is_value_file(every));
+  const auto loaded = load_ivm(every);
+  ASSERT_FALSE(loaded);
+  EXPECT_THAT(loaded.error().message, HasSubstr("a data set of every range, which cannot be used here yet: build it with --range"));
+  const auto values = load_values(one);
+  ASSERT_FALSE(values);
+  EXPECT_THAT(values.error().message, HasSubstr("one range"));
+  EXPECT_TRUE(load_ivm(one));
+  EXPECT_TRUE(load_values(every));
+}
+
+// The bytes of a file with one more stream, an empty one, behind its others.
+std::vector<std::byte> with_stream(std::vector<std::byte> bytes, std::uint32_t type, std::uint32_t flags) {
+  constexpr std::size_t kHeader = 40, kEntry = 32;
+  const auto add = [&bytes](std::size_t at, std::uint64_t more, std::size_t size) {
+    std::uint64_t number = 0;
+    std::memcpy(&number, &bytes[at], size);
+    number += more;
+    std::memcpy(&bytes[at], &number, size);
+    return number;
+  };
+  const std::uint64_t streams = add(12, 1, 4) - 1;
+  for (std::uint64_t i = 0; i < streams; ++i) add(kHeader + i * kEntry + 8, kEntry, 8);
+  bytes.insert(bytes.begin() + std::ptrdiff_t(kHeader + streams * kEntry), kEntry, std::byte{});
+  const std::size_t at = kHeader + streams * kEntry;
+  add(at, type, 4);
+  add(at + 4, flags, 4);
+  add(at + 8, bytes.size(), 8);
+  add(at + 24, XXH3_64bits(nullptr, 0), 8);
+  add(16, kEntry, 8);
+  std::memset(&bytes[32], 0, 8);
+  add(32, XXH3_64bits(bytes.data(), at + kEntry), 8);
+  return bytes;
+}
+
+TEST(IvmFile, StreamsThatAreUnknownAreSkippedOnlyIfTheySaySo) {
+  const auto bytes = encode_ivm(small_volume());
+  const auto refusal = [&bytes](std::uint32_t type, std::uint32_t flags) {
+    const auto decoded = decode_exact(with_stream(bytes, type, flags));
+    return decoded ? std::string() : decoded.error().message;
+  };
+  EXPECT_EQ(refusal(40, 1), "");
+  EXPECT_THAT(refusal(40, 0), HasSubstr("stream 40 is unknown; use a newer program"));
+  EXPECT_THAT(refusal(40, 3), HasSubstr("damaged"));
+  EXPECT_THAT(refusal(0, 0), HasSubstr("unknown"));
+  EXPECT_THAT(refusal(std::uint32_t(StreamType::bricks), 0), HasSubstr("twice"));
+  EXPECT_THAT(refusal(std::uint32_t(StreamType::histogram), 1), HasSubstr("does not belong"));
+}
+
+// Values are predicted from those of ancestors.
+TEST(IvmFile, ASetWithoutAncestorsIsRefused) {
+  const IntervalVolume sigma = small_volume();
+  auto parts = testing::parts_of(sigma);
+  std::vector<SupercubeKey> names;
+  std::vector<std::uint64_t> occupancy;
+  for (BrickIndex b{0}; b < sigma.set().bricks().size(); ++b) {
+    sigma.set().for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+      if (scale_of_key(key) != 0) return;
+      names.push_back(key);
+      occupancy.push_back(sigma.set().occupancy()[s]);
+    });
+  }
+  parts.set = SupercubeSet(names, std::move(occupancy));
+  parts.keys = ValueKeys(parts.set.size(), parts.description.format.last);
+  parts.steps.resize(parts.set.size());
+  parts.error_to_distance.resize(parts.set.supercubes());
+  const auto assembled = IntervalVolume::assemble(std::move(parts));
+  ASSERT_TRUE(assembled);
+  const auto decoded = decode_exact(encode_ivm(*assembled));
   ASSERT_FALSE(decoded);
-  EXPECT_THAT(decoded.error().message, HasSubstr("77"));
-  EXPECT_THAT(decoded.error().message, HasSubstr(std::to_string(kIvmVersion)));
+  EXPECT_THAT(decoded.error().message, HasSubstr("page 0 of 1 is damaged"));
+}
+
+// Pages are decoded in parallel where a scale has several.
+TEST(IvmFile, ThreadsMakeNoDifference) {
+  const IntervalVolume sigma = testing::build(testing::gyroid({90, 83, 80}), {.range = {-0.6, 0.9}, .refine = Refine::uniform});
+  ASSERT_GT(sigma.size(), 2 * kPageValuesMost) << "or it has too few pages";
+  const auto bytes = encode_ivm(sigma);
+  EXPECT_EQ(encode_ivm(sigma, on_all_cores), bytes);
+  const auto decoded = decode_ivm(bytes, "again", on_all_cores);
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  EXPECT_TRUE(std::ranges::equal(decoded->keys().bytes(), sigma.keys().bytes()));
+  EXPECT_EQ(decoded->description().content_hash, sigma.description().content_hash);
 }
 
 TEST(IvmFile, WhatIsNoIntervalVolumeIsRefusedInOneLineThatBeginsWithThePath) {
@@ -180,37 +290,33 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
   using Parts = IntervalVolume::Parts;
   const IntervalVolume sigma = small_volume();
   ASSERT_GT(sigma.error_steps().size(), 3u);
-  ASSERT_GT(sigma.description().root_patch.size(), 8u);
   const struct {
     const char* what;
     void (*spoil)(Parts&);
   } cases[] = {
-      {"too few codes", [](Parts& p) { p.codes.pop_back(); }},
+      {"too few steps", [](Parts& p) { p.steps.pop_back(); }},
       {"too few error_to_distance codes", [](Parts& p) { p.error_to_distance.pop_back(); }},
-      {"too many codes", [](Parts& p) { p.codes.emplace_back(); }},
-      {"no codes", [](Parts& p) { p.codes.clear(); }},
-      {"no set", [](Parts& p) { p.set = SupercubeSet(); }},
-      {"a coefficient too few", [](Parts& p) { p.residuals.pop_back(); }},
-      {"a coefficient too many", [](Parts& p) { p.residuals.push_back(0); }},
-      {"a code that takes too many coefficients",
+      {"too many steps", [](Parts& p) { p.steps.push_back(0); }},
+      {"no steps", [](Parts& p) { p.steps.clear(); }},
+      {"no values", [](Parts& p) { p.keys = {}; }},
+      {"a value too many", [](Parts& p) { p.keys = ValueKeys(p.keys.size() + 1, p.description.format.last); }},
+      {"a value out of range",
        [](Parts& p) {
-         const UpdateCode most(std::uint16_t(31 << 2));
-         p.residuals.resize(p.residuals.size() + most.coefficients() - p.codes[0].coefficients());
-         p.codes[0] = most;
+         p.keys.set(0, p.description.format.last);
+         --p.description.format.last;
+         p.description.corners = {};
        }},
-      {"a code of side 3", [](Parts& p) { p.codes[0] = UpdateCode(std::uint16_t(p.codes[0].bits() | 3)); }},
-      {"a code of a level that is not there",
-       [](Parts& p) { p.codes[0] = UpdateCode(std::uint16_t((p.codes[0].bits() & 127) | p.error_steps.size() << 7)); }},
+      {"no set", [](Parts& p) { p.set = SupercubeSet(); }},
+      {"an error that is not there", [](Parts& p) { p.steps[0] = std::uint8_t(p.error_steps.size()); }},
       {"errors that descend", [](Parts& p) { std::swap(p.error_steps[0], p.error_steps[1]); }},
       {"a negative error", [](Parts& p) { p.error_steps[0] = -1; }},
       {"an infinite error", [](Parts& p) { p.error_steps.back() = std::numeric_limits<float>::infinity(); }},
       {"an error that is no number", [](Parts& p) { p.error_steps[1] = std::numeric_limits<float>::quiet_NaN(); }},
       {"no errors", [](Parts& p) { p.error_steps.clear(); }},
       {"too many errors", [](Parts& p) { p.error_steps.resize(kMaxErrorSteps + 1, p.error_steps.back()); }},
-      {"a root patch too short", [](Parts& p) { p.description.root_patch.pop_back(); }},
-      {"a root patch too long", [](Parts& p) { p.description.root_patch.push_back(0); }},
-      {"no root patch", [](Parts& p) { p.description.root_patch.clear(); }},
-      {"a root patch with a corner on no side", [](Parts& p) { p.description.root_patch[0] = 3; }},
+      {"a corner out of range", [](Parts& p) { p.description.corners[7] = p.description.format.last + 1; }},
+      {"a negative step", [](Parts& p) { p.description.format.step = -1; }},
+      {"a negative largest error", [](Parts& p) { p.description.max_error = -1; }},
       {"a side of 1 sample", [](Parts& p) { p.description.grid.dims[1] = 1; }},
       {"a negative side", [](Parts& p) { p.description.grid.dims[2] = -9; }},
       {"a side that is too long", [](Parts& p) { p.description.grid.dims[0] = kMaxSide + 1; }},
@@ -245,12 +351,7 @@ TEST(Assemble, PartsThatFitButMeanNothingAreNotValid) {
   EXPECT_TRUE(refused([](auto& p) { ++p.description.full.tets; }));
   EXPECT_TRUE(refused([](auto& p) { --p.description.full.vertices; }));
   EXPECT_TRUE(refused([](auto& p) { p.description.grid.dims = {3, 2, 2}; })) << "updates outside the box";
-  EXPECT_TRUE(refused([](auto& p) { p.codes[0] = UpdateCode(std::uint16_t(p.codes[0].bits() & 127)); }))
-      << "the root's error is its descendants' least";
-  for (UpdateIndex i{0}; i < sigma.size(); i += 7) {
-    const unsigned turned = (sigma.codes()[i].side_residual() + 1) % 3;
-    EXPECT_TRUE(refused([&](auto& p) { p.codes[i] = UpdateCode(std::uint16_t((p.codes[i].bits() & ~3) | turned)); })) << "side of update " << i;
-  }
+  EXPECT_TRUE(refused([](auto& p) { p.steps[0] = 0; })) << "the root's error is its descendants' least";
 }
 
 }  // namespace

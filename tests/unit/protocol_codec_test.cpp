@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <random>
+#include <span>
 #include <string>
 
 namespace intervale::protocol {
@@ -27,7 +29,15 @@ Description some_description() {
   d.coefficients = 99;
   d.full = {1u << 31, 1ull << 40};
   d.content_hash = 0xfedcba9876543210;
-  d.root_patch = {1, 2, 3, 255};
+  d.format = {SampleType::f32, 0.25, -1234567890123, 0xfffffffe};
+  d.is_exact = false;
+  for (ValueKey v = 0; v < kRootVertices; ++v) d.corners[v] = v * v * 0x01020304;
+  std::int16_t weight = -32768;
+  for (auto& scale : std::span(d.weights.of).first(7)) {  // of 129 samples
+    for (auto& cls : scale) {
+      for (auto& of : cls) of = weight = std::int16_t(weight + 911);
+    }
+  }
   return d;
 }
 
@@ -40,6 +50,8 @@ std::vector<ClientMessage> client_messages() {
           View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}},
           Credit{65536},
           Open{"buckyball", "test 1", 0, 0xfedcba9876543210u},
+          Open{.dataset = "buckyball", .payload = 0},
+          Open{.dataset = "buckyball", .payload = 0xffffffff},
           Have{},
           Have{{{{}, {}, supercube_key(5, {1, 2, 3}), 1}, {{}, {}, supercube_key(0, {4, 0, 9}), (std::uint64_t(1) << kSlots) - 1}}}};
 }
@@ -136,12 +148,64 @@ TEST(Codec, LimitsHold) {
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(Open{std::string(kMaxName + 1, 'x'), "", 0}))));
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(Open{"x", std::string(kMaxText + 1, 'x'), 0}))));
   Opened opened{some_description(), {}};
-  opened.description.root_patch.resize(kMaxRootPatch + 1);
+  opened.description.name.resize(kMaxName + 1, 'x');
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(opened))));
   EXPECT_TRUE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, 0, 0, Bytes(kMaxBatchPayload)}))));
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, 0, 0, Bytes(kMaxBatchPayload + 1)}))));
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, kNan, 0, 0, {}}))));
   EXPECT_FALSE(decode_server_message(encode(ServerMessage(Batch{1, 0, 1, 0, kNan, 0, {}}))));
+}
+
+std::size_t offset_at(const Bytes& bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+// The place of a field of the table at `table`; 0: it is not there. slot: the field's number in stream.fbs, from 0.
+std::size_t field(const Bytes& bytes, std::size_t table, std::size_t slot) {
+  std::int32_t back = 0;
+  std::memcpy(&back, bytes.data() + table, sizeof back);
+  const std::size_t vtable = std::size_t(std::int64_t(table) - back);
+  std::uint16_t offset = 0;
+  std::memcpy(&offset, bytes.data() + vtable + 4 + 2 * slot, sizeof offset);
+  return offset == 0 ? 0 : table + offset;
+}
+std::size_t target(const Bytes& bytes, std::size_t at) { return at + offset_at(bytes, at); }
+// The place of a field of an Opened's description.
+std::size_t described(const Bytes& bytes, std::size_t slot) {
+  const std::size_t opened = target(bytes, field(bytes, target(bytes, 0), 1));
+  return field(bytes, target(bytes, field(bytes, opened, 0)), slot);
+}
+constexpr std::size_t kType = 14, kCorners = 19, kWeights = 20;  // slots of the description
+
+TEST(Codec, ADescriptionHasTheCornersAndWeightsOfItsGrid) {
+  const Bytes good = encode(ServerMessage(Opened{some_description(), {}}));
+  ASSERT_EQ(offset_at(good, target(good, described(good, kCorners))), 8u);
+  ASSERT_EQ(offset_at(good, target(good, described(good, kWeights))), 7u * 9);
+  const auto refused = [&good](std::size_t at, std::uint32_t value, std::size_t size) {
+    Bytes bytes = good;
+    std::memcpy(bytes.data() + at, &value, size);
+    return !decode_exact(ServerMessage{}, bytes);
+  };
+  for (const std::uint32_t count : {0u, 1u, 7u}) EXPECT_TRUE(refused(target(good, described(good, kCorners)), count, 4)) << count;
+  for (const std::uint32_t count : {0u, 1u, 7u * 9 - 1, 8u * 9}) EXPECT_TRUE(refused(target(good, described(good, kWeights)), count, 4)) << count;
+  EXPECT_TRUE(refused(described(good, kType), 8, 1)) << "no type of samples";
+  EXPECT_FALSE(refused(described(good, kType), 7, 1));
+}
+
+TEST(Codec, ADescriptionOfAnotherVersionKeepsWhatBothHave) {
+  Opened opened{some_description(), {}};
+  for (const std::uint32_t version : {0u, 1u, 3u}) {
+    opened.payload = version;
+    Bytes bytes = encode(ServerMessage(opened));
+    const std::uint32_t none = 0;
+    std::memcpy(bytes.data() + target(bytes, described(bytes, kCorners)), &none, sizeof none);
+    const auto back = decode_exact(ServerMessage{}, bytes);
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(std::get<Opened>(*back).payload, version);
+    EXPECT_EQ(std::get<Opened>(*back).description.name, opened.description.name);
+    EXPECT_EQ(std::get<Opened>(*back).description.format, ValueFormat());
+  }
 }
 
 TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {

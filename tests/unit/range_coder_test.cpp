@@ -18,9 +18,8 @@ std::vector<unsigned> code_all(Coder& coder, const std::vector<unsigned>& values
   BitModel flag;
   NumberModel<7> number;
   SmallNumberModel small;
-  ResidualModel residual;
   for (const unsigned v : values) {
-    switch (got.empty() ? 0 : got.back() % 5) {
+    switch (got.empty() ? 0 : got.back() % 4) {
       case 0:
         got.push_back(unsigned(coder.bit(flag, (v & 1) != 0)));
         break;
@@ -29,9 +28,6 @@ std::vector<unsigned> code_all(Coder& coder, const std::vector<unsigned>& values
         break;
       case 2:
         got.push_back(small.code(coder, v % 65535));
-        break;
-      case 3:
-        got.push_back(residual.code(coder, std::uint8_t(v)));
         break;
       default:
         got.push_back(coder.raw_bits(9, v % 512));
@@ -70,19 +66,15 @@ TEST(RangeCoder, GivesBackWhatWasWritten) {
   }
 }
 
-TEST(RangeCoder, EveryResidualAndEverySmallNumberComesBack) {
+TEST(RangeCoder, EverySmallNumberComesBack) {
   RangeEncoder encoder;
   {
-    ResidualModel residual;
     SmallNumberModel small;
-    for (unsigned v = 0; v < 256; ++v) residual.code(encoder, std::uint8_t(v));
     for (unsigned v = 0; v < 65535; ++v) small.code(encoder, v);
   }
   const auto bytes = encoder.finish();
   RangeDecoder decoder(bytes);
-  ResidualModel residual;
   SmallNumberModel small;
-  for (unsigned v = 0; v < 256; ++v) ASSERT_EQ(residual.code(decoder), v);
   for (unsigned v = 0; v < 65535; ++v) ASSERT_EQ(small.code(decoder), v);
   EXPECT_TRUE(decoder.is_spent());
 }

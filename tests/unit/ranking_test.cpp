@@ -120,7 +120,7 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
   for (int trial = 0; trial < 40; ++trial) {
     const Ranking ranking(volume_, random_lod(volume_, random_));
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
-      const unsigned level = volume_.step_of_half(volume_.supercube_half_steps()[p.supercube]);
+      const unsigned level = volume_.supercube_error_steps()[p.supercube];
       ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level), rank) << "trial " << trial;
     });
   }

@@ -78,21 +78,15 @@ TEST_P(SplitSets, NeighboursAreTheSupercubesFoundByTheirPlaces) {
 // Split ones count as ready too: what is not split and ready is what the front can split.
 TEST_P(SplitSets, ReadyIsWhatAFrontCanSplit) {
   const SupercubeSet& set = volume_.set();
-  const Description& d = volume_.description();
   for (const double share : {0.0, 0.01, 0.1, 0.6, 1.0}) {
     const SplitSet split = some_of(volume_, share, random_);
-    const auto extraction =
-        extract(d.grid, *decode_root_patch(d.root_patch, volume_.domain()), set, split, [&](Front& front, Front::Handle handle, const Place& p) {
-          const DiamondContext context = front.context(handle);
-          Prediction prediction(context);
-          const UpdateView u = volume_.update(p);
-          const Side side = Side((unsigned(prediction.side()) + u.side_residual) % 3);
-          std::array<std::uint8_t, kMaxCuts> cuts;
-          prediction.decode(side, u.residuals, cuts.data());
-          front.split(handle, side, std::span(cuts).first(u.residuals.size()));
-          return true;
-        });
-    ASSERT_TRUE(extraction);
+    Front front = root_front(volume_.description());
+    set.for_each_down([&](const Place& p) {
+      if (!split.contains(p.index)) return;
+      const auto handle = front.find(SupercubeSet::centre(p));
+      ASSERT_TRUE(handle);
+      front.split(*handle, volume_.key(p.index));
+    });
     SplittableSlots splittable(set, volume_.domain(), split);
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
@@ -100,7 +94,7 @@ TEST_P(SplitSets, ReadyIsWhatAFrontCanSplit) {
         const std::uint64_t ready = splittable.slots(), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
         ASSERT_EQ(is_split & ~ready, 0u) << "the ancestors of what is split are split";
         for (Slot slot{0}; slot < kSlots; ++slot) {
-          const bool can_be = extraction->front.find(centre_of(key, slot)).has_value();
+          const bool can_be = front.find(centre_of(key, slot)).has_value();
           ASSERT_EQ(((ready & ~is_split) >> slot & 1) != 0, can_be) << "share " << share << ", slot " << slot;
         }
       });

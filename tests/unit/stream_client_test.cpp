@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <random>
@@ -103,7 +104,7 @@ TEST_P(Stream, EveryLevelOfDetailEndsWithItsMesh) {
     ASSERT_NO_FATAL_FAILURE(stream(fresh, client, lod));
     const auto expected = extract(*volume, lod);
     ASSERT_TRUE(expected) << expected.error().message;
-    EXPECT_EQ(client.updates(), expected->updates);
+    EXPECT_EQ(client.updates_in_mesh(), expected->updates);
     EXPECT_EQ(canonical(client.mesh()), canonical(expected->front.mesh())) << "kind " << kind;
   }
 }
@@ -181,10 +182,16 @@ TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
       {"an infinite origin", [](Description& d) { d.grid.origin[0] = -kInf; }},
       {"an origin that is no number", [](Description& d) { d.grid.origin[2] = kNan; }},
       {"a far corner beyond all numbers", [](Description& d) { d.grid.spacing[1] = std::numeric_limits<double>::max(); }},
-      {"no root patch", [](Description& d) { d.root_patch.clear(); }},
-      {"a root patch too short", [](Description& d) { d.root_patch.pop_back(); }},
-      {"a root patch too long", [](Description& d) { d.root_patch.push_back(0); }},
-      {"a root patch with a corner on no side", [](Description& d) { d.root_patch[7] = 3; }},
+      {"a corner's key beyond the last", [](Description& d) { d.corners[7] = d.format.last + 1; }},
+      {"a last key below the corners'", [](Description& d) { d.format.last = *std::max_element(d.corners.begin(), d.corners.end()) - 1; }},
+      {"a negative step", [](Description& d) { d.format.step = -1; }},
+      {"a step that is no number", [](Description& d) { d.format.step = kNan; }},
+      {"an infinite step", [](Description& d) { d.format.step = kInf; }},
+      {"no step for whole numbers",
+       [](Description& d) {
+         d.format = {SampleType::u8, 0, 0, d.format.last};
+       }},
+      {"a first value beyond all numbers", [](Description& d) { d.format.first = std::numeric_limits<std::int64_t>::max(); }},
       {"a range upside down",
        [](Description& d) {
          d.range = {1, 0};
@@ -207,7 +214,9 @@ TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
 TEST(StreamClient, TheLargestBoxCostsNothingBeforeItsFirstUpdate) {
   Description d;
   d.grid.dims = {kMaxSide, kMaxSide, kMaxSide};
-  d.root_patch.assign(8, 1);
+  d.format.last = 255;
+  d.range = {10, 20};
+  d.corners.fill(15);
   const StreamClient client = started(d);
   EXPECT_EQ(client.tet_count(), 6u);
   EXPECT_EQ(broken(client), "");

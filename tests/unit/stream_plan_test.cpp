@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/front/batch_decoder.h"
+#include "common/ivm/extraction.h"
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/interval_volumes.h"
@@ -52,9 +53,7 @@ Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
 class Receiver {
  public:
   explicit Receiver(std::shared_ptr<const IntervalVolume> volume)
-      : volume_(std::move(volume)),
-        front_(volume_->description().grid, *decode_root_patch(volume_->description().root_patch, volume_->domain())),
-        sent_(volume_->size()) {}
+      : volume_(std::move(volume)), front_(root_front(volume_->description())), sent_(volume_->size()) {}
 
   void set_lod(const Lod& lod) {
     wanted_ = in_order(*volume_, select(*volume_, lod), lod);
@@ -62,7 +61,7 @@ class Receiver {
   }
   // Takes a batch; what was sent before, or before its parents, is refused.
   Result<std::uint64_t> take(const Batch& batch) {
-    auto applied = apply_batch(front_, batch.payload);
+    auto applied = apply_batch(front_, volume_->description(), batch.payload);
     // A diamond whose parents are all split is in the front, or split.
     volume_->set().for_each_down([&](const Place& p) {
       if (sent_[p.index]) return;

@@ -1,11 +1,18 @@
+// Batches of updates: what one side encodes, the other applies; and bytes that are no batch.
 #include "common/front/batch_decoder.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <random>
 
+#include "common/codec/batch.h"
+#include "common/codec/byte_planes.h"
+#include "common/codec/split_names.h"
 #include "common/ivm/extraction.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/batches.h"
@@ -30,44 +37,61 @@ std::vector<IntervalVolume> volumes() {
   return all;
 }
 
-Front root_of(const IntervalVolume& v) { return Front(v.description().grid, *decode_root_patch(v.description().root_patch, v.domain())); }
+Front root_of(const IntervalVolume& v) { return root_front(v.description()); }
 
-std::vector<UpdateIndex> queue_of(const IntervalVolume& v) { return in_order(v, select(v, Lod{}), {}); }
+std::vector<UpdateIndex> queue_of(const IntervalVolume& v, const Lod& lod = {}) { return in_order(v, select(v, lod), lod); }
 
 // The front after the first n updates of the queue.
 Front after(const IntervalVolume& v, std::size_t n) {
   Front front = root_of(v);
   const auto queue = queue_of(v);
-  const auto applied = apply_batch(front, batch_of(v, std::span(queue).first(n)));
+  const auto applied = apply_batch(front, v.description(), batch_of(v, std::span(queue).first(n)));
   EXPECT_TRUE(applied && *applied == n);
   return front;
 }
 
 // In a buffer of exactly its size, so that the address sanitizer sees every step beyond.
-Result<std::uint64_t> apply_exact(Front& front, std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0)) {
+Result<std::uint64_t> apply_exact(Front& front, const IntervalVolume& v, std::span<const std::uint8_t> bytes,
+                                  std::uint64_t max_tets = ~std::uint64_t(0)) {
   const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
   std::copy(bytes.begin(), bytes.end(), exact.get());
-  return apply_batch(front, {exact.get(), bytes.size()}, max_tets);
+  return apply_batch(front, v.description(), {exact.get(), bytes.size()}, max_tets);
+}
+
+// All updates, those of an error, and those of a box.
+std::vector<Lod> lods_of(const IntervalVolume& v) {
+  std::vector<Lod> lods(4);
+  lods[1].error_percent = 10;
+  lods[2].error_percent = 40;
+  const auto& dims = v.description().grid.dims;
+  lods[3].roi = Box{{0, 0, 0}, {dims[0] / 3.0, dims[1] / 2.0, dims[2] / 3.0}};
+  return lods;
 }
 
 TEST(UpdateCodec, AnySplitIntoBatchesGivesTheExtractedMesh) {
   for (const IntervalVolume& v : volumes()) {
-    const auto expected = canonical(extract(v, {})->front.mesh());
-    const auto queue = queue_of(v);
-    for (unsigned seed = 0; seed < 8; ++seed) {
-      SCOPED_TRACE("seed " + std::to_string(seed));
-      std::mt19937 random(seed);
-      const std::size_t most = seed == 0 ? 1 : seed == 1 ? queue.size() : 1 + random() % 200;
-      Front front = root_of(v);
-      for (std::size_t i = 0, n = 0; i < queue.size(); i += n) {
-        n = std::min(queue.size() - i, seed < 2 ? most : 1 + random() % most);
-        const auto applied = apply_exact(front, batch_of(v, std::span(queue).subspan(i, n), std::span(queue).first(i)));
-        ASSERT_TRUE(applied) << applied.error().message;
-        ASSERT_EQ(*applied, n);
-        ASSERT_EQ(front.shown_count(), front.split_count());
+    for (const Lod& lod : lods_of(v)) {
+      const auto extracted = extract(v, lod);
+      ASSERT_TRUE(extracted);
+      const auto expected = canonical(extracted->front.mesh());
+      const auto queue = queue_of(v, lod);
+      for (unsigned seed = 0; seed < 6; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        std::mt19937 random(seed);
+        const std::size_t most = seed == 0 ? 1 : seed == 1 ? queue.size() : 1 + random() % 200;
+        Front front = root_of(v);
+        for (std::size_t i = 0, n = 0; i < queue.size(); i += n) {
+          n = std::min(queue.size() - i, seed < 2 ? most : 1 + random() % most);
+          const auto applied = apply_exact(front, v, batch_of(v, std::span(queue).subspan(i, n), std::span(queue).first(i)));
+          ASSERT_TRUE(applied) << applied.error().message;
+          ASSERT_EQ(*applied, n);
+          ASSERT_EQ(front.withheld_count(), 0u);
+        }
+        EXPECT_EQ(front.validate(), std::nullopt);
+        EXPECT_EQ(front.split_count(), queue.size());
+        EXPECT_EQ(front.shown_count(), extracted->updates);
+        EXPECT_EQ(canonical(front.mesh()), expected);
       }
-      EXPECT_EQ(front.validate(), std::nullopt);
-      EXPECT_EQ(canonical(front.mesh()), expected);
     }
   }
 }
@@ -76,7 +100,7 @@ TEST(UpdateCodec, ABatchOfNothingChangesNothing) {
   const IntervalVolume v = testing::build(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}});
   Front front = root_of(v);
   const auto before = canonical(front.mesh());
-  const auto applied = apply_exact(front, batch_of(v, {}));
+  const auto applied = apply_exact(front, v, batch_of(v, {}));
   ASSERT_TRUE(applied) << applied.error().message;
   EXPECT_EQ(*applied, 0u);
   EXPECT_EQ(canonical(front.mesh()), before);
@@ -88,12 +112,12 @@ TEST(UpdateCodec, EveryTruncationIsRefused) {
     const Bytes bytes = batch_of(v, std::span(queue).first(std::min<std::size_t>(queue.size(), 300)));
     for (std::size_t n = 0; n < bytes.size(); ++n) {
       Front front = root_of(v);
-      ASSERT_FALSE(apply_exact(front, std::span(bytes).first(n))) << "the first " << n << " of " << bytes.size() << " bytes";
+      ASSERT_FALSE(apply_exact(front, v, std::span(bytes).first(n))) << "the first " << n << " of " << bytes.size() << " bytes";
     }
     Bytes longer = bytes;
     longer.push_back(0);
     Front front = root_of(v);
-    EXPECT_FALSE(apply_exact(front, longer));
+    EXPECT_FALSE(apply_exact(front, v, longer));
   }
 }
 
@@ -110,7 +134,7 @@ TEST(UpdateCodec, EveryFlippedByteFailsOrLeavesAFrontThatHolds) {
         Bytes damaged = bytes;
         damaged[i] = std::uint8_t(damaged[i] ^ mask);
         Front front = stage;
-        const auto applied = apply_exact(front, damaged);
+        const auto applied = apply_exact(front, v, damaged);
         if (applied) {
           ASSERT_EQ(front.validate(), std::nullopt) << "byte " << i << ", mask " << mask;
         } else {
@@ -131,7 +155,7 @@ TEST(UpdateCodec, GarbageIsRefused) {
     if (seed % 5 == 0)
       std::fill(bytes.begin(), bytes.begin() + std::min<std::ptrdiff_t>(12, std::ssize(bytes)), std::uint8_t(0xff));  // counts beyond all bounds
     Front front = root_of(v);
-    if (apply_exact(front, bytes)) {
+    if (apply_exact(front, v, bytes)) {
       EXPECT_EQ(front.validate(), std::nullopt) << "seed " << seed;
     }
   }
@@ -143,16 +167,16 @@ TEST(UpdateCodec, WhatDoesNotFitTheFrontIsRefused) {
     const auto queue = queue_of(v);
     const std::size_t half = queue.size() / 2;
     Front front = after(v, half);
-    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(half / 2, half), std::span(queue).first(half / 2))))
+    EXPECT_FALSE(apply_exact(front, v, batch_of(v, std::span(queue).subspan(half / 2, half), std::span(queue).first(half / 2))))
         << "updates a second time";
     front = root_of(v);
-    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(1), std::span(queue).first(1)))) << "children without the root";
+    EXPECT_FALSE(apply_exact(front, v, batch_of(v, std::span(queue).subspan(1), std::span(queue).first(1)))) << "children without the root";
     front = root_of(v);
-    EXPECT_FALSE(apply_exact(front, batch_of(v, std::span(queue).subspan(half), std::span(queue).first(half)))) << "children before parents";
+    EXPECT_FALSE(apply_exact(front, v, batch_of(v, std::span(queue).subspan(half), std::span(queue).first(half)))) << "children before parents";
     for (const IntervalVolume& other : all) {
       if (&other == &v) continue;
       front = root_of(v);
-      EXPECT_FALSE(apply_exact(front, batch_of(other, queue_of(other)))) << "another volume's";
+      EXPECT_FALSE(apply_exact(front, v, batch_of(other, queue_of(other)))) << "another volume's";
     }
   }
 }
@@ -166,7 +190,7 @@ TEST(UpdateCodec, WhatDoesNotFitTheBudgetIsHidden) {
     for (std::uint64_t i = 0; i <= 40; ++i) {
       const std::uint64_t most = coarse + (full - coarse) * i / 40;
       Front front = root_of(v);
-      const auto applied = apply_exact(front, bytes, most);
+      const auto applied = apply_exact(front, v, bytes, most);
       ASSERT_TRUE(applied) << applied.error().message;
       EXPECT_LE(front.tet_count(), most);
       EXPECT_EQ(*applied, queue.size());
@@ -177,6 +201,173 @@ TEST(UpdateCodec, WhatDoesNotFitTheBudgetIsHidden) {
       ASSERT_EQ(broken_law(front.mesh(), v.description().grid, v.description().range.alpha == v.description().range.beta), "") << "at most " << most;
     }
   }
+}
+
+// The range coded part of a batch.
+Bytes coded_part(std::span<const std::uint8_t> batch) {
+  EXPECT_TRUE(take_supercubes(batch, kBatchUpdatesMost));
+  const auto length = take_varint(batch);
+  EXPECT_TRUE(length && *length == batch.size());
+  return {batch.begin(), batch.end()};
+}
+
+// All diamonds are relevant, so every flag is that of an update.
+TEST(UpdateCodec, ValuesWithoutAnyPatternTakeNoMoreThanTheirBits) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::mt19937 random(11);
+  std::vector<std::uint32_t> noise(17 * 17 * 17);
+  for (std::uint32_t& sample : noise) sample = std::uint32_t(random() % 4294967295u);
+  const Volume volume = testing::volume_of_type(SampleType::u32, {17, 17, 17}, noise);
+  const IntervalVolume v = testing::build(volume, {.range = {-kInfinity, kInfinity}, .refine = Refine::uniform});
+  const auto queue = queue_of(v);
+  ASSERT_EQ(queue.size(), noise.size() - 8);
+  for (const std::size_t n : {std::size_t(1), std::size_t(100), queue.size()}) {
+    const Bytes batch = batch_of(v, std::span(queue).first(n)), coded = coded_part(batch);
+    if (n == queue.size()) {
+      EXPECT_EQ(RangeDecoder(coded).raw_bits(1), 1u) << "coded without models";
+      EXPECT_LE(coded.size(), sizeof(std::uint64_t) + n * 33 / 8 + 1);
+    }
+    Front front = root_of(v);
+    const auto applied = apply_exact(front, v, batch);
+    ASSERT_TRUE(applied) << applied.error().message;
+    for (std::size_t i = 0; i < batch.size(); i += 1 + batch.size() / 200) {
+      Front other = root_of(v);
+      ASSERT_FALSE(apply_exact(other, v, std::span(batch).first(i))) << "the first " << i << " of " << batch.size() << " bytes";
+    }
+  }
+  Front front = root_of(v);
+  ASSERT_TRUE(apply_exact(front, v, batch_of(v, queue)));
+  EXPECT_EQ(canonical(front.mesh()), canonical(extract(v, {})->front.mesh()));
+}
+
+// A batch of the root's supercube whose first update, the root's, is coded by `code(encoder, models, cursor, prediction)`.
+template <class Code>
+Bytes batch_of_root(const IntervalVolume& v, bool is_plain, Code code) {
+  const Description& d = v.description();
+  const Front front = root_of(v);
+  const Diamond root(v.domain().root());
+  FrontCursor cursor(front.state());
+  cursor.move_to(root);
+  EXPECT_TRUE(cursor.find_unsplit(kSlotOfType[std::size_t(root.type)]));
+  VertexKeys around = cursor.vertex_keys();
+  fill_missing(around, root.row->vertices);
+  const auto models = std::make_unique<BatchModels>();
+  models->is_plain = is_plain;
+  RangeEncoder encoder;
+  encoder.raw_bits(1, unsigned(is_plain));
+  models->code_flag(encoder, 0, nearness(KeySides(d.format, d.range), d.refine, around, root.row->vertices), true);
+  code(encoder, *models, predict_value(0, root.scale, around, d.weights, d.format.last), root.scale);
+  for (int i = 0; i < 64; ++i) encoder.raw_bits(16, 0);  // what follows is never read
+  const Bytes coded = encoder.finish();
+  Bytes bytes;
+  const SlotGroup group{{}, {}, supercube_key(root.scale, cursor.position()), 1};
+  append_supercubes(bytes, {&group, 1});
+  append_varint(bytes, coded.size());
+  bytes.insert(bytes.end(), coded.begin(), coded.end());
+  return bytes;
+}
+
+bool is_refused_for_its_value(const IntervalVolume& v, const Bytes& bytes) {
+  Front front = root_of(v);
+  const auto applied = apply_exact(front, v, bytes);
+  return !applied && applied.error().message.find("a value is out of range") != std::string::npos;
+}
+
+TEST(UpdateCodec, AKeyBeyondTheLastIsRefused) {
+  for (const IntervalVolume& v : volumes()) {
+    const ValueKey last = v.description().format.last;
+    const auto plain = [&](ValueKey key) {
+      return batch_of_root(v, true, [&](RangeEncoder& encoder, BatchModels& models, const PredictedValue& predicted, int scale) {
+        models.code_key(encoder, 0, scale, predicted, last, key);
+      });
+    };
+    const auto most = ValueKey((std::uint64_t(1) << std::bit_width(last)) - 1);  // that its bits hold
+    EXPECT_FALSE(is_refused_for_its_value(v, plain(0)));
+    EXPECT_FALSE(is_refused_for_its_value(v, plain(last)));
+    EXPECT_EQ(is_refused_for_its_value(v, plain(most)), most != last);
+    if (most != last) {
+      EXPECT_TRUE(is_refused_for_its_value(v, plain(last + 1)));
+    }
+    const auto modelled = [&](std::int64_t key) {
+      return batch_of_root(v, false, [&](RangeEncoder& encoder, BatchModels& models, const PredictedValue& predicted, int scale) {
+        models.values.of[0][scale == 0][predicted.level].code(encoder, key - std::int64_t(predicted.key));
+      });
+    };
+    for (const std::int64_t key : {std::int64_t(0), std::int64_t(last)}) EXPECT_FALSE(is_refused_for_its_value(v, modelled(key)));
+    for (const std::int64_t key :
+         {std::int64_t(last) + 1, std::int64_t(-1), std::int64_t(1) << 32, (std::int64_t(1) << 32) + 1, -(std::int64_t(1) << 32)})
+      EXPECT_TRUE(is_refused_for_its_value(v, modelled(key))) << key;
+  }
+}
+
+// By how many keys one of the values has to move to another side, tried one by one.
+int naive_nearness(const KeySides& sides, Refine refine, const std::vector<ValueKey>& around) {
+  const auto side = [&](std::int64_t n) { return int(n >= std::int64_t(sides.first_inside())) + int(n >= std::int64_t(sides.first_above())); };
+  const int all = side(around[0]);
+  for (const ValueKey key : around) {
+    if (side(key) != all) return 0;
+  }
+  if (refine == Refine::uniform && all == int(Side::inside)) return 0;
+  const auto leaves = [&](std::int64_t distance) {
+    return std::any_of(around.begin(), around.end(), [&](ValueKey key) { return side(key - distance) != all || side(key + distance) != all; });
+  };
+  std::int64_t distance = 1;
+  while (!leaves(distance)) ++distance;
+  const auto [least, greatest] = std::minmax_element(around.begin(), around.end());
+  const double share = 8.0 * double(distance) / (double(*greatest) - double(*least) + 1);
+  return std::clamp(int(std::floor(std::log2(std::max(share, 0.5)))) + 1, 1, kNearness - 1);
+}
+
+TEST(Nearness, IsThatOfTheNaiveDefinition) {
+  std::mt19937 random(3);
+  std::array<int, kNearness> seen{};
+  for (int trial = 0; trial < 20000; ++trial) {
+    const ValueFormat format{SampleType::u16, 1, 0, ValueKey(random() % 400)};
+    const int vertices = 4 + int(random() % 7);
+    const ValueKey low = ValueKey(random() % (format.last + 1)), spread = ValueKey(1 + random() % (trial % 3 == 0 ? 4 : 60));
+    VertexKeys around{};
+    std::vector<ValueKey> keys;
+    for (int v = 0; v < vertices; ++v) {
+      around[std::size_t(v)] = std::min(format.last, ValueKey(low + random() % spread));
+      keys.push_back(around[std::size_t(v)]);
+    }
+    for (std::size_t v = keys.size(); v < around.size(); ++v) around[v] = ValueKey(random() % 400);  // not to be looked at
+    double alpha = int(random() % 440) - 20, beta = int(random() % 440) - 20;
+    if (alpha > beta) std::swap(alpha, beta);
+    const KeySides sides(format, {alpha, beta});
+    for (const Refine refine : {Refine::boundary, Refine::uniform}) {
+      const int near = nearness(sides, refine, around, vertices);
+      ASSERT_EQ(near, naive_nearness(sides, refine, keys)) << "trial " << trial << ", [" << alpha << ", " << beta << "]";
+      ++seen[std::size_t(near)];
+    }
+  }
+  for (const int count : seen) EXPECT_GT(count, 100);
+}
+
+TEST(Nearness, HoldsAtTheBordersOfTheKeys) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const ValueKey last = ~ValueKey(0) - 1;
+  const ValueFormat format{SampleType::u32, 1, 0, last};
+  const auto near = [&](const Range& range, ValueKey a, ValueKey b) {
+    VertexKeys around{};
+    around.fill(a);
+    around[1] = b;
+    return nearness(KeySides(format, range), Refine::boundary, around, 6);
+  };
+  const Range none{5e9, 6e9}, all{-kInfinity, kInfinity}, negative{-2, -1};
+  EXPECT_EQ(near(none, last, last), 4) << "one key off, of one";  // 8 has four bits
+  EXPECT_EQ(near(none, 0, 0), kNearness - 1);
+  EXPECT_EQ(near(none, 0, last), 1) << "they differ by 2^32";
+  EXPECT_EQ(near(negative, 0, 0), 4);
+  EXPECT_EQ(near(negative, last, last), kNearness - 1);
+  EXPECT_EQ(near(negative, 0, last), 1);
+  EXPECT_EQ(near(all, 0, last), 1);
+  EXPECT_EQ(near(all, 1000, 1000), kNearness - 1);
+  EXPECT_EQ(near({double(last), kInfinity}, last - 1, last), 0);
+  EXPECT_EQ(near({double(last), kInfinity}, last - 1, last - 1), 4);
+  EXPECT_EQ(near({0, 0}, 0, 0), 4);
+  EXPECT_EQ(near({0, 0}, 0, 1), 0);
+  EXPECT_EQ(near({0, 0}, 1, 1), 4);
 }
 
 }  // namespace

@@ -110,7 +110,8 @@ class Viewer {
     val progress = val::object();
     progress.set("bytes", double(stats.bytes));
     progress.set("updates", updates());
-    progress.set("updatesShown", client ? double(client->updates_in_mesh()) : 0.0);
+    progress.set("updatesInMesh", client ? double(client->updates_in_mesh()) : 0.0);
+    progress.set("updatesShown", client ? double(client->updates() - client->updates_left_out()) : 0.0);
     progress.set("tets", client ? double(client->tet_count()) : 0.0);
     progress.set("triangles", surface_ ? double(surface_->triangles()) : 0.0);
     progress.set("updatesToGo", double(stats.updates_to_go));

@@ -64,7 +64,8 @@ export type ConnectionState =
 export interface Progress {
   bytes: number; // received, of messages
   updates: number; // received
-  updatesShown: number; // in the mesh: fewer than received where the budget of tetrahedra leaves some out
+  updatesInMesh: number; // those that change the surfaces, and their ancestors
+  updatesShown: number; // fewer than received where the budget of tetrahedra leaves some out
   tets: number; // of the mesh
   triangles: number; // of the boundary surface
   updatesToGo: number; // upper bound for this view; 0 when done

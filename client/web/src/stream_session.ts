@@ -120,8 +120,8 @@ export class StreamSession {
 
   digest(): void {
     if (!this.isOpen) return;
-    const { updates, tets } = this.viewer.progress();
-    this.report({ type: 'digest', digest: this.viewer.digest(), updates, tets });
+    const { updatesInMesh, tets } = this.viewer.progress();
+    this.report({ type: 'digest', digest: this.viewer.digest(), updates: updatesInMesh, tets });
   }
 
   private fail(text: string): void {

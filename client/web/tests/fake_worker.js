@@ -208,7 +208,7 @@ const toSamples = (p) => p.map((x) => x + kSide / 2); // the origin of the world
 function postProgress(done) {
   const updates = [0, 900, 6200, 48000][step + 1];
   post({ type: 'progress', progress: {
-    bytes: updates * 2.1 + 900, updates, updatesShown: updates, tets: mesh?.tets.length ?? 0, triangles: 0, updatesToGo: done ? 0 : 48000 - updates,
+    bytes: updates * 2.1 + 900, updates, updatesInMesh: updates, updatesShown: updates, tets: mesh?.tets.length ?? 0, triangles: 0, updatesToGo: done ? 0 : 48000 - updates,
     remainingError: done ? 0.0123 : 0.4 / (step + 2), remainingPixels: done ? 0.92 : 60 / (step + 2), done, full: name === 'full',
     volume: mesh ? mesh.tets.reduce((sum, tet) => sum + mesh.volume(tet), 0) : 0, volumeBound: 900 / 4 ** (step + 1), memory: 12.4e6,
     busy: { updates, seconds: updates / 2.1e6 }, reconnects: 0, repeated: 0,

@@ -2,9 +2,11 @@
 // FlatBuffers written and read by hand. Each throws where it goes otherwise than PROTOCOL.md says.
 export const WINDOW = 256 << 10;
 const ENVELOPE = 160;
+const PAYLOAD = 2; // the version of batches
 const client = { Open: 1, View: 2, Credit: 3 }, server = { Opened: 1, Batch: 2, Done: 3, Fault: 4 };
 
-// Tables as objects of field numbers: a number is a byte, a bigint a uint64, a string a string, an object a table.
+// Tables as objects of field numbers: a number is a byte, a bigint a uint64 (or, if small, a uint32), a string a string,
+// an object a table.
 function encode(root) {
   const bytes = new Uint8Array(4096), at = new DataView(bytes.buffer);
   let end = 4;
@@ -73,7 +75,8 @@ export function must(condition, what) {
 
 // What there is to say, and what is said by the conversations below, to one server with a data set.
 export function conversations(WebSocket, url, dataset) {
-  const open = (name = dataset, credit = WINDOW) => encode({ 0: client.Open, 1: { 0: name, 1: 'talk.mjs', 2: BigInt(credit) } });
+  const open = (name = dataset, credit = WINDOW, payload = PAYLOAD) =>
+    encode({ 0: client.Open, 1: { 0: name, 1: 'talk.mjs', 2: BigInt(credit), 4: BigInt(payload) } });
   const view = (epoch = 1) => encode({ 0: client.View, 1: { 0: BigInt(epoch), 1: {} } });
   const credit = (size) => encode({ 0: client.Credit, 1: { 0: BigInt(size) } });
 
@@ -145,6 +148,7 @@ export function conversations(WebSocket, url, dataset) {
       peer.ws.send(open());
       peer.ws.send(view());
       const opened = await peer.expect(server.Opened), all = opened.table(0).number(8, 8);
+      must(opened.number(5, 4) === PAYLOAD, 'batches of another version');
       const updates = await takeStream(peer);
       must(updates === all && all > 0, `${updates} of ${all} updates`);
       peer.ws.close(1000);
@@ -156,7 +160,7 @@ export function conversations(WebSocket, url, dataset) {
     },
     async closeCodes() {
       const ends = [['hello', 1003], [new Uint8Array(64).fill(255), 4400], [open('nowhere'), 4404], [view(), 4409], [open(dataset, 2 ** 40), 4413],
-                    [new Uint8Array(65537), 4413]];
+                    [open(dataset, WINDOW, 0), 4426], [open(dataset, WINDOW, PAYLOAD + 1), 4426], [new Uint8Array(65537), 4413]];
       for (const [message, code] of ends) {
         const peer = await connect();
         peer.ws.send(message);

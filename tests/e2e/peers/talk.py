@@ -12,6 +12,7 @@ import websockets
 
 WINDOW = 256 << 10
 ENVELOPE = 160  # of a batch's cost
+PAYLOAD = 2  # the version of batches
 
 
 def load_schema(schema):
@@ -54,7 +55,7 @@ class Peer:
         return names[message.bodyType], message.body
 
     def open(self, credit=WINDOW):
-        return self.encode("Open", dataset=self.dataset, client="talk.py", credit=credit)
+        return self.encode("Open", dataset=self.dataset, client="talk.py", credit=credit, payload=PAYLOAD)
 
     def view(self, epoch=1):
         return self.encode("View", epoch=epoch)
@@ -120,7 +121,12 @@ async def sends_the_whole_stream(peer):
     async with peer.connect() as ws:
         await ws.send(peer.open())
         opened = await peer.expect(ws, "Opened")
-        assert opened.description.name.decode() == peer.dataset
+        description = opened.description
+        assert description.name.decode() == peer.dataset
+        assert opened.payload == PAYLOAD, f"batches of version {opened.payload}"
+        assert len(description.corners) == 8 and max(description.corners) <= description.last, description.corners
+        levels = (max(description.dims.x, description.dims.y, description.dims.z) - 2).bit_length()
+        assert len(description.weights) == 9 * max(levels, 1), f"{len(description.weights)} weights for {levels} levels"
         await ws.send(peer.view())
         updates = await peer.take_stream(ws)
         assert updates == opened.description.updates > 0, f"{updates} of {opened.description.updates} updates"
@@ -159,8 +165,15 @@ async def ends_garbage_with_4400(peer):
 async def ends_an_unknown_data_set_with_4404(peer):
     for name in ("nowhere", "../" + peer.dataset, peer.dataset + ".ivm", ""):
         async with peer.connect() as ws:
-            await ws.send(peer.encode("Open", dataset=name, client="talk.py", credit=WINDOW))
+            await ws.send(peer.encode("Open", dataset=name, client="talk.py", credit=WINDOW, payload=PAYLOAD))
             await peer.expect_end(ws, 4404)
+
+
+async def ends_batches_of_another_version_with_4426(peer):
+    for fields in ({}, {"payload": 1}, {"payload": PAYLOAD + 1}):
+        async with peer.connect() as ws:
+            await ws.send(peer.encode("Open", dataset=peer.dataset, client="talk.py", credit=WINDOW, **fields))
+            await peer.expect_end(ws, 4426)
 
 
 async def ends_what_is_out_of_order_with_4409(peer):
@@ -231,8 +244,8 @@ async def closes_in_every_state(peer):
 
 CONVERSATIONS = (confirms_the_subprotocol, refuses_an_upgrade_without_the_subprotocol, sends_the_whole_stream,
                  takes_fragments_and_answers_pings_in_the_middle, ends_a_text_frame_with_1003, ends_garbage_with_4400,
-                 ends_an_unknown_data_set_with_4404, ends_what_is_out_of_order_with_4409, ends_what_is_too_large_with_4413,
-                 ends_a_flood_of_pings_with_4413, closes_in_every_state)
+                 ends_an_unknown_data_set_with_4404, ends_batches_of_another_version_with_4426,
+                 ends_what_is_out_of_order_with_4409, ends_what_is_too_large_with_4413, ends_a_flood_of_pings_with_4413, closes_in_every_state)
 
 
 async def talk(peer):

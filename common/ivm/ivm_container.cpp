@@ -1,0 +1,220 @@
+#include "common/ivm/ivm_container.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <string>
+
+#include "common/util/atomic_file.h"
+#include "common/util/bits.h"
+
+namespace intervale {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are stored as they lie in memory: little endian");
+
+constexpr char kMagic[8] = {'\x89', 'I', 'V', 'M', '\r', '\n', '\x1a', '\n'};
+constexpr std::uint32_t kMaxStreams = 64;
+constexpr std::uint32_t kOptional = 1;  // flag: a reader that does not know the type skips the stream
+
+struct Header {
+  char magic[8];
+  std::uint32_t version, streams;
+  std::uint64_t file_bytes, content_hash;
+  std::uint64_t checksum;  // XXH3 of header and stream table, this field 0
+};
+struct Entry {
+  std::uint32_t type, flags;
+  std::uint64_t offset, bytes;
+  std::uint64_t checksum;  // XXH3 of its bytes; 0 for the pages, each of which has its own
+};
+static_assert(sizeof(Header) == 40 && sizeof(Entry) == 32, "no padding");
+constexpr std::size_t kMostHeadBytes = sizeof(Header) + kMaxStreams * sizeof(Entry);
+
+constexpr std::uint32_t bit_of(StreamType type) { return std::uint32_t(1) << std::uint32_t(type); }
+
+// The types of a scope's streams, as bits.
+constexpr std::uint32_t kCommon =
+    bit_of(StreamType::field) | bit_of(StreamType::weights) | bit_of(StreamType::page_index) | bit_of(StreamType::pages);
+constexpr std::uint32_t kStatistics = bit_of(StreamType::histogram) | bit_of(StreamType::volumes);
+constexpr std::uint32_t types_of(Scope scope) {
+  if (scope == Scope::every_range) return kCommon | kStatistics;
+  return ((std::uint32_t(1) << kStreamTypes) - 2) & ~kStatistics;
+}
+
+std::uint64_t head_checksum(std::span<const std::byte> head) {
+  std::vector<std::byte> copy(head.begin(), head.end());
+  std::memset(copy.data() + offsetof(Header, checksum), 0, 8);
+  return XXH3_64bits(copy.data(), copy.size());
+}
+
+// A header and its table, checked.
+struct Head {
+  Header header{};
+  std::vector<Entry> entries;
+  [[nodiscard]] bool has(StreamType type) const {
+    return std::any_of(entries.begin(), entries.end(), [type](const Entry& e) { return e.type == std::uint32_t(type); });
+  }
+  [[nodiscard]] Scope scope() const { return has(StreamType::range) ? Scope::one_range : Scope::every_range; }
+};
+
+std::string name_of(std::uint32_t type) { return "stream " + std::to_string(type); }
+
+// The table: streams without gaps up to the end of the file, none twice, and each that the scope has.
+Result<void> check_entries(const Head& head) {
+  std::uint64_t next = sizeof(Header) + head.entries.size() * sizeof(Entry);
+  std::uint32_t found = 0;
+  for (const Entry& e : head.entries) {
+    if (e.offset != next || e.bytes > head.header.file_bytes - next || (e.flags & ~kOptional) != 0) return fail("the table of streams is damaged");
+    next += e.bytes;
+    const bool is_known = e.type > 0 && e.type < kStreamTypes;
+    if (!is_known && (e.flags & kOptional) == 0) return fail(name_of(e.type) + " is unknown; use a newer program");
+    if (!is_known) continue;
+    const std::uint32_t bit = bit_of(StreamType(e.type));
+    if ((found & bit) != 0) return fail(name_of(e.type) + " is there twice");
+    if ((types_of(head.scope()) & bit) == 0) return fail(name_of(e.type) + " does not belong to a data set of this kind");
+    found |= bit;
+  }
+  if (next != head.header.file_bytes) return fail("bytes after the last stream");
+  for (const int type : set_bits(types_of(head.scope()) & ~found)) return fail(name_of(std::uint32_t(type)) + " is missing");
+  return {};
+}
+
+// Checks the start of a file of so many bytes: at least header and table, or the whole file if it is shorter.
+Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes) {
+  if (start.size() < sizeof kMagic || std::memcmp(start.data(), kMagic, sizeof kMagic) != 0) return fail("not an interval volume file (.ivm)");
+  if (start.size() < sizeof(Header)) return fail("the file ends within its header");
+  Head head;
+  Header& header = head.header;
+  std::memcpy(&header, start.data(), sizeof header);
+  if (header.version != kIvmVersion) {
+    return fail("version " + std::to_string(header.version) + " of the format, this program reads version " + std::to_string(kIvmVersion) +
+                (header.version > kIvmVersion ? "; use a newer program" : "; build the file again"));
+  }
+  if (header.streams > kMaxStreams) return fail("the header is damaged: too many streams");
+  const std::size_t head_bytes = sizeof header + header.streams * sizeof(Entry);
+  if (start.size() < head_bytes) return fail("the file ends within its header");
+  if (header.checksum != head_checksum(start.first(head_bytes))) return fail("the header is damaged (checksum)");
+  if (header.file_bytes != bytes) {
+    return fail("the file has " + std::to_string(bytes) + " bytes, " + std::to_string(header.file_bytes) + " expected: it was cut short or added to");
+  }
+  head.entries.resize(header.streams);
+  if (header.streams > 0) std::memcpy(head.entries.data(), start.data() + sizeof header, header.streams * sizeof(Entry));
+  if (auto ok = check_entries(head); !ok) return tl::unexpected(ok.error());
+  return head;
+}
+
+// The same, of a file that must have a scope.
+Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes, Scope scope) {
+  auto head = read_head(start, bytes);
+  if (!head || head->scope() == scope) return head;
+  if (scope == Scope::one_range) return fail("a data set of every range, which cannot be used here yet: build it with --range");
+  return fail("a data set of one range, not of every range");
+}
+
+// Reads the start of a file, and says how long the file is.
+Result<std::vector<std::byte>> read_start(std::ifstream& in, std::uint64_t& bytes) {
+  const std::streamoff size = in.tellg();
+  if (size < 0) return fail("not a file that can be read at once");
+  bytes = std::uint64_t(size);
+  std::vector<std::byte> start(std::size_t(std::min<std::uint64_t>(kMostHeadBytes, bytes)));
+  in.seekg(0);
+  in.read(reinterpret_cast<char*>(start.data()), std::streamsize(start.size()));
+  if (!in) return fail("could not be read to its end");
+  return start;
+}
+
+Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, Scope scope) {
+  std::error_code code;
+  if (std::filesystem::is_directory(path, code)) return fail("is a folder, not an interval volume file (.ivm)");
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in) return fail(std::strerror(errno));
+  std::uint64_t size = 0;
+  auto bytes = read_start(in, size);
+  if (!bytes) return bytes;
+  if (auto head = read_head(*bytes, size, scope); !head) return tl::unexpected(head.error());
+  const std::size_t read = bytes->size();
+  bytes->resize(std::size_t(size));
+  in.read(reinterpret_cast<char*>(bytes->data() + read), std::streamsize(bytes->size() - read));
+  if (!in) return fail("could not be read to its end");
+  return bytes;
+}
+
+}  // namespace
+
+std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, const Streams& streams) {
+  const std::uint32_t types = types_of(scope);
+  Header header{};
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  header.version = kIvmVersion;
+  header.streams = std::uint32_t(std::popcount(types));
+  header.content_hash = content_hash;
+  header.file_bytes = sizeof(Header) + header.streams * sizeof(Entry);
+  std::vector<std::byte> file(sizeof(Header));
+  for (const int type : set_bits(types)) {
+    const auto& bytes = streams[StreamType(type)];
+    const bool is_pages = StreamType(type) == StreamType::pages;
+    const Entry e{std::uint32_t(type), (kStatistics >> type & 1) != 0 ? kOptional : 0, header.file_bytes, bytes.size(),
+                  is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size())};
+    append(file, std::span(&e, 1));
+    header.file_bytes += bytes.size();
+  }
+  std::memcpy(file.data(), &header, sizeof header);
+  header.checksum = head_checksum(file);
+  std::memcpy(file.data(), &header, sizeof header);
+  file.reserve(header.file_bytes);
+  for (const int type : set_bits(types)) append<std::byte>(file, streams[StreamType(type)]);
+  return file;
+}
+
+Result<Container> Container::open(std::span<const std::byte> file, Scope scope) {
+  const auto head = read_head(file, file.size(), scope);
+  if (!head) return tl::unexpected(head.error());
+  Container container;
+  container.content_hash_ = head->header.content_hash;
+  container.file_bytes_ = file.size();
+  for (const Entry& e : head->entries) {
+    if (e.type == 0 || e.type >= kStreamTypes) continue;
+    const auto bytes = file.subspan(e.offset, e.bytes);
+    const bool is_pages = StreamType(e.type) == StreamType::pages;
+    if (e.checksum != (is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size()))) return fail(name_of(e.type) + " is damaged (checksum)");
+    container.streams_[e.type] = bytes;
+  }
+  return container;
+}
+
+Result<std::span<const std::byte>> Container::stream(StreamType type, std::size_t bytes) const {
+  const auto found = (*this)[type];
+  if (found.size() == bytes) return found;
+  return fail(name_of(std::uint32_t(type)) + " has " + std::to_string(found.size()) + " bytes, " + std::to_string(bytes) + " expected");
+}
+
+std::optional<Scope> scope_of(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  std::uint64_t size = 0;
+  if (!in) return {};
+  const auto start = read_start(in, size);
+  if (!start) return {};
+  const auto head = read_head(*start, size);
+  if (!head) return {};
+  return head->scope();
+}
+
+Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, Scope scope) {
+  auto bytes = read_bytes(path, scope);
+  if (!bytes) return fail(path.string() + ": " + bytes.error().message);
+  return bytes;
+}
+
+Result<void> save_container(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  auto file = AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (auto ok = file->write(bytes); !ok) return ok;
+  return file->commit();
+}
+
+}  // namespace intervale

@@ -1,0 +1,94 @@
+// The container of .ivm files: a header, a table of streams, the streams. FORMAT.md is the specification.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/util/result.h"
+
+namespace intervale {
+
+inline constexpr std::uint32_t kIvmVersion = 5;
+
+enum class StreamType : std::uint32_t {
+  field = 1,
+  weights = 2,
+  page_index = 3,
+  pages = 4,
+  // every range only
+  histogram = 5,
+  volumes = 6,
+  // one range only
+  range = 7,
+  bricks = 8,
+  masks = 9,
+  occupancy = 10,
+  errors = 11,
+  error_to_distance = 12,
+  error_steps = 13,
+};
+inline constexpr std::uint32_t kStreamTypes = 14;  // and one more, as 0 is none
+
+enum class Scope { every_range, one_range };
+
+// The streams of a file, by type. A scope has some of the types; the others are empty.
+class Streams {
+ public:
+  [[nodiscard]] std::vector<std::byte>& operator[](StreamType type) { return bytes_[std::size_t(type)]; }
+  [[nodiscard]] const std::vector<std::byte>& operator[](StreamType type) const { return bytes_[std::size_t(type)]; }
+
+ private:
+  std::array<std::vector<std::byte>, kStreamTypes> bytes_;
+};
+
+// Adds numbers to a stream as they lie in memory: no padding, little endian.
+template <class T>
+void append(std::vector<std::byte>& out, std::span<const T> values) {
+  const auto bytes = std::as_bytes(values);
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+[[nodiscard]] inline std::span<const std::uint8_t> octets(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
+}
+
+// The file's bytes.
+[[nodiscard]] std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, const Streams& streams);
+
+// A file from outside: its header, table and checksums are in order, and it has exactly the streams of its scope. Pages
+// have checksums of their own, which whoever reads them must check.
+class Container {
+ public:
+  // The file must outlive the result. Fails, in one line, if it is not a file of this scope.
+  static Result<Container> open(std::span<const std::byte> file, Scope scope);
+
+  [[nodiscard]] std::uint64_t content_hash() const { return content_hash_; }  // as the header has it
+  [[nodiscard]] std::size_t file_bytes() const { return file_bytes_; }
+  // The bytes of a stream of the scope.
+  [[nodiscard]] std::span<const std::byte> operator[](StreamType type) const { return streams_[std::size_t(type)]; }
+  // The same, of a stream that must have so many bytes.
+  [[nodiscard]] Result<std::span<const std::byte>> stream(StreamType type, std::size_t bytes) const;
+
+ private:
+  std::uint64_t content_hash_ = 0;
+  std::size_t file_bytes_ = 0;
+  std::array<std::span<const std::byte>, kStreamTypes> streams_;
+};
+
+// The scope of a file, from its beginning. Nothing if it cannot be read, or is not a whole file of this version: those
+// who open it say why.
+[[nodiscard]] std::optional<Scope> scope_of(const std::filesystem::path& path);
+
+// The bytes of a file, for Container::open. Checks the header, the scope and the length first, and allocates nothing for
+// another file. Errors begin with the path.
+[[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, Scope scope);
+
+// Writes a temporary file and renames it. Errors name the path.
+[[nodiscard]] Result<void> save_container(const std::filesystem::path& path, std::span<const std::byte> bytes);
+
+}  // namespace intervale

@@ -1,0 +1,144 @@
+#include "common/ivm/value_streams.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "common/ivm/value_page.h"
+
+namespace intervale {
+namespace {
+
+struct FieldRecord {
+  std::int32_t dims[3];
+  std::uint32_t type;
+  double spacing[3], origin[3], step, max_error;
+  std::int64_t first;
+  std::uint32_t last, corners[kRootVertices], is_exact;
+};
+struct PageRecord {
+  std::uint64_t bytes, checksum;
+};
+static_assert(sizeof(FieldRecord) == 128 && sizeof(PageRecord) == 16, "no padding");
+
+FieldRecord record_of(const PagedValues& v, bool is_exact) {
+  FieldRecord r{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    r.dims[i] = v.grid.dims[i];
+    r.spacing[i] = v.grid.spacing[i];
+    r.origin[i] = v.grid.origin[i];
+  }
+  r.type = std::uint32_t(v.format.type);
+  r.step = v.format.step;
+  r.max_error = v.max_error;
+  r.first = v.format.first;
+  r.last = v.format.last;
+  r.is_exact = is_exact;
+  std::copy(v.corners.begin(), v.corners.end(), r.corners);
+  return r;
+}
+
+template <class D>
+Result<void> read_record(const Container& file, D& d) {
+  FieldRecord r;
+  const auto bytes = file.stream(StreamType::field, sizeof r);
+  if (!bytes) return tl::unexpected(bytes.error());
+  std::memcpy(&r, bytes->data(), sizeof r);
+  for (std::size_t i = 0; i < 3; ++i) {
+    d.grid.dims[i] = r.dims[i];
+    d.grid.spacing[i] = r.spacing[i];
+    d.grid.origin[i] = r.origin[i];
+  }
+  if (auto ok = check_grid(d.grid); !ok) return ok;
+  if (r.type >= std::uint32_t(kSampleTypes)) return fail("the type of the samples is unknown");
+  d.format = {SampleType(r.type), r.step, r.first, r.last};
+  if (auto ok = check_value_format(d.format); !ok) return ok;
+  if (r.is_exact > 1) return fail("the field's record is damaged");
+  d.is_exact = r.is_exact != 0;
+  d.max_error = r.max_error;
+  if (!(d.max_error >= 0) || !std::isfinite(d.max_error)) return fail("the largest error is negative or not finite");
+  std::copy_n(r.corners, kRootVertices, d.corners.begin());
+  if (std::any_of(d.corners.begin(), d.corners.end(), [&](ValueKey key) { return key > d.format.last; }))
+    return fail("a corner's value is out of range");
+  return {};
+}
+
+// A page as the file has it.
+struct StoredPage {
+  std::span<const std::byte> bytes;
+  std::uint64_t checksum = 0;
+};
+
+Result<std::vector<StoredPage>> stored_pages(const Container& file, std::size_t pages) {
+  const auto index = file.stream(StreamType::page_index, pages * sizeof(PageRecord));
+  if (!index) return tl::unexpected(index.error());
+  auto rest = file[StreamType::pages];
+  std::vector<StoredPage> stored;
+  stored.reserve(pages);
+  for (std::size_t page = 0; page < pages; ++page) {
+    PageRecord r;
+    std::memcpy(&r, index->data() + page * sizeof r, sizeof r);
+    if (r.bytes > rest.size()) return fail("the index of the pages is damaged");
+    stored.push_back({rest.first(r.bytes), r.checksum});
+    rest = rest.subspan(r.bytes);
+  }
+  if (!rest.empty()) return fail("the index of the pages is damaged");
+  return stored;
+}
+
+}  // namespace
+
+void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel) {
+  const std::vector<ValuePage> pages = pages_of(values.set);
+  std::vector<std::vector<std::uint8_t>> coded(pages.size());
+  parallel(pages.size(), [&](std::size_t page) { coded[page] = encode_page(values, pages[page]); });
+  const FieldRecord field = record_of(values, is_exact);
+  append(streams[StreamType::field], std::span(&field, 1));
+  const auto scales = std::size_t(Domain(values.grid.dims).levels());
+  append(streams[StreamType::weights], std::span<const PredictorWeights>(&values.weights.of[0][0], scales * 3));
+  for (auto& page : coded) {
+    const PageRecord record{page.size(), XXH3_64bits(page.data(), page.size())};
+    append(streams[StreamType::page_index], std::span(&record, 1));
+    append<std::uint8_t>(streams[StreamType::pages], page);
+    page = {};
+  }
+}
+
+Result<void> read_field(const Container& file, FieldDescription& to) { return read_record(file, to); }
+Result<void> read_field(const Container& file, Description& to) { return read_record(file, to); }
+
+Result<void> read_weights(const Container& file, int levels, ValueWeights& to) {
+  const auto bytes = file.stream(StreamType::weights, std::size_t(levels) * 3 * sizeof(PredictorWeights));
+  if (!bytes) return tl::unexpected(bytes.error());
+  std::memcpy(to.of.data(), bytes->data(), bytes->size());
+  return {};
+}
+
+// Pages of one scale in parallel: they depend on coarser ones only.
+Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel) {
+  const SupercubeSet& set = to.values.set;
+  const std::vector<ValuePage> pages = pages_of(set);
+  const auto stored = stored_pages(file, pages.size());
+  if (!stored) return tl::unexpected(stored.error());
+  const auto scale = [&](std::size_t page) { return scale_of_key(set.bricks()[pages[page].front().first].key); };
+  constexpr std::size_t kNone = ~std::size_t(0);
+  std::atomic<std::size_t> damaged = kNone;
+  for (std::size_t first = 0, end = 0; first < pages.size() && damaged == kNone; first = end) {
+    while (end < pages.size() && scale(end) == scale(first)) ++end;
+    parallel(end - first, [&](std::size_t i) {
+      const std::size_t page = first + i;
+      const auto& [bytes, checksum] = (*stored)[page];
+      const bool is_intact = XXH3_64bits(bytes.data(), bytes.size()) == checksum;
+      if (!is_intact || !decode_page(to, pages[page], octets(bytes))) damaged = page;
+    });
+  }
+  if (damaged != kNone) return fail("page " + std::to_string(damaged.load()) + " of " + std::to_string(pages.size()) + " is damaged");
+  return {};
+}
+
+}  // namespace intervale

@@ -1,0 +1,27 @@
+// The streams of an .ivm file that hold values: what both scopes share. FORMAT.md is the specification.
+#pragma once
+
+#include <cstdint>
+
+#include "common/ivm/ivm_container.h"
+#include "common/ivm/paged_values.h"
+#include "common/util/parallel.h"
+#include "common/util/result.h"
+
+namespace intervale {
+
+// No page has more values in a byte, and no error step takes less either: no bit is less probable than 1/1040.
+inline constexpr std::uint64_t kValuesPerByte = 8192;
+
+// Writes field, weights, page_index and pages. The same bytes whatever `parallel` is.
+void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel);
+
+// The inverse, of bytes from outside. read_field() sets and checks grid, format, corners, max_error and is_exact.
+[[nodiscard]] Result<void> read_field(const Container& file, FieldDescription& to);
+[[nodiscard]] Result<void> read_field(const Container& file, Description& to);
+// levels: of the field's domain
+[[nodiscard]] Result<void> read_weights(const Container& file, int levels, ValueWeights& to);
+// Sets keys and error levels. All the rest is known.
+[[nodiscard]] Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel);
+
+}  // namespace intervale

@@ -1,0 +1,22 @@
+// The keys (value_format.h) of a volume's samples, at the centres of diamonds.
+#pragma once
+
+#include <array>
+
+#include "common/diamond/supercube.h"
+#include "common/ivm/value_keys.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+// The keys at the centres of a set's diamonds, clamped to the box (domain.h), by number. keys: as many as the set has.
+// format: chosen for this volume (value_steps.h). Uses all cores that oneTBB may.
+void find_keys(const Volume& volume, const ValueFormat& format, const SupercubeSet& set, ValueKeys& keys);
+
+// The keys at the root's vertices, in local order.
+[[nodiscard]] std::array<ValueKey, kRootVertices> corner_keys(const Volume& volume, const ValueFormat& format);
+
+// Whether every sample is the value of its key.
+[[nodiscard]] bool has_exact_values(const Volume& volume, const ValueFormat& format);
+
+}  // namespace intervale
