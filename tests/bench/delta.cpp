@@ -234,6 +234,7 @@ class TypedDelta final : public Delta {
   template <class Wanted>
   void refine_supercubes(Refined& refined, const Range& range, const Wanted& wanted) const {
     std::vector<Level> levels;
+    levels.reserve(std::size_t(domain_.levels()));
     for (int scale = 0; scale < domain_.levels(); ++scale) levels.emplace_back(places(scale));
     const auto reach = [&](Vertex centre, Index index) {
       const int scale = scale_of(centre), up = scale + 2;

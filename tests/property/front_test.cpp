@@ -31,24 +31,24 @@ class FrontLaws : public ::testing::TestWithParam<unsigned> {
     const std::array<std::int32_t, 3> dims{side(), side(), side()};
     const bool equal = GetParam() % 4 == 0;
     if (GetParam() % 2 == 0) {
-      volume = testing::digits(dims, GetParam());
-      range = {3, equal ? 3.0 : 5.5};
+      volume_ = testing::digits(dims, GetParam());
+      range_ = {3, equal ? 3.0 : 5.5};
     } else {
-      volume = testing::gyroid(GetParam() % 3 == 0 ? std::array<std::int32_t, 3>{9, 9, 9} : dims);
-      range = {-0.3, equal ? -0.3 : 0.2};
+      volume_ = testing::gyroid(GetParam() % 3 == 0 ? std::array<std::int32_t, 3>{9, 9, 9} : dims);
+      range_ = {-0.3, equal ? -0.3 : 0.2};
     }
   }
-  [[nodiscard]] FieldHierarchy hierarchy() const { return {volume, {.range = range}}; }
-  Volume volume;
-  Range range;
+  [[nodiscard]] FieldHierarchy hierarchy() const { return {volume_, {.range = range_}}; }
+  Volume volume_;
+  Range range_;
 };
 
 TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
   const FieldHierarchy delta = hierarchy();
-  const testing::Canonical expected = canonical(extract(testing::build(volume, {.range = range}), {})->front.mesh());
+  const testing::Canonical expected = canonical(extract(testing::build(volume_, {.range = range_}), {})->front.mesh());
   for (unsigned trial = 0; trial < 3; ++trial) {
     std::mt19937 random(GetParam() * 10 + trial);
-    Front front(volume.grid, delta.root_patch());
+    Front front(volume_.grid, delta.root_patch());
     std::vector<Place> waiting;
     delta.set().for_each_down([&](const Place& p) { waiting.push_back(p); });
     std::size_t steps = 0;
@@ -65,7 +65,7 @@ TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
         split_by_cuts(front, *handle, delta, c);
         if (++steps % 97 == 0) {
           ASSERT_EQ(front.validate(), std::nullopt);
-          ASSERT_EQ(broken_law(front.mesh(), volume.grid, range.alpha == range.beta), "");
+          ASSERT_EQ(broken_law(front.mesh(), volume_.grid, range_.alpha == range_.beta), "");
         }
       }
       ASSERT_LT(later.size(), waiting.size()) << "nothing can be split";
@@ -78,7 +78,7 @@ TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
 TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
   const FieldHierarchy delta = hierarchy();
   std::mt19937 random(GetParam());
-  Front front(volume.grid, delta.root_patch());
+  Front front(volume_.grid, delta.root_patch());
   const testing::Canonical coarse = canonical(front.mesh());
   std::set<UpdateIndex> split;
   std::vector<Place> places;
@@ -87,7 +87,7 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
   const auto afresh = [&] {  // the mesh of this split set, made afresh
     SplitSet set(delta.set().size());
     for (UpdateIndex i : split) set.insert(i);
-    return canonical(front_by_cuts(delta, volume.grid, set).mesh());
+    return canonical(front_by_cuts(delta, volume_.grid, set).mesh());
   };
   for (int round = 0; round < 12; ++round) {
     // Some splits, then some merges, of whatever can be.
@@ -108,7 +108,7 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
       }
     }
     ASSERT_EQ(front.validate(), std::nullopt);
-    ASSERT_EQ(broken_law(front.mesh(), volume.grid, range.alpha == range.beta), "");
+    ASSERT_EQ(broken_law(front.mesh(), volume_.grid, range_.alpha == range_.beta), "");
     ASSERT_EQ(canonical(front.mesh()), afresh());
   }
   // All the way back.
@@ -126,12 +126,12 @@ TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
 // What is hidden is no part of the mesh; what comes back is as it was.
 TEST_P(FrontLaws, HidingIsLeavingOut) {
   const FieldHierarchy delta = hierarchy();
-  Front front = front_by_cuts(delta, volume.grid, all_of(delta.set()));
+  Front front = front_by_cuts(delta, volume_.grid, all_of(delta.set()));
   const testing::Canonical full = canonical(front.mesh());
   std::vector<Place> all;
   delta.set().for_each_down([&](const Place& p) { all.push_back(p); });
   SplitSet shown = all_of(delta.set());
-  const auto afresh = [&] { return canonical(front_by_cuts(delta, volume.grid, shown).mesh()); };
+  const auto afresh = [&] { return canonical(front_by_cuts(delta, volume_.grid, shown).mesh()); };
   const auto may_hide = [&](const Place& p) {
     if (!shown.contains(p.index)) return false;
     return std::none_of(all.begin(), all.end(), [&](const Place& child) {
@@ -167,7 +167,7 @@ TEST_P(FrontLaws, HidingIsLeavingOut) {
     ASSERT_EQ(front.shown_count(), shown.count());
     if (step % 40 != 0) continue;
     ASSERT_EQ(front.validate(), std::nullopt);
-    ASSERT_EQ(broken_law(front.mesh(), volume.grid, range.alpha == range.beta), "");
+    ASSERT_EQ(broken_law(front.mesh(), volume_.grid, range_.alpha == range_.beta), "");
     ASSERT_EQ(front.mesh().tets.size(), front.tet_count());
     ASSERT_EQ(canonical(front.mesh()), afresh());
   }

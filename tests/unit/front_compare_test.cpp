@@ -29,15 +29,15 @@ class FrontParts : public ::testing::TestWithParam<unsigned> {
     std::mt19937 random(GetParam());
     const auto side = [&] { return std::int32_t(2 + random() % 12); };
     const std::array<std::int32_t, 3> dims{side(), side(), side()};
-    volume = GetParam() % 2 == 0 ? testing::digits(dims, GetParam()) : testing::gyroid(dims);
-    range = GetParam() % 2 == 0 ? Range{3, 5.5} : Range{-0.3, GetParam() % 3 == 0 ? -0.3 : 0.2};
+    volume_ = GetParam() % 2 == 0 ? testing::digits(dims, GetParam()) : testing::gyroid(dims);
+    range_ = GetParam() % 2 == 0 ? Range{3, 5.5} : Range{-0.3, GetParam() % 3 == 0 ? -0.3 : 0.2};
   }
-  Volume volume;
-  Range range;
+  Volume volume_;
+  Range range_;
 };
 
 TEST_P(FrontParts, CoarserIsPartOfFiner) {
-  const IntervalVolume sigma = testing::build(volume, {.range = range});
+  const IntervalVolume sigma = testing::build(volume_, {.range = range_});
   const Front full = front_of(sigma, {});
   EXPECT_TRUE(full.is_part_of(full));
   for (const double percent : {0.0, 10.0, 40.0, 100.0}) {
@@ -50,9 +50,9 @@ TEST_P(FrontParts, CoarserIsPartOfFiner) {
 }
 
 TEST_P(FrontParts, CoarsenedIsTheSameMesh) {
-  const IntervalVolume sigma = testing::build(volume, {.range = range});
+  const IntervalVolume sigma = testing::build(volume_, {.range = range_});
   const Front full = front_of(sigma, {});
-  const Grid& grid = volume.grid;
+  const Grid& grid = volume_.grid;
   std::mt19937 random(GetParam());
   for (int trial = 0; trial < 5; ++trial) {
     Box box;
