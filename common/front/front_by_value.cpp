@@ -24,8 +24,8 @@ void Front::split(Handle handle, ValueKey key) {
 void Front::split(FrontCursor& at, ValueKey key, std::uint64_t max_tets) {
   FrontValues& values = *state_.values;
   assert(key <= values.format.last && "the caller checked it");
-  if (!at.has_block()) at.set_here(state_.obtain_block(at.scale(), at.position()));
-  FrontState::Block& block = FrontState::own(at.here());
+  FrontState::Block& block = state_.obtain_block(at.scale(), at.position());
+  at.set_here(block);
   const std::uint64_t bit = std::uint64_t(1) << at.slot();
   const Side side = values.sides.side(key);
   const bool is_counting = counts(at.context(), side, values.refine), was_complete = values.is_complete();

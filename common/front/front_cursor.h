@@ -73,14 +73,13 @@ class FrontCursor {
   [[nodiscard]] const Links& links() const { return neighbours_.links(slot_); }
   // Of the vertex's diamond
   [[nodiscard]] const Split& split_of(int vertex) const { return split_[std::size_t(vertex)]; }
-  // Of a front split by values: the key of the value at a vertex that exists, and at the centre of a diamond that is
-  // split.
-  [[nodiscard]] ValueKey key_of(int vertex) { return vertex_keys()[std::size_t(vertex)]; }
-  // Those of all its vertices, or kNoKey for one that does not exist.
+  // Of a front split by values: the keys at its vertices, kNoKey at one that does not exist; at one of them; and at the
+  // centre of a diamond that is split.
   [[nodiscard]] const VertexKeys& vertex_keys() {
     if (!has_keys_) gather_keys();
     return keys_;
   }
+  [[nodiscard]] ValueKey key_of(int vertex) { return vertex_keys()[std::size_t(vertex)]; }
   [[nodiscard]] ValueKey centre_key() { return here().key[std::size_t(slot_)]; }
   // Its cuts may be those of another diamond
   [[nodiscard]] const DiamondContext& context() const { return context_; }
@@ -119,8 +118,6 @@ class FrontCursor {
   [[nodiscard]] std::span<const Link> children(Slot slot) const { return neighbours_.children(slot); }
   [[nodiscard]] int scale() const { return neighbours_.scale(); }
   [[nodiscard]] Vertex position() const { return neighbours_.position(); }
-  // Whether the supercube has a block.
-  [[nodiscard]] bool has_block() { return &here() != BlockFinder::none(); }
   // Takes note of the supercube's block, which was added since the cursor moved there.
   void set_here(const Block& block) { neighbours_.set_here(&block); }
 

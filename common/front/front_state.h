@@ -165,8 +165,6 @@ struct FrontState {
     return number == kNone ? nullptr : &blocks[number];
   }
   Block& obtain_block(int scale, Vertex position);
-  // One of this state's blocks, found by a cursor, to be changed.
-  [[nodiscard]] static Block& own(const Block& block) { return const_cast<Block&>(block); }  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   [[nodiscard]] std::span<const std::uint8_t> cuts_of(const Split& split) const {
     return std::span(q).subspan(split.first, split.centre() - split.first);
   }

@@ -52,7 +52,7 @@ void ShownSplits::add_parents(FrontCursor& at, bool shown, std::vector<Place>& p
   for (int k = 0; k < at.diamond().row->parents; ++k) {
     const FrontCursor::Neighbour parent = at.at(links.vertex[links.parent[std::size_t(k)]]);
     if (!parent.is_split() || parent.is_shown() != shown || state_.is_root_block(parent.block)) continue;
-    places.push_back({&FrontState::own(parent.block), parent.slot});
+    places.push_back({&state_.obtain_block(parent.block.scale, parent.block.position), parent.slot});
   }
 }
 
@@ -85,7 +85,7 @@ std::int64_t ShownSplits::place_points(FrontCursor& at, const Place& place) {
 }
 
 bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
-  const Place own{&FrontState::own(at.here()), at.slot()};
+  const Place own{&state_.obtain_block(at.scale(), at.position()), at.slot()};
   std::vector<Place> ancestors;
   // Marks ancestors as shown when they are found, so that each is found once.
   const auto add_hidden_parents = [&](FrontCursor& of) {
@@ -114,7 +114,7 @@ bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
 }
 
 void ShownSplits::hide_one(FrontCursor& at) {
-  Block& block = FrontState::own(at.here());
+  Block& block = state_.obtain_block(at.scale(), at.position());
   state_.tet_count -= std::uint64_t(at.added_tets(block.of[std::size_t(at.slot())]));
   block.shown &= ~bit(at.slot());
   --state_.shown_count;

@@ -16,7 +16,6 @@
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
-#include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
 #include "server/builder/all_cores.h"
