@@ -33,7 +33,7 @@ void place_corner(FrontState& state, const RootPatch& root_patch, const DiamondP
   block->split |= std::uint64_t(1) << slot;
   block->shown = block->counts = block->placed = block->split;
   block->set_side(slot, side);
-  Split& s = block->of[std::size_t(slot)];
+  Split s;
   s.bits = std::uint32_t(side) << FrontState::kSideBit;
   s.first = PointId(state.q.size());
   std::array<Cuts, kMaxVertices> cuts_to{};  // by the other end's local number: not the order of the root's edges
@@ -47,6 +47,7 @@ void place_corner(FrontState& state, const RootPatch& root_patch, const DiamondP
     const unsigned surfaces = unsigned(alpha_cuts(side_a, side_b)) | unsigned(beta_cuts(side_a, side_b)) << 1;
     s.bits |= surfaces << (2 * edge.other);
   }
+  block->of.set(slot, s);
   for (const Cuts& c : cuts_to) state.q.insert(state.q.end(), c.q, c.q + c.count);
   state.q.push_back(0);
 }
@@ -73,7 +74,7 @@ void set_corner_keys(FrontState& state, const std::array<ValueKey, kRootVertices
   state.obtain_block(state.domain.levels(), {});
   for (int v = 0; v < kRootVertices; ++v) {
     const auto [block, slot] = corner_at(state, root, v);
-    block->key.set(std::size_t(slot), keys[std::size_t(v)]);
+    block->key.set(slot, keys[std::size_t(v)], state.values->format.last);
   }
 }
 

@@ -35,11 +35,12 @@ void Front::split(FrontCursor& at, Side side, std::span<const std::uint8_t> cuts
   assert(int(cuts.size()) == at.context().count_cuts(side) && "the caller counted");
   Block& block = state_.obtain_block(at.scale(), at.position());
   at.set_here(block);
-  Split& s = block.of[at.slot()];
+  Split s = block.of[at.slot()];
   const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
   if (s.bits != bits || bits == 0) {  // else the split that was merged comes back, and its points are still there
     s = {bits, PointId(state_.q.size())};
     state_.q.resize(state_.q.size() + s.points());
+    block.of.set(at.slot(), s);
   }
   std::copy(cuts.begin(), cuts.end(), state_.q.begin() + s.first);
   const bool all_shown = state_.shown_count == state_.split_count;

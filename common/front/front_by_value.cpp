@@ -29,7 +29,7 @@ void Front::split(FrontCursor& at, ValueKey key, std::uint64_t max_tets) {
   const std::uint64_t bit = std::uint64_t(1) << at.slot();
   const Side side = values.sides.side(key);
   const bool is_counting = counts(at.context(), side, values.refine), was_complete = values.is_complete();
-  block.key.set(std::size_t(at.slot()), key);
+  block.key.set(at.slot(), key, values.format.last);
   widen_bounds(at, block);
   block.set_side(at.slot(), side);
   block.split |= bit;

@@ -108,7 +108,7 @@ class FrontCursor {
     Slot slot;
     [[nodiscard]] bool is_split() const { return block.is_split(slot); }
     [[nodiscard]] bool is_shown() const { return block.is_shown(slot); }
-    [[nodiscard]] const Split& split() const { return block.of[std::size_t(slot)]; }
+    [[nodiscard]] Split split() const { return block.of[std::size_t(slot)]; }
   };
   [[nodiscard]] Neighbour at(Link link) {
     const auto found = neighbours_.at(link);

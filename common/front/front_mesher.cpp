@@ -62,14 +62,14 @@ bool FrontMesher::is_at_border(std::size_t number) const {
 
 void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) const {
   // The domain's corner (0, 0, 0), the oldest vertex, owns no edge.
-  if (const FrontState::Split& origin = state_.origin.of[0]; number == 0 && origin.side() == Side::inside) {
+  if (const FrontState::Split origin = state_.origin.of[0]; number == 0 && origin.side() == Side::inside) {
     points.push_back({origin.centre(), {}, Surface::inside, false});
   }
   const FrontState::Block& block = state_.blocks[number];
   const bool at_border = is_at_border(number);
   for (const Slot slot : set_bits<Slot>(block.shown)) {
     const Diamond d(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]);
-    const FrontState::Split& split = block.of[slot];
+    const FrontState::Split split = block.of[slot];
     const Vertex c = at_border ? state_.domain.clamp(d.centre) : d.centre;
     const bool on_border = at_border && is_on_border(d.centre);
     PointId id = split.first;
@@ -89,7 +89,7 @@ void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) 
 void FrontMesher::append_runs(std::size_t number, std::vector<Run>& runs) const {
   if (number == 0) runs.push_back({state_.origin.of[0].first, state_.origin.of[0].points()});
   for (const Slot slot : set_bits<Slot>(block(number).shown)) {
-    const FrontState::Split& split = block(number).of[slot];
+    const FrontState::Split split = block(number).of[slot];
     runs.push_back({split.first, split.points()});
   }
 }
@@ -101,7 +101,7 @@ void FrontMesher::append_removed_runs(std::size_t number, std::vector<Run>& runs
   for (const Slot slot : set_bits<Slot>(block(number).shown)) {
     const Links& links = cursor.links(slot);
     const Links::Edge spine = links.edge[0];
-    const FrontState::Split& owner = cursor.at(links.vertex[spine.owner]).split();
+    const FrontState::Split owner = cursor.at(links.vertex[spine.owner]).split();
     runs.push_back({owner.cut(2 * spine.other), std::uint32_t(std::popcount(owner.cuts_to(spine.other)))});
   }
 }
@@ -178,7 +178,7 @@ void FrontMesher::gather_points(FrontCursor& cursor, const Numbers& numbers, Poi
   }
   for (const int e : set_bits((alpha | beta) & cursor.parts().edges)) {
     const Links::Edge edge = links.edge[e];
-    const FrontState::Split& owner = cursor.at(links.vertex[edge.owner]).split();
+    const FrontState::Split owner = cursor.at(links.vertex[edge.owner]).split();
     const unsigned surfaces = owner.cuts_to(edge.other);
     PointId id = owner.cut(2 * edge.other);
     if (surfaces & 1) points[kCutsFrom + 2 * e] = numbers[id++];
@@ -189,7 +189,7 @@ void FrontMesher::gather_points(FrontCursor& cursor, const Numbers& numbers, Poi
 // Of the split diamond that the cursor found last, the halves that it left to some of its children, a bit each.
 template <class Numbers>
 void FrontMesher::append_children(const Output<Numbers>& out, FrontCursor& cursor, unsigned children) const {
-  const FrontState::Split& split = cursor.here().of[cursor.slot()];
+  const FrontState::Split split = cursor.here().of[cursor.slot()];
   const bool is_empty = split.cut_bits() == 0 && split.side() != Side::inside;  // all on one side, and not inside
   if (is_empty && out.halves == nullptr) return;
   const Diamond& d = cursor.diamond();

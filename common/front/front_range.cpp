@@ -25,20 +25,6 @@ constexpr std::size_t kPiece = 32;  // supercubes
 
 constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
 
-// A bit for each of the keys that is not less than `first`.
-std::uint64_t at_least(const std::array<ValueKey, kSlots>& keys, std::uint64_t first) {
-  if (first > ~ValueKey(0)) return 0;
-  std::array<std::uint8_t, kSlots> is;
-  for (std::size_t i = 0; i < kSlots; ++i) is[i] = keys[i] >= ValueKey(first);
-  std::uint64_t mask = 0;
-  for (std::size_t i = 0; i < kSlots; i += 8) {
-    std::uint64_t eight = 0;
-    for (std::size_t k = 0; k < 8; ++k) eight |= std::uint64_t(is[i + k]) << (8 * k);
-    mask |= (eight * 0x0102040810204080u >> 56) << i;  // bit 0 of byte k becomes bit k
-  }
-  return mask;
-}
-
 // Makes what is shown of a front from its splits and their keys, whatever was shown before.
 class Reclassification {
  public:
@@ -78,14 +64,15 @@ class Reclassification {
       for (std::size_t number = std::max<std::size_t>(1, begin); number < end; ++number) {  // the first has the corners
         Block& block = state_.blocks[number];
         block.shown = block.counts = block.placed = 0;
+        block.of.reshape(0);
         const std::optional<Side> all = side_of_all(block);
         if (all) {
           block.above = *all == Side::above ? block.split : 0;
           block.inside = *all == Side::inside ? block.split : 0;
           if (*all != Side::inside || values_.refine != Refine::uniform) continue;
         } else {
-          block.above = at_least(*block.key.all(), values_.sides.first_above()) & block.split;
-          block.inside = at_least(*block.key.all(), values_.sides.first_inside()) & block.split & ~block.above;
+          block.above = block.key.at_least(values_.sides.first_above()) & block.split;
+          block.inside = block.key.at_least(values_.sides.first_inside()) & block.split & ~block.above;
         }
         if (block.split != 0) found[piece].push_back(&block);
       }
@@ -103,12 +90,15 @@ class Reclassification {
   // Shows the diamonds that count, and writes the bits of their splits.
   void count_in(Block& block, FrontCursor& cursor) const {
     cursor.move_to(block.scale, block.position);
+    std::array<Split, kSlots> splits;
     for (const Slot slot : set_bits<Slot>(block.split)) {
       const Side side = block.side(slot);
       if (!cursor.gather_sides(slot) || !counts(cursor.context(), side, values_.refine)) continue;
       block.counts |= bit(slot);
-      block.of[std::size_t(slot)].bits = cursor.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
+      splits[slot].bits = cursor.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
     }
+    block.of.reshape(block.counts);
+    for (const Slot slot : set_bits<Slot>(block.counts)) block.of.set(slot, splits[slot]);
     block.shown = block.counts;
   }
 
@@ -179,7 +169,11 @@ class Reclassification {
       std::copy(made[piece].q.begin(), made[piece].q.end(), state_.q.begin() + std::ptrdiff_t(base[piece]));
       for (std::size_t i = begin; i < end; ++i) {
         Block& block = state_.blocks[shown_[i]];
-        for (const Slot slot : set_bits<Slot>(block.shown)) block.of[std::size_t(slot)].first += PointId(base[piece]);
+        for (const Slot slot : set_bits<Slot>(block.shown)) {
+          Split split = block.of[slot];
+          split.first += PointId(base[piece]);
+          block.of.set(slot, split);
+        }
       }
     });
   }
@@ -188,12 +182,14 @@ class Reclassification {
   std::int64_t derive_in(Block& block, FrontCursor& cursor, std::vector<std::uint8_t>& q) const {
     std::int64_t tets = 0;
     block.placed = block.shown;
+    block.of.reshape(block.shown);
     cursor.move_to(block.scale, block.position);
     for (const Slot slot : set_bits<Slot>(block.shown)) {
-      Split& split = block.of[std::size_t(slot)];
+      Split split = block.of[slot];
       // What does not count has its vertices and its centre on one side.
       if (!block.is_counting(slot)) split.bits = std::uint32_t(block.side(slot)) << FrontState::kSideBit;
       split.first = PointId(q.size());
+      block.of.set(slot, split);
       cursor.gather_own(slot);
       if (split.cut_bits() != 0) append_cuts(values_, cursor, split.cut_bits(), q);
       if (split.side() == Side::inside) q.push_back(0);
@@ -248,8 +244,10 @@ std::optional<Vertex> Front::split_all(std::span<const SlotGroup> groups, const 
   Vertex misfit;
   parallel((groups.size() + kPiece - 1) / kPiece, [&](std::size_t piece) {
     FrontCursor cursor(state_);
+    std::array<ValueKey, kSlots> keys{};
     for (std::size_t i = piece * kPiece; i < std::min(groups.size(), (piece + 1) * kPiece); ++i) {
-      keys_of(groups[i], blocks[i]->key.obtain());
+      keys_of(groups[i], keys);
+      blocks[i]->key.assign(groups[i].slots, keys, format().last);
       cursor.move_to(groups[i].key);
       for (const Slot slot : set_bits<Slot>(groups[i].slots)) {
         if (!cursor.is_splittable(slot) && !failed.exchange(true)) misfit = centre_of(groups[i].key, slot);

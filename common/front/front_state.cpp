@@ -1,5 +1,7 @@
 #include "common/front/front_state.h"
 
+#include "common/util/bits.h"
+
 namespace intervale {
 namespace {
 
@@ -27,7 +29,7 @@ FrontState::Block& FrontState::obtain_block(int scale, Vertex position) {
 
 std::size_t FrontState::memory_bytes() const {
   std::size_t bytes = blocks.size() * sizeof(Block) + index.bucket_count() * 17 + q.capacity();
-  for (const Block& block : blocks) bytes += block.key.memory_bytes();
+  for (const Block& block : blocks) bytes += block.of.memory_bytes() + block.key.memory_bytes();
   return bytes;
 }
 
@@ -38,16 +40,14 @@ void FrontState::pack() {
     block.neighbours = {};
     const std::uint64_t with_cuts = values ? block.shown : block.split;
     block.placed = with_cuts;
-    for (Slot slot{0}; slot < kSlots; ++slot) {
-      Split& s = block.of[std::size_t(slot)];
-      if (!(with_cuts >> slot & 1)) {
-        s = {};
-        continue;
-      }
+    block.of.reshape(with_cuts);
+    for (const Slot slot : set_bits<Slot>(with_cuts)) {
+      Split s = block.of[slot];
       const std::span<const std::uint8_t> cuts = cuts_of(s);
       s.first = PointId(kept_q.size());
       kept_q.insert(kept_q.end(), cuts.begin(), cuts.end());
       if (s.side() == Side::inside) kept_q.push_back(0);
+      block.of.set(slot, s);
     }
   };
   index.clear();
@@ -56,7 +56,7 @@ void FrontState::pack() {
     if (block.split == 0) continue;
     pack_cuts(block);
     index.emplace(index_key(block.scale, block.position), std::uint32_t(kept.size()));
-    kept.push_back(block);
+    kept.push_back(std::move(block));
   }
   blocks = std::move(kept);
   kept_q.shrink_to_fit();

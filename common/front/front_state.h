@@ -39,6 +39,7 @@
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
 #include "common/diamond/supercube_neighbours.h"
+#include "common/front/slot_array.h"
 #include "common/patch/description.h"
 #include "common/patch/key_sides.h"
 #include "common/patch/range.h"
@@ -79,33 +80,6 @@ struct FrontValues {
   [[nodiscard]] bool is_complete() const { return withheld == 0 && !is_limited; }
 };
 
-// The keys of one supercube, by slot; without memory until the first is set.
-class BlockKeys {
- public:
-  BlockKeys() = default;
-  BlockKeys(const BlockKeys& other) : keys_(other.keys_ ? std::make_unique<Keys>(*other.keys_) : nullptr) {}
-  BlockKeys(BlockKeys&&) noexcept = default;
-  BlockKeys& operator=(const BlockKeys& other) {
-    if (this != &other) keys_ = other.keys_ ? std::make_unique<Keys>(*other.keys_) : nullptr;
-    return *this;
-  }
-  BlockKeys& operator=(BlockKeys&&) noexcept = default;
-  ~BlockKeys() = default;
-  // Of a slot whose key was set.
-  [[nodiscard]] ValueKey operator[](std::size_t slot) const { return (*keys_)[slot]; }
-  void set(std::size_t slot, ValueKey key) { obtain()[slot] = key; }
-  using Keys = std::array<ValueKey, kSlots>;
-  [[nodiscard]] Keys& obtain() {
-    if (!keys_) keys_ = std::make_unique<Keys>();
-    return *keys_;
-  }
-  [[nodiscard]] const Keys* all() const { return keys_.get(); }  // or null
-  [[nodiscard]] std::size_t memory_bytes() const { return keys_ ? sizeof(Keys) : 0; }
-
- private:
-  std::unique_ptr<Keys> keys_;
-};
-
 struct FrontState {
   // A split, as bits: 2 v for a cut of alpha on the edge from the centre to local vertex v, 2 v + 1 for one of beta;
   // above them the centre's side.
@@ -142,8 +116,8 @@ struct FrontState {
     // Bounds of the keys at the centres and the vertices of the diamonds that are split, or were
     ValueKey least = ~ValueKey(0), greatest = 0;
     NeighbourCache neighbours;
-    std::array<Split, kSlots> of{};  // by slot; by values: of those placed
-    BlockKeys key;                   // by slot, if split by values
+    SlotArray<Split> of;  // of those split; by values: of those placed
+    SlotKeys key;         // of those split, or were, if by values
     [[nodiscard]] bool is_split(Slot slot) const { return (split >> slot & 1) != 0; }
     [[nodiscard]] bool is_shown(Slot slot) const { return (shown >> slot & 1) != 0; }
     [[nodiscard]] bool is_counting(Slot slot) const { return (counts >> slot & 1) != 0; }

@@ -55,7 +55,7 @@ Wrong validate_block(const FrontState& state, const Block& block, FrontCursor& c
   for (const Slot slot : set_bits<Slot>(block.split)) {
     const Vertex c = centre_of(block.scale, block.position, slot);
     const auto where = " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")";
-    const Split& split = block.of[slot];
+    const Split split = block.of[slot];
     if (!cursor.gather_sides(slot)) return "a diamond is split before its parents" + where;
     if (!state.values || block.is_shown(slot)) {
       if (const Wrong wrong = validate_cuts(state, cursor, split)) return *wrong + where;

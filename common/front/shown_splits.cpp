@@ -66,7 +66,7 @@ bool ShownSplits::move_to(const Place& place) {
 // was placed before, and its vertices have the same sides, its points come back.
 std::int64_t ShownSplits::place_points(FrontCursor& at, const Place& place) {
   Block& block = *place.block;
-  Split& split = block.of[std::size_t(place.slot)];
+  Split split = block.of[place.slot];
   const Side side = block.side(place.slot);
   const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
   const bool is_back = (block.placed >> place.slot & 1) != 0 && split.bits == bits;
@@ -78,6 +78,7 @@ std::int64_t ShownSplits::place_points(FrontCursor& at, const Place& place) {
     q.resize(end);
   } else {
     split = {bits, PointId(end)};
+    block.of.set(place.slot, split);
     q.resize(end + split.points());
     block.placed |= bit(place.slot);
   }
