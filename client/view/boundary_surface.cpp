@@ -98,7 +98,7 @@ void BoundarySurface::mark_parents(std::size_t number, std::uint64_t slots, std:
 std::vector<std::uint8_t> BoundarySurface::find_changes() {
   const std::size_t count = mesher_.state().blocks.size(), before = parts_.size();
   std::vector<std::uint8_t> dirty(count);
-  const auto grow = [points = mesher_.state().q.size()](auto& items) {  // by less than doubling, for these are most of a viewer's memory
+  const auto grow = [points = mesher_.state().points](auto& items) {  // by less than doubling, for these are most of a viewer's memory
     if (items.capacity() < points) items.reserve(points + points / 8);
     items.resize(points);
   };

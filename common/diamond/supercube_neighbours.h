@@ -82,7 +82,6 @@ inline constexpr int kOriginScale = 32;  // scale_of((0, 0, 0)): that corner of 
 //   Found find(where, place)   of the neighbour `where` of the supercube last moved to; place: its scale and position.
 //                              Not called for places with negative coordinates
 //   Found none()               for what is not there
-//   void set_here(found)       only if SupercubeNeighbours::set_here is called
 //   bool kImmutable            whether what it finds never changes: moving to the same supercube keeps what was found
 template <class Finder>
 class SupercubeNeighbours {
@@ -130,11 +129,8 @@ class SupercubeNeighbours {
     const Found& found = at(int(link.where));
     return {found, Slot(link.slot | corner_slot_[link.where])};
   }
-  // Replaces what was found of the supercube itself, which has since come into being.
-  void set_here(const Found& found) {
-    finder_.set_here(found);
-    keep(kHere, found);
-  }
+  // Sets what is found of the supercube itself: looked up elsewhere, or come into being since.
+  void set_here(const Found& found) { keep(kHere, found); }
 
  private:
   void look_up(int where) {

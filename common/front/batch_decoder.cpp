@@ -42,7 +42,7 @@ class BatchDecoder {
   // Reads the flag of the diamond that the cursor found, and splits it if the flag is set.
   bool take_found(int cls) {
     around_ = cursor_.vertex_keys();
-    const int vertices = cursor_.diamond().row->vertices;
+    const int vertices = cursor_.context().row->vertices;
     fill_missing(around_, vertices);
     const bool is_split = models_.code_flag(coder_, cls, nearness(sides_, description_.refine, around_, vertices));
     if (coder_.is_overdrawn()) return stop("it has fewer flags than its supercubes call for");

@@ -31,10 +31,10 @@ void place_corner(FrontState& state, const RootPatch& root_patch, const DiamondP
   const auto [block, slot] = corner_at(state, root, corner);
   const Side side = root_patch.side[std::size_t(corner)];
   block->split |= std::uint64_t(1) << slot;
-  block->shown = block->counts = block->placed = block->split;
+  block->shown = block->counts = block->split;
   block->set_side(slot, side);
   Split s;
-  s.bits = std::uint32_t(side) << FrontState::kSideBit;
+  s.bits = std::uint32_t(side) << Split::kSideBit;
   s.first = PointId(state.q.size());
   std::array<Cuts, kMaxVertices> cuts_to{};  // by the other end's local number: not the order of the root's edges
   for (const int e : set_bits(parts.edges)) {
@@ -47,9 +47,10 @@ void place_corner(FrontState& state, const RootPatch& root_patch, const DiamondP
     const unsigned surfaces = unsigned(alpha_cuts(side_a, side_b)) | unsigned(beta_cuts(side_a, side_b)) << 1;
     s.bits |= surfaces << (2 * edge.other);
   }
-  block->of.set(slot, s);
+  block->placed.set(slot, s);
   for (const Cuts& c : cuts_to) state.q.insert(state.q.end(), c.q, c.q + c.count);
   state.q.push_back(0);
+  state.points = PointId(state.q.size());
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ void hide_split(FrontState& state, FrontCursor& at) {
     return;
   }
   Block& block = state.obtain_block(at.scale(), at.position());
-  state.tet_count -= std::uint64_t(at.added_tets(block.of[at.slot()]));
+  state.tet_count -= std::uint64_t(at.added_tets(block.split_at(at.slot())));
   block.shown &= ~bit(at.slot());
   --state.shown_count;
 }
@@ -74,7 +74,7 @@ bool Front::show(Handle handle, std::uint64_t max_tets) {
   if (state_.values) return cursor.here().is_counting(handle.slot) && ShownSplits(state_).show(cursor, max_tets);
   if (!cursor.parents_are_shown()) return false;
   Block& block = state_.obtain_block(cursor.scale(), cursor.position());
-  const std::uint64_t tets = state_.tet_count + std::uint64_t(cursor.added_tets(block.of[handle.slot]));
+  const std::uint64_t tets = state_.tet_count + std::uint64_t(cursor.added_tets(block.split_at(handle.slot)));
   if (tets > max_tets) return false;
   state_.tet_count = tets;
   block.shown |= bit(handle.slot);

@@ -33,14 +33,15 @@ void Front::split(Handle handle, Side side, std::span<const std::uint8_t> cuts) 
 
 void Front::split(FrontCursor& at, Side side, std::span<const std::uint8_t> cuts, std::uint64_t max_tets) {
   assert(int(cuts.size()) == at.context().count_cuts(side) && "the caller counted");
-  Block& block = state_.obtain_block(at.scale(), at.position());
-  at.set_here(block);
-  Split s = block.of[at.slot()];
-  const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
-  if (s.bits != bits || bits == 0) {  // else the split that was merged comes back, and its points are still there
-    s = {bits, PointId(state_.q.size())};
-    state_.q.resize(state_.q.size() + s.points());
-    block.of.set(at.slot(), s);
+  Block& block = at.obtain_here(state_);
+  block.set_side(at.slot(), side);
+  const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << Split::kSideBit;
+  Split s = block.split_at(at.slot());
+  if (!block.placed.has(at.slot()) || s.bits != bits) {  // else the split that was merged comes back, and its points are still there
+    s = {bits, state_.points};
+    state_.points += s.points();
+    state_.q.resize(state_.points);
+    block.place(at.slot(), s);
   }
   std::copy(cuts.begin(), cuts.end(), state_.q.begin() + s.first);
   const bool all_shown = state_.shown_count == state_.split_count;

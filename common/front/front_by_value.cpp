@@ -24,11 +24,10 @@ void Front::split(Handle handle, ValueKey key) {
 void Front::split(FrontCursor& at, ValueKey key, std::uint64_t max_tets) {
   FrontValues& values = *state_.values;
   assert(key <= values.format.last && "the caller checked it");
-  FrontState::Block& block = state_.obtain_block(at.scale(), at.position());
-  at.set_here(block);
+  FrontState::Block& block = at.obtain_here(state_);
   const std::uint64_t bit = std::uint64_t(1) << at.slot();
   const Side side = values.sides.side(key);
-  const bool is_counting = counts(at.context(), side, values.refine), was_complete = values.is_complete();
+  const bool is_counting = counts(at.context_with_sides(), side, values.refine), was_complete = values.is_complete();
   block.key.set(at.slot(), key, values.format.last);
   widen_bounds(at, block);
   block.set_side(at.slot(), side);

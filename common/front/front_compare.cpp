@@ -24,7 +24,7 @@ bool has_splits_of(const FrontState& whole, const FrontState& part, const Block&
   if (same == nullptr || (block.split & ~same->split) != 0) return false;
   for (const Slot slot : set_bits<Slot>(block.split)) {
     if (part.values && block.key[slot] != same->key[slot]) return false;
-    if (!part.values && !are_equal(part, block.of[slot], whole, same->of[slot])) return false;
+    if (!part.values && !are_equal(part, block.split_at(slot), whole, same->split_at(slot))) return false;
   }
   return true;
 }
@@ -36,8 +36,8 @@ bool Front::is_part_of(const Front& other) const {
   if (state_.grid != other.state_.grid || mine.has_value() != others.has_value()) return false;
   if (mine && (mine->format != others->format || mine->range != others->range)) return false;
   // The root patch is compared as splits are: the domain's corners are a block, but for the one at the origin.
-  const bool same_origin =
-      mine ? state_.origin.key[0] == other.state_.origin.key[0] : are_equal(state_, state_.origin.of[0], other.state_, other.state_.origin.of[0]);
+  const bool same_origin = mine ? state_.origin.key[0] == other.state_.origin.key[0]
+                                : are_equal(state_, state_.origin.split_at(Slot()), other.state_, other.state_.origin.split_at(Slot()));
   return same_origin &&
          std::all_of(state_.blocks.begin(), state_.blocks.end(), [&](const Block& block) { return has_splits_of(other.state_, state_, block); });
 }

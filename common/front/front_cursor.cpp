@@ -13,17 +13,10 @@ typename BlockFinderOf<State>::Found BlockFinderOf<State>::none() {
 }
 
 template <class State>
-typename BlockFinderOf<State>::Found BlockFinderOf<State>::find(int where, const SupercubePlace& place) const {
-  if (where == kHere) return here_ == nullptr ? none() : here_;
-  const bool is_cached = where < kFiner && here_ != nullptr;
-  if (is_cached) {
-    if (const std::uint32_t number = here_->neighbours.load(where); number != NeighbourCache::kUnknown) return &state_.blocks[number - 1];
-  }
+typename BlockFinderOf<State>::Found BlockFinderOf<State>::find(int, const SupercubePlace& place) const {
   if (place.scale == kOriginScale) return &state_.origin;
   const std::uint32_t number = state_.find_number(place.scale, place.position);
-  if (number == FrontState::kNone) return none();
-  if (is_cached) here_->neighbours.store(where, number + 1);
-  return &state_.blocks[number];
+  return number == FrontState::kNone ? none() : &state_.blocks[number];
 }
 
 template class BlockFinderOf<const FrontState>;
@@ -31,6 +24,8 @@ template class BlockFinderOf<FrontState>;
 
 void FrontCursor::move_to(int scale, Vertex position) {
   neighbours_.move_to(scale, position);
+  here_ = state_.find_number(scale, position);
+  if (here_ != FrontState::kNone) neighbours_.set_here(&state_.blocks[here_]);
   is_interior_ = intervale::is_interior(state_.domain, scale, position);
 }
 
@@ -41,11 +36,10 @@ void FrontCursor::move_to(const Diamond& d) {
 
 bool FrontCursor::gather_parts(Slot slot) {
   slot_ = slot;
-  has_keys_ = false;
+  has_keys_ = has_sides_ = false;
   const DiamondType& row = diamond_type(kTypeOfSlot[std::size_t(slot)]);
   if (scale() >= state_.domain.levels()) return false;
-  diamond_ = Diamond(centre_of(scale(), position(), slot), scale(), kTypeOfSlot[std::size_t(slot)]);
-  parts_ = is_interior_ ? all_parts(row) : parts_of(state_.domain, *diamond_);
+  parts_ = is_interior_ ? all_parts(row) : parts_of(state_.domain, diamond());
   if (parts_.tets == 0) return false;
   context_.row = &row;
   context_.vertices = parts_.vertices;
@@ -54,7 +48,8 @@ bool FrontCursor::gather_parts(Slot slot) {
 
 void FrontCursor::gather_own(Slot slot) {
   gather_parts(slot);
-  context_.sides = here().of[std::size_t(slot)].vertex_sides(context_.pairs());
+  context_.sides = here().split_at(slot).vertex_sides(context_.pairs());
+  has_sides_ = true;
 }
 
 bool FrontCursor::gather_sides(Slot slot) {
@@ -68,43 +63,35 @@ bool FrontCursor::gather_sides(Slot slot) {
     sides |= std::uint32_t(state_.values ? vertex.block.side(vertex.slot) : vertex.split().side()) << (2 * v);
   }
   context_.sides = sides;
+  has_sides_ = true;
   return true;
 }
 
-bool FrontCursor::gather_keys_and_sides(Slot slot) {
-  if (!gather_parts(slot)) return false;
-  const KeySides& side = state_.values->sides;
+bool FrontCursor::gather_keys(Slot slot) { return gather_parts(slot) && load_keys(); }
+
+// False if a vertex's diamond is not split.
+bool FrontCursor::load_keys() {
   const Links& links = this->links();
-  const int vertices = context_.row->vertices;
-  std::uint32_t sides = 0;
-  for (int v = 0; v < vertices; ++v) {
+  for (int v = 0; v < context_.row->vertices; ++v) {
     if (!(parts_.vertices >> v & 1)) {
       keys_[std::size_t(v)] = kNoKey;
       continue;
     }
     const Neighbour vertex = at(links.vertex[std::size_t(v)]);
     if (!vertex.is_split()) return false;
-    const ValueKey key = vertex.block.key[std::size_t(vertex.slot)];
-    keys_[std::size_t(v)] = key;
-    sides |= std::uint32_t(side.side(key)) << (2 * v);
+    keys_[std::size_t(v)] = vertex.block.key[std::size_t(vertex.slot)];
   }
-  context_.sides = sides;
   has_keys_ = true;
   return true;
 }
 
-void FrontCursor::gather_keys() {
-  const Links& links = this->links();
-  const int vertices = diamond_->row->vertices;
-  for (int v = 0; v < vertices; ++v) {
-    if (!(parts_.vertices >> v & 1)) {
-      keys_[std::size_t(v)] = kNoKey;
-      continue;
-    }
-    const Neighbour vertex = at(links.vertex[std::size_t(v)]);
-    keys_[std::size_t(v)] = vertex.block.key[std::size_t(vertex.slot)];
-  }
-  has_keys_ = true;
+const DiamondContext& FrontCursor::context_with_sides() {
+  if (has_sides_) return context_;
+  const KeySides& sides = state_.values->sides;
+  context_.sides = 0;
+  for (const int v : set_bits(parts_.vertices)) context_.sides |= std::uint32_t(sides.side(keys_[std::size_t(v)])) << (2 * v);
+  has_sides_ = true;
+  return context_;
 }
 
 bool FrontCursor::gather_splits() {
@@ -127,7 +114,7 @@ bool FrontCursor::parents_are_split(Slot slot) {
 
 bool FrontCursor::parents_are_shown() {
   const Links& links = this->links();
-  for (int k = 0; k < diamond_->row->parents; ++k) {
+  for (int k = 0; k < context_.row->parents; ++k) {
     const int v = links.parent[std::size_t(k)];
     if ((parts_.vertices >> v & 1) && !at(links.vertex[std::size_t(v)]).is_shown()) return false;
   }
@@ -139,8 +126,8 @@ bool FrontCursor::has_child_in(std::uint64_t Block::*slots) {
   for (std::size_t k = 0; k < children.size(); ++k) {
     const Neighbour child = at(children[k]);
     if (!(child.block.*slots >> child.slot & 1)) continue;
-    for (const Duet::Half& half : diamond_->row->child[k].half) {
-      if ((parts_.tets >> half.tet & 1) && half_exists(state_.domain, *diamond_, half.tet, half.end)) return true;
+    for (const Duet::Half& half : context_.row->child[k].half) {
+      if ((parts_.tets >> half.tet & 1) && half_exists(state_.domain, diamond(), half.tet, half.end)) return true;
     }
   }
   return false;
@@ -178,7 +165,7 @@ std::int64_t FrontCursor::added_tets(const Split& split) const {
   if (!parts_.straddles && split.cut_bits() == 0) {  // all on one side: every tetrahedron inside becomes two
     return split.side() == Side::inside ? std::popcount(parts_.tets) : 0;
   }
-  return count_added(state_.domain, *diamond_, parts_, context_.sides | std::uint32_t(split.side()) << (2 * kCentre));
+  return count_added(state_.domain, diamond(), parts_, context_.sides | std::uint32_t(split.side()) << (2 * kCentre));
 }
 
 }  // namespace intervale

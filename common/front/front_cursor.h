@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <type_traits>
 
@@ -25,17 +24,12 @@ class BlockFinderOf {
   static constexpr bool kImmutable = false;
   using Found = std::conditional_t<std::is_const_v<State>, const FrontState::Block*, FrontState::Block*>;
   explicit BlockFinderOf(State& state) : state_(state) {}
-  void move_to(int scale, Vertex position) {
-    const std::uint32_t number = state_.find_number(scale, position);
-    here_ = number == FrontState::kNone ? nullptr : &state_.blocks[number];
-  }
-  void set_here(Found block) { here_ = block; }
+  static void move_to(int /*scale*/, Vertex /*position*/) {}
   [[nodiscard]] Found find(int where, const SupercubePlace& place) const;
   [[nodiscard]] static Found none();
 
  private:
   State& state_;
-  Found here_ = nullptr;  // null if there is none
 };
 using BlockFinder = BlockFinderOf<const FrontState>;
 
@@ -55,39 +49,41 @@ class FrontCursor {
   // Finds the diamond in a slot if it exists and all its vertices' diamonds are split: if it is split, or in the front
   // with all its tetrahedra. The functions below are of the diamond found last.
   bool gather(Slot slot) { return gather_sides(slot) && gather_splits(); }
-  // The same without split_of and what needs it.
+  // The same without what gather_cuts() needs.
   bool gather_sides(Slot slot);
-  // Finds the diamond in a slot whose own split is there, with its cuts. Its vertices' sides follow from those; split_of
-  // is left as it is.
+  // Finds the diamond in a slot whose own split is there, with its cuts. Its vertices' sides follow from those.
   void gather_own(Slot slot);
-  // Like gather_sides(), of a front split by values, with the keys of the vertices.
-  bool gather_keys_and_sides(Slot slot);
+  // Like gather_sides(), of a front split by values, with the keys of the vertices in place of their sides.
+  bool gather_keys(Slot slot);
   // The same, if it can be split now.
-  bool find_unsplit(Slot slot) { return parents_are_split(slot) && gather_keys_and_sides(slot) && !is_split() && !is_noop(); }
+  bool find_unsplit(Slot slot) { return parents_are_split(slot) && gather_keys(slot) && !is_split() && !is_noop(); }
   // Like gather(), if it can be split now.
   bool find(Slot slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
 
-  [[nodiscard]] const Diamond& diamond() const { return *diamond_; }
+  [[nodiscard]] Diamond diamond() const {
+    const unsigned type = kTypeOfSlot[std::size_t(slot_)];
+    return {centre_of(scale(), position(), slot_), scale(), type};
+  }
   [[nodiscard]] Slot slot() const { return slot_; }
   [[nodiscard]] const DiamondParts& parts() const { return parts_; }
   [[nodiscard]] const Links& links() const { return neighbours_.links(slot_); }
-  // Of the vertex's diamond
-  [[nodiscard]] const Split& split_of(int vertex) const { return split_[std::size_t(vertex)]; }
   // Of a front split by values: the keys at its vertices, kNoKey at one that does not exist; at one of them; and at the
   // centre of a diamond that is split.
   [[nodiscard]] const VertexKeys& vertex_keys() {
-    if (!has_keys_) gather_keys();
+    if (!has_keys_) load_keys();
     return keys_;
   }
   [[nodiscard]] ValueKey key_of(int vertex) { return vertex_keys()[std::size_t(vertex)]; }
   [[nodiscard]] ValueKey centre_key() { return here().key[std::size_t(slot_)]; }
-  // Its cuts may be those of another diamond
+  // Its cuts may be those of another diamond, and after gather_keys() and find_unsplit() its sides, too
   [[nodiscard]] const DiamondContext& context() const { return context_; }
+  // The same, with its own sides
+  const DiamondContext& context_with_sides();
   // The same, with its own cuts
   const DiamondContext& gather_cuts();
   [[nodiscard]] bool is_split() { return here().is_split(slot_); }
   [[nodiscard]] bool is_shown() { return here().is_shown(slot_); }
-  [[nodiscard]] bool is_noop() const { return parts_.straddles && state_.domain.is_noop(*diamond_); }
+  [[nodiscard]] bool is_noop() const { return parts_.straddles && state_.domain.is_noop(diamond()); }
   // Whether a split of it is possible, or was: all parents that exist are split, and it would change something. The
   // diamond is found if not all its supercube is inside the box.
   [[nodiscard]] bool is_splittable(Slot slot) { return parents_are_split(slot) && (is_interior_ || (gather_sides(slot) && !is_noop())); }
@@ -108,7 +104,7 @@ class FrontCursor {
     Slot slot;
     [[nodiscard]] bool is_split() const { return block.is_split(slot); }
     [[nodiscard]] bool is_shown() const { return block.is_shown(slot); }
-    [[nodiscard]] Split split() const { return block.of[std::size_t(slot)]; }
+    [[nodiscard]] Split split() const { return block.split_at(slot); }
   };
   [[nodiscard]] Neighbour at(Link link) {
     const auto found = neighbours_.at(link);
@@ -118,24 +114,30 @@ class FrontCursor {
   [[nodiscard]] std::span<const Link> children(Slot slot) const { return neighbours_.children(slot); }
   [[nodiscard]] int scale() const { return neighbours_.scale(); }
   [[nodiscard]] Vertex position() const { return neighbours_.position(); }
-  // Takes note of the supercube's block, which was added since the cursor moved there.
-  void set_here(const Block& block) { neighbours_.set_here(&block); }
+  // The block, to be changed: that of `state`, which is the one that the cursor looks at. Adds it if it is not there.
+  [[nodiscard]] Block& obtain_here(FrontState& state) {
+    if (here_ == FrontState::kNone) {
+      here_ = state.obtain_number(scale(), position());
+      neighbours_.set_here(&state.blocks[here_]);
+    }
+    return state.blocks[here_];
+  }
 
  private:
   [[nodiscard]] bool parents_are_split(Slot slot);
   bool gather_splits();
   bool gather_parts(Slot slot);
-  void gather_keys();
+  bool load_keys();
 
   const FrontState& state_;
   SupercubeNeighbours<BlockFinder> neighbours_;
-  bool is_interior_ = false;  // all diamonds of the supercube are inside the box
+  std::uint32_t here_ = FrontState::kNone;  // number of the supercube's block
+  bool is_interior_ = false;                // all diamonds of the supercube are inside the box
   Slot slot_;
-  std::optional<Diamond> diamond_;
   DiamondParts parts_;
   std::array<Split, kMaxVertices> split_;  // of each vertex that exists
   DiamondContext context_;
-  bool has_keys_ = false;
+  bool has_keys_ = false, has_sides_ = false;
   VertexKeys keys_{};
 };
 

@@ -24,8 +24,8 @@ class FrontMesh {
         parallel_(parallel),
         shown_(numbers_of_shown(state)),
         pieces_((shown_.size() + kPiece - 1) / kPiece),
-        used_(state.q.size()),
-        number_(state.q.size()) {}
+        used_(state.points),
+        number_(state.points) {}
 
   Mesh make() {
     parallel_(pieces_, [this](std::size_t piece) { use_edges(piece); });
@@ -150,7 +150,7 @@ class FrontMesh {
   // The values of a supercube's centres that are points.
   void place_values(std::size_t number, Mesh& mesh) const {
     const auto place_centre = [&](const FrontState::Block& block, Slot slot) {
-      const PointId id = block.of[slot].centre();
+      const PointId id = block.split_at(slot).centre();
       if (used_[id]) mesh.value[number_[id]] = state_.values->format.value(block.key[slot]);
     };
     const FrontState::Block& block = mesher_.block(number);

@@ -3,6 +3,7 @@
 #include <bit>
 #include <memory>
 
+#include "common/front/shown_splits.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -62,20 +63,30 @@ bool FrontMesher::is_at_border(std::size_t number) const {
 
 void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) const {
   // The domain's corner (0, 0, 0), the oldest vertex, owns no edge.
-  if (const FrontState::Split origin = state_.origin.of[0]; number == 0 && origin.side() == Side::inside) {
+  if (const FrontState::Split origin = state_.origin.split_at(Slot()); number == 0 && origin.side() == Side::inside) {
     points.push_back({origin.centre(), {}, Surface::inside, false});
   }
   const FrontState::Block& block = state_.blocks[number];
   const bool at_border = is_at_border(number);
-  for (const Slot slot : set_bits<Slot>(block.shown)) {
+  FrontCursor cursor(state_);
+  cursor.move_to(block.scale, block.position);
+  CutPlaces derived{};
+  for (const Slot slot : set_bits<Slot>(block.shown & block.placed.slots())) {
     const Diamond d(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]);
-    const FrontState::Split split = block.of[slot];
+    const FrontState::Split split = block.placed[slot];
+    const std::uint8_t* q = derived.data();
+    if (split.first < state_.q.size()) {
+      q = state_.q.data() + split.first;
+    } else if (split.cut_bits() != 0) {
+      cursor.gather_own(slot);
+      derive_cuts(*state_.values, cursor, split.cut_bits(), derived);
+    }
     const Vertex c = at_border ? state_.domain.clamp(d.centre) : d.centre;
     const bool on_border = at_border && is_on_border(d.centre);
     PointId id = split.first;
     for (const int bit : set_bits(split.cut_bits())) {
       const Vertex end = d.vertex(bit / 2), v = at_border ? state_.domain.clamp(end) : end;
-      const std::int32_t t = 2 * state_.q[id] + 1;
+      const std::int32_t t = 2 * *q++ + 1;
       points.push_back({id,
                         {c.x * kSteps + (v.x - c.x) * t, c.y * kSteps + (v.y - c.y) * t, c.z * kSteps + (v.z - c.z) * t},
                         (bit & 1) == 0 ? Surface::alpha : Surface::beta,
@@ -87,9 +98,9 @@ void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) 
 }
 
 void FrontMesher::append_runs(std::size_t number, std::vector<Run>& runs) const {
-  if (number == 0) runs.push_back({state_.origin.of[0].first, state_.origin.of[0].points()});
-  for (const Slot slot : set_bits<Slot>(block(number).shown)) {
-    const FrontState::Split split = block(number).of[slot];
+  if (const FrontState::Split origin = state_.origin.split_at(Slot()); number == 0) runs.push_back({origin.first, origin.points()});
+  for (const Slot slot : set_bits<Slot>(block(number).shown & block(number).placed.slots())) {
+    const FrontState::Split split = block(number).placed[slot];
     runs.push_back({split.first, split.points()});
   }
 }
@@ -189,10 +200,10 @@ void FrontMesher::gather_points(FrontCursor& cursor, const Numbers& numbers, Poi
 // Of the split diamond that the cursor found last, the halves that it left to some of its children, a bit each.
 template <class Numbers>
 void FrontMesher::append_children(const Output<Numbers>& out, FrontCursor& cursor, unsigned children) const {
-  const FrontState::Split split = cursor.here().of[cursor.slot()];
+  const FrontState::Split split = cursor.here().split_at(cursor.slot());
   const bool is_empty = split.cut_bits() == 0 && split.side() != Side::inside;  // all on one side, and not inside
   if (is_empty && out.halves == nullptr) return;
-  const Diamond& d = cursor.diamond();
+  const Diamond d = cursor.diamond();
   const DiamondParts& parts = cursor.parts();
   const std::uint32_t sides = cursor.context().sides | std::uint32_t(split.side()) << (2 * kCentre);
   PointsAround points;

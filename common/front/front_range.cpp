@@ -2,7 +2,7 @@
 //
 // Passes over the supercubes, each of which many threads can share: the sides of the centres; which diamonds count;
 // ancestors of those, from the finest scale on and class by class, so that a parent is complete before its own parents
-// follow; then the cuts of what is shown. Only the first pass visits supercubes whose diamonds are all on one side.
+// follow; then the points of what is shown. Only the first pass visits supercubes whose diamonds are all on one side.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -36,7 +36,7 @@ class Reclassification {
     find_sides();
     find_counting();
     show_ancestors();
-    derive();
+    place_points();
     values_.withheld = 0;
     values_.is_limited = false;
     ++state_.point_generation;
@@ -63,8 +63,8 @@ class Reclassification {
     for_each_piece(state_.blocks.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
       for (std::size_t number = std::max<std::size_t>(1, begin); number < end; ++number) {  // the first has the corners
         Block& block = state_.blocks[number];
-        block.shown = block.counts = block.placed = 0;
-        block.of.reshape(0);
+        block.shown = block.counts = 0;
+        block.placed.reshape(0);
         const std::optional<Side> all = side_of_all(block);
         if (all) {
           block.above = *all == Side::above ? block.split : 0;
@@ -95,10 +95,10 @@ class Reclassification {
       const Side side = block.side(slot);
       if (!cursor.gather_sides(slot) || !counts(cursor.context(), side, values_.refine)) continue;
       block.counts |= bit(slot);
-      splits[slot].bits = cursor.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
+      splits[slot].bits = cursor.context().cut_bits(side) | std::uint32_t(side) << Split::kSideBit;
     }
-    block.of.reshape(block.counts);
-    for (const Slot slot : set_bits<Slot>(block.counts)) block.of.set(slot, splits[slot]);
+    block.placed.reshape(block.counts);
+    for (const Slot slot : set_bits<Slot>(block.counts)) block.placed.set(slot, splits[slot]);
     block.shown = block.counts;
   }
 
@@ -141,58 +141,55 @@ class Reclassification {
     }
   }
 
-  // The cuts of all that is shown. Points are numbered within each piece first.
-  void derive() {
-    struct Made {
-      std::vector<std::uint8_t> q;
+  // Gives points to all that is shown, numbered within each piece first.
+  void place_points() {
+    struct Placed {
+      PointId points = 0;
       std::uint64_t shown = 0;
       std::int64_t tets = 0;
     };
-    std::vector<Made> made((shown_.size() + kPiece - 1) / kPiece);
+    std::vector<Placed> placed((shown_.size() + kPiece - 1) / kPiece);
     for_each_piece(shown_.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
       FrontCursor cursor(state_);
       for (std::size_t i = begin; i < end; ++i) {
         Block& block = state_.blocks[shown_[i]];
-        made[piece].shown += std::uint64_t(std::popcount(block.shown));
-        made[piece].tets += derive_in(block, cursor, made[piece].q);
+        placed[piece].shown += std::uint64_t(std::popcount(block.shown));
+        placed[piece].tets += place_in(block, cursor, placed[piece].points);
       }
     });
     state_.shown_count = 0;
-    std::vector<std::size_t> base(made.size() + 1, state_.q.size());
-    for (std::size_t piece = 0; piece < made.size(); ++piece) {
-      base[piece + 1] = base[piece] + made[piece].q.size();
-      state_.shown_count += made[piece].shown;
-      state_.tet_count += std::uint64_t(made[piece].tets);
+    std::vector<PointId> base;
+    base.reserve(placed.size());
+    for (const Placed& piece : placed) {
+      base.push_back(state_.points);
+      state_.points += piece.points;
+      state_.shown_count += piece.shown;
+      state_.tet_count += std::uint64_t(piece.tets);
     }
-    state_.q.resize(base.back());
     for_each_piece(shown_.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
-      std::copy(made[piece].q.begin(), made[piece].q.end(), state_.q.begin() + std::ptrdiff_t(base[piece]));
       for (std::size_t i = begin; i < end; ++i) {
         Block& block = state_.blocks[shown_[i]];
-        for (const Slot slot : set_bits<Slot>(block.shown)) {
-          Split split = block.of[slot];
-          split.first += PointId(base[piece]);
-          block.of.set(slot, split);
+        for (const Slot slot : set_bits<Slot>(block.placed.slots())) {
+          Split split = block.placed[slot];
+          split.first += base[piece];
+          block.placed.set(slot, split);
         }
       }
     });
   }
 
-  // Appends q of the cuts; returns how many tetrahedra the splits add.
-  std::int64_t derive_in(Block& block, FrontCursor& cursor, std::vector<std::uint8_t>& q) const {
+  // points: how many were given before. Returns how many tetrahedra the splits add.
+  static std::int64_t place_in(Block& block, FrontCursor& cursor, PointId& points) {
     std::int64_t tets = 0;
-    block.placed = block.shown;
-    block.of.reshape(block.shown);
+    block.placed.reshape(block.counts | (block.shown & block.inside));
     cursor.move_to(block.scale, block.position);
     for (const Slot slot : set_bits<Slot>(block.shown)) {
-      Split split = block.of[slot];
       // What does not count has its vertices and its centre on one side.
-      if (!block.is_counting(slot)) split.bits = std::uint32_t(block.side(slot)) << FrontState::kSideBit;
-      split.first = PointId(q.size());
-      block.of.set(slot, split);
+      Split split{std::uint32_t(block.side(slot)) << Split::kSideBit, points};
+      if (block.is_counting(slot)) split.bits = block.placed[slot].bits;
+      if (block.placed.has(slot)) block.placed.set(slot, split);
+      points += split.points();
       cursor.gather_own(slot);
-      if (split.cut_bits() != 0) append_cuts(values_, cursor, split.cut_bits(), q);
-      if (split.side() == Side::inside) q.push_back(0);
       tets += cursor.added_tets(split);
     }
     return tets;

@@ -21,7 +21,7 @@ using Wrong = std::optional<std::string>;
 Wrong validate_cuts(const FrontState& state, const FrontCursor& cursor, const Split& split) {
   if (unsigned(split.side()) > 2) return "a side is not below, inside or above";
   if (split.cut_bits() != cursor.context().cut_bits(split.side())) return "the cuts do not fit the sides";
-  if (std::size_t(split.first) + split.points() > state.q.size()) return "a cut is out of range";
+  if (std::size_t(split.first) + split.points() > state.points) return "a point is out of range";
   return {};
 }
 
@@ -36,12 +36,9 @@ Wrong validate_values(const FrontState& state, FrontCursor& cursor, const Block&
   if (is_shown && !is_counting && !has_child) return "a split is shown that does not count, without a shown child";
   if (values.is_complete() && (is_counting || has_child) != is_shown) return "what is shown is not what the rule says";
   if (!is_shown) return {};
-  if (!(block.placed >> slot & 1)) return "a shown split has no points";
-  if (block.of[slot].side() != side) return "the side of a split is wrong";
-  std::vector<std::uint8_t> q;
-  append_cuts(values, cursor, block.of[slot].cut_bits(), q);
-  const auto kept = state.cuts_of(block.of[slot]);
-  if (!std::equal(q.begin(), q.end(), kept.begin(), kept.end())) return "the cuts are not those of the values";
+  const Split split = block.split_at(slot);
+  if (split.points() != 0 && !block.placed.has(slot)) return "a shown split has no points";
+  if (split.side() != side) return "the side of a split is wrong";
   return {};
 }
 
@@ -55,7 +52,7 @@ Wrong validate_block(const FrontState& state, const Block& block, FrontCursor& c
   for (const Slot slot : set_bits<Slot>(block.split)) {
     const Vertex c = centre_of(block.scale, block.position, slot);
     const auto where = " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")";
-    const Split split = block.of[slot];
+    const Split split = block.split_at(slot);
     if (!cursor.gather_sides(slot)) return "a diamond is split before its parents" + where;
     if (!state.values || block.is_shown(slot)) {
       if (const Wrong wrong = validate_cuts(state, cursor, split)) return *wrong + where;

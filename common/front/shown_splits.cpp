@@ -22,16 +22,15 @@ bool counts(const DiamondContext& context, Side centre, Refine refine) {
   return centre != all || (refine == Refine::uniform && all == Side::inside);
 }
 
-int append_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, std::vector<std::uint8_t>& q) {
-  const std::size_t before = q.size();
+void derive_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, CutPlaces& q) {
   const double centre = values.format.value(at.centre_key());
+  std::size_t n = 0;
   for (std::uint32_t bits = cut_bits; bits != 0;) {
     const int v = std::countr_zero(bits) / 2;
     bits &= ~(3u << (2 * v));
     const Cuts cuts = cuts_between(centre, values.format.value(at.key_of(v)), values.range);
-    for (int i = 0; i < cuts.count; ++i) q.push_back(cuts.q[i]);
+    for (int i = 0; i < cuts.count; ++i) q[n++] = cuts.q[i];
   }
-  return int(q.size() - before);
 }
 
 void widen_bounds(FrontCursor& at, Block& block) {
@@ -49,7 +48,7 @@ void widen_bounds(FrontCursor& at, Block& block) {
 // Adds the parents by place that are split and shown, or hidden.
 void ShownSplits::add_parents(FrontCursor& at, bool shown, std::vector<Place>& places) {
   const Links& links = at.links();
-  for (int k = 0; k < at.diamond().row->parents; ++k) {
+  for (int k = 0; k < at.context().row->parents; ++k) {
     const FrontCursor::Neighbour parent = at.at(links.vertex[links.parent[std::size_t(k)]]);
     if (!parent.is_split() || parent.is_shown() != shown || state_.is_root_block(parent.block)) continue;
     places.push_back({&state_.obtain_block(parent.block.scale, parent.block.position), parent.slot});
@@ -62,31 +61,23 @@ bool ShownSplits::move_to(const Place& place) {
   return cursor_->gather_sides(place.slot);
 }
 
-// Derives the split of the diamond that the cursor found last. Returns how many tetrahedra it adds to the mesh. If it
-// was placed before, and its vertices have the same sides, its points come back.
+// Gives points to the split of the diamond that the cursor found last. Returns how many tetrahedra it adds to the mesh.
+// If it had points before, and its vertices have the same sides, those come back.
 std::int64_t ShownSplits::place_points(FrontCursor& at, const Place& place) {
   Block& block = *place.block;
-  Split split = block.of[place.slot];
   const Side side = block.side(place.slot);
-  const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << FrontState::kSideBit;
-  const bool is_back = (block.placed >> place.slot & 1) != 0 && split.bits == bits;
-  std::vector<std::uint8_t>& q = state_.q;
-  const std::size_t end = q.size();
-  append_cuts(*state_.values, at, bits & FrontState::kCutBits, q);
-  if (is_back) {
-    std::copy(q.begin() + std::ptrdiff_t(end), q.end(), q.begin() + split.first);
-    q.resize(end);
-  } else {
-    split = {bits, PointId(end)};
-    block.of.set(place.slot, split);
-    q.resize(end + split.points());
-    block.placed |= bit(place.slot);
+  const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << Split::kSideBit;
+  Split split = block.split_at(place.slot);
+  if (!block.placed.has(place.slot) || split.bits != bits) {
+    split = {bits, state_.points};
+    state_.points += split.points();
+    block.place(place.slot, split);
   }
   return at.added_tets(split);
 }
 
 bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
-  const Place own{&state_.obtain_block(at.scale(), at.position()), at.slot()};
+  const Place own{&at.obtain_here(state_), at.slot()};
   std::vector<Place> ancestors;
   // Marks ancestors as shown when they are found, so that each is found once.
   const auto add_hidden_parents = [&](FrontCursor& of) {
@@ -115,8 +106,8 @@ bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
 }
 
 void ShownSplits::hide_one(FrontCursor& at) {
-  Block& block = state_.obtain_block(at.scale(), at.position());
-  state_.tet_count -= std::uint64_t(at.added_tets(block.of[std::size_t(at.slot())]));
+  Block& block = at.obtain_here(state_);
+  state_.tet_count -= std::uint64_t(at.added_tets(block.split_at(at.slot())));
   block.shown &= ~bit(at.slot());
   --state_.shown_count;
   state_.values->withheld += block.is_counting(at.slot());

@@ -2,21 +2,24 @@
 // (front.h). Inside the front.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "common/front/front_cursor.h"
 #include "common/front/front_state.h"
+#include "common/patch/diamond_context.h"
 
 namespace intervale {
 
 // Whether a diamond counts for a range. context: of the diamond, with its sides; centre: the side of its centre.
 [[nodiscard]] bool counts(const DiamondContext& context, Side centre, Refine refine);
 
-// Appends q of each cut on the subdivision edges of the split diamond that the cursor found last, in order of the bits
-// of its split. Returns their number.
-int append_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, std::vector<std::uint8_t>& q);
+// Sets q of each cut on the subdivision edges of the split diamond that the cursor found last, in order of the bits of
+// its split, as many as there are.
+using CutPlaces = std::array<std::uint8_t, kMaxCuts>;
+void derive_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, CutPlaces& q);
 
 // Widens the bounds of a supercube's keys by those of the diamond that the cursor found last, which has its key.
 void widen_bounds(FrontCursor& at, FrontState::Block& block);

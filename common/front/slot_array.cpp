@@ -1,5 +1,7 @@
 #include "common/front/slot_array.h"
 
+#include <algorithm>
+
 namespace intervale {
 
 std::uint8_t* SlotBytes::obtain(std::size_t slot, std::size_t bytes) {

@@ -1,13 +1,11 @@
 // Arrays by slot of one supercube, in which only the slots that were set take memory.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <memory>
-#include <type_traits>
 
 #include "common/diamond/supercube.h"
 #include "common/patch/value_format.h"
@@ -35,6 +33,7 @@ class SlotBytes {
 
   [[nodiscard]] std::uint64_t slots() const { return slots_; }  // that were set
   [[nodiscard]] bool has(std::size_t slot) const { return (slots_ >> slot & 1) != 0; }
+  [[nodiscard]] std::size_t bytes_per() const { return bytes_per_; }  // of an element
   [[nodiscard]] std::size_t memory_bytes() const { return std::size_t(capacity_) * bytes_per_; }
 
   // The element of a slot that was set.
@@ -52,43 +51,20 @@ class SlotBytes {
   std::uint8_t bytes_per_ = 0, capacity_ = 0;
 };
 
-// Elements of a type that is copied as bytes.
-template <class T>
-class SlotArray {
- public:
-  static_assert(std::is_trivially_copyable_v<T>);
-  // The element of a slot, T() if it was not set.
-  [[nodiscard]] T operator[](std::size_t slot) const {
-    T value{};
-    if (bytes_.has(slot)) std::memcpy(&value, bytes_.at(slot), sizeof(T));
-    return value;
-  }
-  void set(std::size_t slot, const T& value) { std::memcpy(bytes_.obtain(slot, sizeof(T)), &value, sizeof(T)); }
-  void reshape(std::uint64_t slots) { bytes_.reshape(slots, sizeof(T)); }
-  [[nodiscard]] std::size_t memory_bytes() const { return bytes_.memory_bytes(); }
-
- private:
-  SlotBytes bytes_;
-};
-
 // Keys, in as many bytes each as the greatest one needs: 1, 2 or 4.
 class SlotKeys {
  public:
   [[nodiscard]] static std::size_t width(ValueKey last) { return last < 1u << 8 ? 1 : last < 1u << 16 ? 2 : 4; }
   // Of a slot that was set.
   [[nodiscard]] ValueKey operator[](std::size_t slot) const { return load(bytes_.at(slot)); }
-  void set(std::size_t slot, ValueKey key, ValueKey last) {
-    width_ = std::uint8_t(width(last));
-    store(bytes_.obtain(slot, width_), key);
-  }
+  void set(std::size_t slot, ValueKey key, ValueKey last) { store(bytes_.obtain(slot, width(last)), key); }
   // Replaces all: keys[slot] for each of `slots`.
   void assign(std::uint64_t slots, const std::array<ValueKey, kSlots>& keys, ValueKey last) {
-    width_ = std::uint8_t(width(last));
-    bytes_.reshape(slots, width_);
+    bytes_.reshape(slots, width(last));
     std::uint8_t* to = slots == 0 ? nullptr : bytes_.at(std::size_t(std::countr_zero(slots)));
     for (const int slot : set_bits(slots)) {
       store(to, keys[std::size_t(slot)]);
-      to += width_;
+      to += bytes_.bytes_per();
     }
   }
   // A bit for each slot that was set whose key is not less than `first`.
@@ -98,7 +74,7 @@ class SlotKeys {
     const std::uint8_t* from = slots == 0 ? nullptr : bytes_.at(std::size_t(std::countr_zero(slots)));
     for (const int slot : set_bits(slots)) {
       mask |= std::uint64_t(load(from) >= first) << slot;
-      from += width_;
+      from += bytes_.bytes_per();
     }
     return mask;
   }
@@ -106,8 +82,8 @@ class SlotKeys {
 
  private:
   [[nodiscard]] ValueKey load(const std::uint8_t* at) const {
-    if (width_ == 1) return *at;
-    if (width_ == 2) {
+    if (bytes_.bytes_per() == 1) return *at;
+    if (bytes_.bytes_per() == 2) {
       std::uint16_t key = 0;
       std::memcpy(&key, at, sizeof key);
       return key;
@@ -117,16 +93,15 @@ class SlotKeys {
     return key;
   }
   void store(std::uint8_t* at, ValueKey key) const {
-    if (width_ == 1) {
+    if (bytes_.bytes_per() == 1) {
       *at = std::uint8_t(key);
-    } else if (width_ == 2) {
+    } else if (bytes_.bytes_per() == 2) {
       const auto narrow = std::uint16_t(key);
       std::memcpy(at, &narrow, sizeof narrow);
     } else {
       std::memcpy(at, &key, sizeof key);
     }
   }
-  std::uint8_t width_ = 1;
   SlotBytes bytes_;
 };
 

@@ -88,7 +88,7 @@ TEST_P(VertexKeysLaws, AreThoseThatAFrontGathers) {
     gather_vertex_keys(*volume_, around, slot, keys);
     cursor.move_to(key);
     for (const bool at_once : {false, true}) {
-      ASSERT_TRUE(at_once ? cursor.gather_keys_and_sides(slot) : cursor.gather_sides(slot));
+      ASSERT_TRUE(at_once ? cursor.gather_keys(slot) : cursor.gather_sides(slot));
       expect_equal(cursor, keys);
     }
     if (cursor.is_split()) {
