@@ -18,7 +18,7 @@ namespace intervale {
 // The most that a client keeps.
 struct Budget {
   std::uint64_t max_tets = ~std::uint64_t(0);  // in its mesh
-  // In the mesh or hidden, some 30 bytes each; the server learns it as View::room.
+  // In the mesh or hidden, some 15 bytes each; the server learns it as View::room.
   std::uint64_t max_updates = ~std::uint64_t(0);
   friend bool operator==(const Budget&, const Budget&) = default;
 };

@@ -115,7 +115,7 @@ void add_options(CLI::App& app, LoadCommand& options) {
       ->needs(verify);
   within(
       app.add_option("--max-kept", load.budget.max_updates,
-                     "With --verify: most updates that each client keeps, some 30 bytes each; it gives up the least important ones, and the server "
+                     "With --verify: most updates that each client keeps, some 15 bytes each; it gives up the least important ones, and the server "
                      "sends them again when needed"),
       0, 1e15, "N")
       ->needs(verify);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <span>
 
 namespace intervale {
 namespace {
@@ -20,12 +19,11 @@ struct Pair {
   std::int64_t sum, difference;
 };
 
-}  // namespace
-
-PredictorValues predictor_values(int cls, const VertexKeys& keys) {
+template <int Class>
+PredictorValues values_of(const VertexKeys& keys) {
   constexpr std::array<int, 3> kBelt{6, 4, 8};
-  const int half = kBelt[std::size_t(cls)] / 2, pairs = half + 1;
-  std::array<Pair, 5> pair;
+  constexpr int half = kBelt[std::size_t(Class)] / 2, pairs = half + 1;
+  std::array<Pair, std::size_t(pairs)> pair;
   const auto pair_of = [&keys](int a, int b) {
     const std::int64_t x = keys[std::size_t(a)], y = keys[std::size_t(b)];
     return Pair{x + y, x < y ? y - x : x - y};
@@ -38,7 +36,7 @@ PredictorValues predictor_values(int cls, const VertexKeys& keys) {
   }
   const int shift = std::max(0, int(std::bit_width(std::uint64_t(widest))) - kWeightBits);
   std::int64_t weights = 0, sum = 0;
-  for (const Pair& p : std::span(pair).first(std::size_t(pairs))) {
+  for (const Pair& p : pair) {
     const std::int64_t weight = kPairWeights[std::size_t(p.difference >> shift)];
     weights += weight;
     sum += weight * p.sum;
@@ -46,9 +44,9 @@ PredictorValues predictor_values(int cls, const VertexKeys& keys) {
   const std::int64_t mean = 8 * sum / weights;
   PredictorValues values;
   values.spine = 8 * pair[0].sum;
-  if (cls == 0) {
+  if constexpr (Class == 0) {
     values.difference[0] = (pair[1].sum + pair[2].sum + pair[3].sum) * 8 / 3 - values.spine;
-  } else if (cls == 1) {  // the belt is far, near, far, near
+  } else if constexpr (Class == 1) {  // the belt is far, near, far, near
     values.difference[0] = 8 * pair[2].sum - values.spine;
     values.difference[1] = 8 * pair[1].sum - values.spine;
   } else {  // near, far, ...
@@ -62,9 +60,15 @@ PredictorValues predictor_values(int cls, const VertexKeys& keys) {
     greatest = std::max(greatest, keys[std::size_t(v)]);
   }
   std::int64_t disagreement = 0;
-  for (const Pair& p : std::span(pair).first(std::size_t(pairs))) disagreement += std::max(8 * p.sum - mean, mean - 8 * p.sum);
+  for (const Pair& p : pair) disagreement += std::max(8 * p.sum - mean, mean - 8 * p.sum);
   values.activity = std::uint64_t(disagreement) + 4 * std::uint64_t(pairs) * (greatest - least);
   return values;
+}
+
+}  // namespace
+
+PredictorValues predictor_values(int cls, const VertexKeys& keys) {
+  return cls == 0 ? values_of<0>(keys) : cls == 1 ? values_of<1>(keys) : values_of<2>(keys);
 }
 
 ValueKey predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last) {

@@ -44,6 +44,20 @@ Link link_to_finer(unsigned type, Offset f) {
   return {std::uint8_t(kFiner + ((at[0] >> 2) + 1) + 3 * ((at[1] >> 2) + 1) + 9 * ((at[2] >> 2) + 1)), kSlotOfType[child]};
 }
 
+// The steps to each neighbour: see kSame and those after it.
+constexpr std::array<Offset, kNeighbours> kSteps = [] {
+  std::array<Offset, kNeighbours> steps{};
+  for (int i = 0; i < 27; ++i) {
+    const Offset step{std::int8_t(i % 3 - 1), std::int8_t(i / 3 % 3 - 1), std::int8_t(i / 9 - 1)};
+    steps[std::size_t(kSame + i)] = steps[std::size_t(kFiner + i)] = step;
+  }
+  for (int i = 0; i < 8; ++i) {
+    const Offset step{std::int8_t(i & 1), std::int8_t(i >> 1 & 1), std::int8_t(i >> 2)};
+    steps[std::size_t(kCoarser + i)] = steps[std::size_t(kCorner + i)] = step;
+  }
+  return steps;
+}();
+
 Links links_of(Slot slot, unsigned parity) {
   const unsigned type = kTypeOfSlot[slot];
   const DiamondType& row = diamond_type(type);
@@ -92,14 +106,11 @@ const LinkTable& link_table() {
 }
 
 SupercubePlace neighbour_at(int where, int scale, Vertex p) {
-  if (where < kCoarser) return {scale, {p.x + where % 3 - 1, p.y + where / 3 % 3 - 1, p.z + where / 9 - 1}};
-  if (where >= kFiner) {
-    const int w = where - kFiner;
-    return {scale - 1, {2 * p.x + w % 3 - 1, 2 * p.y + w / 3 % 3 - 1, 2 * p.z + w / 9 - 1}};
-  }
-  const int w = where < kCorner ? where - kCoarser : where - kCorner, x = w & 1, y = w >> 1 & 1, z = w >> 2;
-  if (where < kCorner) return {scale + 1, {(p.x >> 1) + x, (p.y >> 1) + y, (p.z >> 1) + z}};
-  const Vertex v{(p.x + x) << (scale + 2), (p.y + y) << (scale + 2), (p.z + z) << (scale + 2)};
+  const Offset o = kSteps[std::size_t(where)];
+  if (where < kCoarser) return {scale, {p.x + o.x, p.y + o.y, p.z + o.z}};
+  if (where < kCorner) return {scale + 1, {(p.x >> 1) + o.x, (p.y >> 1) + o.y, (p.z >> 1) + o.z}};
+  if (where >= kFiner) return {scale - 1, {2 * p.x + o.x, 2 * p.y + o.y, 2 * p.z + o.z}};
+  const Vertex v{(p.x + o.x) << (scale + 2), (p.y + o.y) << (scale + 2), (p.z + o.z) << (scale + 2)};
   const int of_v = scale_of(v), up = of_v + 2;
   if (of_v == kOriginScale) return {kOriginScale, {}};
   return {of_v, {v.x >> up, v.y >> up, v.z >> up}, kSlotOfType[type_of(v, of_v)]};

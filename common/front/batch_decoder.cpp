@@ -41,21 +41,28 @@ class BatchDecoder {
  private:
   // Reads the flag of the diamond that the cursor found, and splits it if the flag is set.
   bool take_found(int cls) {
-    around_ = cursor_.vertex_keys();
     const int vertices = cursor_.context().row->vertices;
-    fill_missing(around_, vertices);
-    const bool is_split = models_.code_flag(coder_, cls, nearness(sides_, description_.refine, around_, vertices));
+    const VertexKeys& around = keys_around(vertices);
+    const bool is_split = models_.code_flag(coder_, cls, nearness(sides_, description_.refine, around, vertices));
     if (coder_.is_overdrawn()) return stop("it has fewer flags than its supercubes call for");
     if (!is_split) return true;
     if (updates_ == kBatchUpdatesMost) return stop("it has too many updates");
     const ValueKey last = description_.format.last;
     const ValueKey key =
-        models_.code_key(coder_, cls, cursor_.scale(), predict_value(cls, cursor_.scale(), around_, description_.weights, last), last);
+        models_.code_key(coder_, cls, cursor_.scale(), predict_value(cls, cursor_.scale(), around, description_.weights, last), last);
     if (coder_.is_overdrawn()) return stop("it has fewer bytes than its updates call for");
     if (key > last) return stop("a value is out of range");
     front_.split(cursor_, key, max_tets_);
     ++updates_;
     return true;
+  }
+  // The keys at the vertices of the diamond that the cursor found, none missing.
+  const VertexKeys& keys_around(int vertices) {
+    const VertexKeys& keys = cursor_.vertex_keys();
+    if (cursor_.is_interior()) return keys;
+    around_ = keys;
+    fill_missing(around_, vertices);
+    return around_;
   }
   bool stop(const char* why) {
     wrong_ = why;
@@ -69,7 +76,7 @@ class BatchDecoder {
   RangeDecoder coder_;
   BatchModels models_;
   FrontCursor cursor_;
-  VertexKeys around_{};
+  VertexKeys around_{};  // at the border of the box
   std::uint64_t updates_ = 0;
   const char* wrong_ = nullptr;
 };

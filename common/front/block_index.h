@@ -6,10 +6,9 @@
 #pragma once
 
 #include <array>
-#include <boost/unordered/unordered_flat_map.hpp>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
+#include <vector>
 
 #include "common/diamond/diamond.h"
 
@@ -22,30 +21,37 @@ class BlockIndex {
 
   // The number of a supercube's block, or kNone. Positions have no more than 19 bits.
   [[nodiscard]] std::uint32_t find(int scale, Vertex position) const {
-    const auto found = bricks_.find(brick_key(scale, position));
-    return found == bricks_.end() ? kNone : numbers_[found->second][place_of(position)];
+    const std::uint32_t brick = bricks_[find_brick(brick_key(scale, position))].brick;
+    return brick == kNone ? kNone : numbers_[brick][place_of(position)];
   }
-  // The same, to be set; kNone if the supercube is new.
-  [[nodiscard]] std::uint32_t& obtain(int scale, Vertex position) {
-    const auto [found, is_new] = bricks_.try_emplace(brick_key(scale, position), std::uint32_t(numbers_.size()));
-    if (is_new) numbers_.emplace_back().fill(kNone);
-    return numbers_[found->second][place_of(position)];
-  }
-  void clear() {
-    bricks_.clear();
-    numbers_.clear();
-  }
-  [[nodiscard]] std::size_t memory_bytes() const { return bricks_.bucket_count() * 17 + numbers_.size() * (sizeof(numbers_[0]) + sizeof(void*)); }
+  // The same, to be set; kNone if the supercube is new. Valid until the next call.
+  [[nodiscard]] std::uint32_t& obtain(int scale, Vertex position);
+  void clear() { *this = {}; }
+  [[nodiscard]] std::size_t memory_bytes() const { return bricks_.capacity() * sizeof(Entry) + numbers_.capacity() * sizeof(Numbers); }
 
  private:
+  struct Entry {
+    std::uint64_t key = 0;
+    std::uint32_t brick = kNone;  // its place in numbers_; kNone if the entry is free
+  };
+  using Numbers = std::array<std::uint32_t, 64>;  // of a brick's supercubes, kNone where there is none
+
   static std::uint64_t brick_key(int scale, Vertex p) {
     return std::uint64_t(scale) << 57 | std::uint64_t(std::uint32_t(p.z) >> 2) << 38 | std::uint64_t(std::uint32_t(p.y) >> 2) << 19 |
            std::uint32_t(p.x) >> 2;
   }
   static std::size_t place_of(Vertex p) { return unsigned(p.x & 3) | unsigned(p.y & 3) << 2 | unsigned(p.z & 3) << 4; }
+  // The entry of a brick, or the free one where it belongs.
+  [[nodiscard]] std::size_t find_brick(std::uint64_t key) const {
+    std::size_t i = std::size_t(key * 0x9e3779b97f4a7c15u >> shift_);
+    while (bricks_[i].key != key && bricks_[i].brick != kNone) i = (i + 1) & (bricks_.size() - 1);
+    return i;
+  }
+  void grow();
 
-  boost::unordered_flat_map<std::uint64_t, std::uint32_t> bricks_;  // places in numbers_
-  std::deque<std::array<std::uint32_t, 64>> numbers_;               // of each brick's supercubes, kNone where there is none
+  int shift_ = 60;
+  std::vector<Entry> bricks_ = std::vector<Entry>(16);  // a hash table, at most half full; 2^(64 - shift_) entries
+  std::vector<Numbers> numbers_;
 };
 
 }  // namespace intervale

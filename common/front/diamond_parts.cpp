@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "common/diamond/supercube.h"
 #include "common/patch/tet_cases.h"
 #include "common/util/bits.h"
 
@@ -33,12 +34,59 @@ class AddedTets {
   std::array<ByBelt, 64> table_{};
 };
 
+// Of a diamond whose vertices are clamped, the gaps between coordinates that are left: on each axis, bit 0 from below
+// the centre to the centre, bit 1 from there to above it.
+unsigned gaps_of(const Domain& domain, const Diamond& d) {
+  const Vertex low = domain.clamp({d.centre.x - d.h, d.centre.y - d.h, d.centre.z - d.h}), c = domain.clamp(d.centre),
+               high = domain.clamp({d.centre.x + d.h, d.centre.y + d.h, d.centre.z + d.h});
+  const auto on_axis = [](std::int32_t below, std::int32_t at, std::int32_t above) { return unsigned(below < at) | unsigned(at < above) << 1; };
+  return on_axis(low.x, c.x, high.x) | on_axis(low.y, c.y, high.y) << 2 | on_axis(low.z, c.z, high.z) << 4;
+}
+
+// What exists of diamonds, by type and gaps. The volume of a tetrahedron is a sum of products of one gap on each axis.
+// As clamping turns no tetrahedron inside out, no product has a negative factor before it: so which gaps are 0 tells
+// whether a tetrahedron is flat, however wide the others are.
+class PartsTable {
+ public:
+  PartsTable() {
+    for (const std::uint8_t type : kTypeOfSlot) {
+      for (unsigned gaps = 0; gaps < kGaps; ++gaps) table_[type][gaps] = parts_with(type, gaps);
+    }
+  }
+  [[nodiscard]] const DiamondParts& of(unsigned type, unsigned gaps) const { return table_[type][gaps]; }
+
+ private:
+  static constexpr unsigned kGaps = 64;
+  static DiamondParts parts_with(unsigned type, unsigned gaps) {
+    const DiamondType& row = diamond_type(type);
+    const auto clamped = [gaps](int axis, std::int8_t step) {
+      const bool is_left = (gaps >> (2 * axis + (step > 0)) & 1) != 0;
+      return is_left ? std::int32_t(step) : 0;
+    };
+    DiamondParts parts;
+    for (int t = 0; t < row.tets; ++t) {
+      std::array<Vertex, 4> corners;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const Offset step = row.vertex[row.tet(t)[i]];
+        corners[i] = {clamped(0, step.x), clamped(1, step.y), clamped(2, step.z)};
+      }
+      parts.tets |= std::uint32_t(Domain::exists(corners)) << t;
+    }
+    parts.vertices = Domain::vertices(row, parts.tets);
+    parts.edges = Domain::edges(row, parts.tets);
+    return parts;
+  }
+  std::array<std::array<DiamondParts, kGaps>, 64> table_{};
+};
+
 }  // namespace
 
 DiamondParts parts_of(const Domain& domain, const Diamond& d) {
   if (domain.is_interior(d)) return all_parts(*d.row);
-  const unsigned tets = domain.tets(d);
-  return {tets, Domain::vertices(*d.row, tets), Domain::edges(*d.row, tets), !domain.is_unmoved(d)};
+  static const PartsTable table;
+  DiamondParts parts = table.of(d.type, gaps_of(domain, d));
+  parts.straddles = !domain.is_unmoved(d);
+  return parts;
 }
 
 bool half_exists(const Domain& domain, const Diamond& d, int tet, int end) {
@@ -80,8 +128,8 @@ std::uint64_t count_halves(const Domain& domain, const Diamond& d, const Diamond
   std::uint64_t n = 0;
   for (const int t : set_bits(parts.tets)) {
     for (int end = 0; end < 2; ++end) {
-      if (parts.straddles && !half_exists(domain, d, t, end)) continue;
       unsigned count = cases.count(ring.half(t, end));
+      if (count == 0 || (parts.straddles && !half_exists(domain, d, t, end))) continue;
       if (count == TetCases::kDepends) {
         const TetShape s = half_shape(domain, d, parts, t, end);
         count = cases.count(s.order, shape_sides(s, sides));

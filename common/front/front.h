@@ -86,8 +86,8 @@ class Front {
   // shown if it counts, and the hidden splits of its ancestors with it. They all stay hidden if the mesh would have
   // more than max_tets tetrahedra, and from then on, as long as splits that count are hidden, new ones stay hidden, too.
   void split(Handle handle, ValueKey key);
-  // The same for the diamond that a cursor over state() found last, by find() or gather_sides(); the cursor sees the
-  // split.
+  // The same for the diamond that a cursor over state() found last, by find(), find_unsplit() or
+  // gather_sides(); the cursor sees the split.
   void split(FrontCursor& at, ValueKey key, std::uint64_t max_tets = ~std::uint64_t(0));
 
   // Undoes the split of a diamond none of whose children is split. False, and nothing done, if there is no such split.

@@ -52,6 +52,12 @@ void FrontCursor::gather_own(Slot slot) {
   has_sides_ = true;
 }
 
+void FrontCursor::gather_one_sided(Slot slot) {
+  gather_parts(slot);
+  context_.sides = context_.pairs() * std::uint32_t(here().side(slot));
+  has_sides_ = true;
+}
+
 bool FrontCursor::gather_sides(Slot slot) {
   if (!gather_parts(slot)) return false;
   const Links& links = neighbours_.links(slot);
@@ -72,8 +78,10 @@ bool FrontCursor::gather_keys(Slot slot) { return gather_parts(slot) && load_key
 // False if a vertex's diamond is not split.
 bool FrontCursor::load_keys() {
   const Links& links = this->links();
-  for (int v = 0; v < context_.row->vertices; ++v) {
-    if (!(parts_.vertices >> v & 1)) {
+  const int vertices = context_.row->vertices;
+  const std::uint32_t exist = parts_.vertices;
+  for (int v = 0; v < vertices; ++v) {
+    if (!(exist >> v & 1)) {
       keys_[std::size_t(v)] = kNoKey;
       continue;
     }
@@ -87,9 +95,11 @@ bool FrontCursor::load_keys() {
 
 const DiamondContext& FrontCursor::context_with_sides() {
   if (has_sides_) return context_;
-  const KeySides& sides = state_.values->sides;
-  context_.sides = 0;
-  for (const int v : set_bits(parts_.vertices)) context_.sides |= std::uint32_t(sides.side(keys_[std::size_t(v)])) << (2 * v);
+  const KeySides sides = state_.values->sides;
+  const int vertices = context_.row->vertices;
+  std::uint32_t found = 0;
+  for (int v = 0; v < vertices; ++v) found |= std::uint32_t(sides.side(keys_[std::size_t(v)])) << (2 * v);
+  context_.sides = found & 3 * context_.pairs();
   has_sides_ = true;
   return context_;
 }
@@ -101,15 +111,14 @@ bool FrontCursor::gather_splits() {
 }
 
 // Rejects most of the diamonds that cannot be split, at a fraction of gather()'s cost. At the border some parents may
-// not exist: gather() decides.
+// not exist, of all but the root not all: gather() decides.
 bool FrontCursor::parents_are_split(Slot slot) {
-  if (!is_interior_) return true;
   const Links& links = neighbours_.links(slot);
   const int parents = diamond_type(kTypeOfSlot[std::size_t(slot)]).parents;
   for (int k = 0; k < parents; ++k) {
-    if (!at(links.vertex[links.parent[std::size_t(k)]]).is_split()) return false;
+    if (at(links.vertex[links.parent[std::size_t(k)]]).is_split() != is_interior_) return !is_interior_;
   }
-  return true;
+  return is_interior_ || scale() == state_.domain.levels() - 1;
 }
 
 bool FrontCursor::parents_are_shown() {

@@ -53,6 +53,8 @@ class FrontCursor {
   bool gather_sides(Slot slot);
   // Finds the diamond in a slot whose own split is there, with its cuts. Its vertices' sides follow from those.
   void gather_own(Slot slot);
+  // Finds the diamond in a slot whose split is there, by values, and does not count: its vertices have its centre's side.
+  void gather_one_sided(Slot slot);
   // Like gather_sides(), of a front split by values, with the keys of the vertices in place of their sides.
   bool gather_keys(Slot slot);
   // The same, if it can be split now.

@@ -4,6 +4,7 @@
 // spine that is; and a centre inside the range stays a point. Only on the far faces of a box that clamps (domain.h),
 // where edges may fall together or vanish, the tetrahedra decide.
 #include <algorithm>
+#include <boost/unordered/unordered_flat_map.hpp>
 #include <cassert>
 
 #include "common/front/front.h"

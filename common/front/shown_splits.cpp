@@ -35,11 +35,13 @@ void derive_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_b
 
 void widen_bounds(FrontCursor& at, Block& block) {
   const ValueKey centre = block.key[std::size_t(at.slot())];
+  const VertexKeys& keys = at.vertex_keys();
   ValueKey least = std::min(block.least, centre), greatest = std::max(block.greatest, centre);
-  for (const int v : set_bits(at.parts().vertices)) {
-    const ValueKey key = at.key_of(v);
-    least = std::min(least, key);
-    greatest = std::max(greatest, key);
+  const int vertices = at.context().row->vertices;
+  for (int v = 0; v < vertices; ++v) {
+    const ValueKey key = keys[std::size_t(v)];
+    least = std::min(least, key);  // kNoKey is the greatest key
+    greatest = std::max(greatest, key == kNoKey ? 0 : key);
   }
   block.least = least;
   block.greatest = greatest;
@@ -50,15 +52,19 @@ void ShownSplits::add_parents(FrontCursor& at, bool shown, std::vector<Place>& p
   const Links& links = at.links();
   for (int k = 0; k < at.context().row->parents; ++k) {
     const FrontCursor::Neighbour parent = at.at(links.vertex[links.parent[std::size_t(k)]]);
-    if (!parent.is_split() || parent.is_shown() != shown || state_.is_root_block(parent.block)) continue;
+    if (parent.is_shown() != shown || !parent.is_split() || state_.is_root_block(parent.block)) continue;
     places.push_back({&state_.obtain_block(parent.block.scale, parent.block.position), parent.slot});
   }
 }
 
-bool ShownSplits::move_to(const Place& place) {
+void ShownSplits::move_to(const Place& place) {
   if (!cursor_) cursor_.emplace(state_);
   cursor_->move_to(place.block->scale, place.block->position);
-  return cursor_->gather_sides(place.slot);
+  if (!place.block->is_counting(place.slot)) {
+    cursor_->gather_one_sided(place.slot);
+  } else {
+    cursor_->gather_sides(place.slot);
+  }
 }
 
 // Gives points to the split of the diamond that the cursor found last. Returns how many tetrahedra it adds to the mesh.
@@ -85,7 +91,6 @@ bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
     add_parents(of, false, ancestors);
     for (std::size_t k = before; k < ancestors.size(); ++k) ancestors[k].block->shown |= bit(ancestors[k].slot);
   };
-  own.block->shown |= bit(own.slot);
   std::uint64_t tets = state_.tet_count + std::uint64_t(place_points(at, own));
   add_hidden_parents(at);
   for (std::size_t i = 0; i < ancestors.size(); ++i) {
@@ -94,13 +99,14 @@ bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
     tets += std::uint64_t(place_points(*cursor_, place));
     add_hidden_parents(*cursor_);
   }
-  ancestors.push_back(own);
   if (tets > max_tets) {
     for (const Place& place : ancestors) place.block->shown &= ~bit(place.slot);
     return false;
   }
+  own.block->shown |= bit(own.slot);
   state_.tet_count = tets;
-  state_.shown_count += ancestors.size();
+  state_.shown_count += ancestors.size() + 1;
+  state_.values->withheld -= own.block->is_counting(own.slot);
   for (const Place& place : ancestors) state_.values->withheld -= place.block->is_counting(place.slot);
   return true;
 }
@@ -121,7 +127,9 @@ void ShownSplits::hide(FrontCursor& at) {
     const Place place = places.back();
     places.pop_back();
     // A parent of several that were hidden may be here more than once.
-    if (!place.block->is_shown(place.slot) || place.block->is_counting(place.slot) || !move_to(place) || cursor_->has_shown_child()) continue;
+    if (!place.block->is_shown(place.slot) || place.block->is_counting(place.slot)) continue;
+    move_to(place);
+    if (cursor_->has_shown_child()) continue;
     hide_one(*cursor_);
     add_parents(*cursor_, true, places);
   }

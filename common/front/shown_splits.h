@@ -41,7 +41,7 @@ class ShownSplits {
     Slot slot;
   };
   void add_parents(FrontCursor& at, bool shown, std::vector<Place>& places);
-  bool move_to(const Place& place);
+  void move_to(const Place& place);
   std::int64_t place_points(FrontCursor& at, const Place& place);
   void hide_one(FrontCursor& at);
 
