@@ -45,22 +45,30 @@ class Domain {
     return unmoved(d.centre.x, last_.x) && unmoved(d.centre.y, last_.y) && unmoved(d.centre.z, last_.z);
   }
 
+  // What clamping does to a centre's coordinate c on an axis, and to those h below and above: bit 0 if it makes the
+  // lower two equal, bit 1 if the upper two.
+  [[nodiscard]] unsigned squeezed(int axis, std::int32_t c, std::int32_t h) const {
+    const std::int32_t last = axis == 0 ? last_.x : axis == 1 ? last_.y : last_.z;
+    const std::int32_t below = std::clamp(c - h, 0, last), middle = std::clamp(c, 0, last), above = std::clamp(c + h, 0, last);
+    return unsigned(below == middle) | unsigned(middle == above) << 1;
+  }
+
   // One bit for each tetrahedron of the diamond that exists, because it is not flat after clamping. 0: nothing of the
   // diamond exists.
   [[nodiscard]] unsigned tets(const Diamond& d) const {
-    const unsigned all = (1u << d.row->tets) - 1;
-    if (is_interior(d)) return all;
-    if ((d.centre.x | d.centre.y | d.centre.z) >= 0 && is_unmoved(d)) {
-      // Only a diamond whose centre lies in a face of the virtual grid reaches beyond the grid, with half of its
-      // tetrahedra.
-      const auto outside = [&d](int axis, std::int32_t c, std::int32_t last) {
-        return (c == 0 ? d.row->beyond[axis][0] : 0) | (c == last ? d.row->beyond[axis][1] : 0);
-      };
-      return all & ~(outside(0, d.centre.x, last_.x) | outside(1, d.centre.y, last_.y) | outside(2, d.centre.z, last_.z));
+    return tets(*d.row, {squeezed(0, d.centre.x, d.h), squeezed(1, d.centre.y, d.h), squeezed(2, d.centre.z, d.h)});
+  }
+  // The same, from squeezed() on each axis. The volume of a tetrahedron is a product of differences of coordinates, one
+  // an axis: it is 0 only if, on an axis, all vertices come to lie at one coordinate.
+  [[nodiscard]] static unsigned tets(const DiamondType& row, const std::array<unsigned, 3>& squeezed) {
+    unsigned flat = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (squeezed[axis] == 3) return 0;
+      const auto [below, above] = row.beyond[axis];
+      flat |= (squeezed[axis] & 1) != 0 ? below & ~above : 0;
+      flat |= (squeezed[axis] & 2) != 0 ? above & ~below : 0;
     }
-    unsigned mask = 0;
-    for (int i = 0; i < d.row->tets; ++i) mask |= unsigned(exists(positions(d, d.row->tet(i)))) << i;
-    return mask;
+    return ((1u << row.tets) - 1) & ~flat;
   }
 
   // One bit for each local vertex (kCentre not among them) of a tetrahedron in the mask.
