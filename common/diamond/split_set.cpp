@@ -16,12 +16,21 @@ std::uint64_t deposit_portably(std::uint64_t bits, std::uint64_t mask) {
   for (std::uint64_t left = mask; left != 0; left &= left - 1, bits >>= 1) result |= left & (~left + 1) & (~(bits & 1) + 1);
   return result;
 }
+// The inverse: moves the bits at the ones of `mask` to the lowest positions, in their order.
+std::uint64_t extract_portably(std::uint64_t bits, std::uint64_t mask) {
+  std::uint64_t result = 0;
+  for (std::uint64_t left = mask, to = 1; left != 0; left &= left - 1, to <<= 1) result |= (bits >> std::countr_zero(left) & 1) != 0 ? to : 0;
+  return result;
+}
 #if defined(__x86_64__)
 __attribute__((target("bmi2"))) std::uint64_t deposit_bmi2(std::uint64_t bits, std::uint64_t mask) { return _pdep_u64(bits, mask); }
+__attribute__((target("bmi2"))) std::uint64_t extract_bmi2(std::uint64_t bits, std::uint64_t mask) { return _pext_u64(bits, mask); }
 const bool kHasBmi2 = __builtin_cpu_supports("bmi2") != 0;
 std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return kHasBmi2 ? deposit_bmi2(bits, mask) : deposit_portably(bits, mask); }
+std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return kHasBmi2 ? extract_bmi2(bits, mask) : extract_portably(bits, mask); }
 #else
 std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return deposit_portably(bits, mask); }
+std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return extract_portably(bits, mask); }
 #endif
 
 }  // namespace
@@ -34,6 +43,20 @@ std::uint64_t SplitSet::count() const {
 
 std::uint64_t SplitSet::slots(UpdateIndex first, std::uint64_t occupancy) const {
   return deposit(some(first, unsigned(std::popcount(occupancy))), occupancy);
+}
+
+void SplitSet::insert(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {
+  const std::uint64_t bits = extract(slots, occupancy);
+  const unsigned shift = first % 64;
+  words_[first / 64] |= bits << shift;
+  if (shift != 0 && bits >> (64 - shift) != 0) words_[first / 64 + 1] |= bits >> (64 - shift);
+}
+
+void SplitSet::erase(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {
+  const std::uint64_t bits = extract(slots, occupancy);
+  const unsigned shift = first % 64;
+  words_[first / 64] &= ~(bits << shift);
+  if (shift != 0 && bits >> (64 - shift) != 0) words_[first / 64 + 1] &= ~(bits >> (64 - shift));
 }
 
 std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {

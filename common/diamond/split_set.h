@@ -27,9 +27,11 @@ class SplitSet {
   void insert(UpdateIndex i) { words_[i / 64] |= std::uint64_t(1) << (i % 64); }
   void erase(UpdateIndex i) { words_[i / 64] &= ~(std::uint64_t(1) << (i % 64)); }
   [[nodiscard]] std::uint64_t count() const;
-  // The slots of a supercube's diamonds that are in it. occupancy: of that supercube, not 0; first: the number of its
-  // first diamond.
+  // The slots of a supercube's diamonds that are in it; inserts and erases some. occupancy: of that supercube, not 0,
+  // and the slots are among it; first: the number of its first diamond.
   [[nodiscard]] std::uint64_t slots(UpdateIndex first, std::uint64_t occupancy) const;
+  void insert(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots);
+  void erase(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots);
   [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;  // all of it, in order
   [[nodiscard]] std::vector<std::uint64_t>& words() { return words_; }
   friend bool operator==(const SplitSet&, const SplitSet&) = default;

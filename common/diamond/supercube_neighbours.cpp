@@ -140,7 +140,8 @@ SetFinder::Found SetFinder::find(int where, const SupercubePlace& place) {
   BrickIndex& brick = where >= kCorner && where < kFiner ? looked_up : brick_at(where, at);
   if (brick == kUnknown) brick = set_.find_brick(place.scale, at).value_or(kNone);
   if (brick == kNone) return none();
-  const unsigned bit = parity_of(p) | parity_of({p.x >> 1, p.y >> 1, p.z >> 1}) << 3;
+  constexpr std::array<std::uint8_t, 4> kSpread{0, 1, 8, 9};
+  const unsigned bit = kSpread[std::size_t(p.x & 3)] | unsigned(kSpread[std::size_t(p.y & 3)]) << 1 | unsigned(kSpread[std::size_t(p.z & 3)]) << 2;
   const SupercubeSet::Brick& b = set_.bricks()[brick];
   if (!(b.mask >> bit & 1)) return none();
   const SupercubeIndex s = b.first_supercube + count_below(b.mask, int(bit));

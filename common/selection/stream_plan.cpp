@@ -4,6 +4,7 @@
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <boost/unordered/unordered_flat_set.hpp>
 
+#include "common/diamond/ancestor_inserter.h"
 #include "common/ivm/batch_encoder.h"
 #include "common/ivm/refinement.h"
 
@@ -20,25 +21,38 @@ constexpr std::uint32_t kMaxVisited = 1 << 16;  // supercubes and updates visite
 
 // The batch under construction.
 struct StreamPlan::BatchBuilder {
+  AncestorInserter inserter;
   SetNeighbours around;              // of the supercube visited
   std::vector<SetNeighbours> above;  // of ancestors, by scale
   std::vector<SlotGroup> groups;
   boost::unordered_flat_map<SupercubeIndex, std::uint32_t> group_of;  // by supercube
   boost::unordered_flat_set<BrickIndex> bricks;
-  std::size_t max_bytes = 0, bytes = kPlaneBytes;
+  std::size_t update_bytes = 0, max_bytes = 0, bytes = kPlaneBytes;
   std::uint32_t updates = 0;
   std::uint32_t visited = 0;  // supercubes and updates
 
-  BatchBuilder(const IntervalVolume& volume, std::size_t max_payload)
-      : around(volume.set()), above(kMaxLevels, SetNeighbours(volume.set())), max_bytes(max_payload) {}
-  SlotGroup* find(SupercubeIndex supercube) {
-    if (!groups.empty() && groups.back().supercube == supercube) return &groups.back();
-    const auto found = group_of.find(supercube);
-    return found == group_of.end() ? nullptr : &groups[found->second];
+  BatchBuilder(const IntervalVolume& volume, SplitSet& sent, std::size_t max_payload)
+      : inserter(volume.set(), sent),
+        around(volume.set()),
+        above(kMaxLevels, SetNeighbours(volume.set())),
+        update_bytes(1 + volume.keys().width()),
+        max_bytes(max_payload) {}
+  // How much longer `count` updates of a supercube make the payload; and the most that it can be.
+  [[nodiscard]] std::size_t bytes_of(const SlotGroup& added, std::size_t count) const {
+    if (group_of.contains(added.supercube)) return count * update_bytes;
+    return count * update_bytes + kSupercubeBytes + (bricks.contains(added.brick) ? 0 : kBrickBytes);
   }
-  SlotGroup& add(const SlotGroup& group) {
-    group_of.emplace(group.supercube, std::uint32_t(groups.size()));
-    return groups.emplace_back(group);
+  [[nodiscard]] std::size_t most_bytes_of(std::size_t count) const { return count * update_bytes + kSupercubeBytes + kBrickBytes; }
+  void put(const SlotGroup& added, std::uint32_t count) {
+    updates += count;
+    bytes += count * update_bytes;
+    const auto [group, is_new] = group_of.emplace(added.supercube, std::uint32_t(groups.size()));
+    if (!is_new) {
+      groups[group->second].slots |= added.slots;
+      return;
+    }
+    groups.push_back(added);
+    bytes += kSupercubeBytes + (bricks.insert(added.brick).second ? kBrickBytes : 0);
   }
 };
 
@@ -166,22 +180,43 @@ bool StreamPlan::add_with_ancestors(const Place& place, SetNeighbours& around, B
 }
 
 bool StreamPlan::add(const Place& place, BatchBuilder& builder) {
-  std::size_t bytes = 1 + volume_->keys().width();
-  SlotGroup* group = builder.find(place.supercube);
-  const bool new_brick = group == nullptr && !builder.bricks.contains(place.brick);
-  if (group == nullptr) bytes += kSupercubeBytes + (new_brick ? kBrickBytes : 0);
-  if (builder.bytes + bytes > builder.max_bytes || builder.updates == kBatchUpdatesMost || sent_count_ >= room_) return false;
-  builder.bytes += bytes;
-  ++builder.updates;
-  if (new_brick) builder.bricks.insert(place.brick);
-  if (group == nullptr) group = &builder.add({place.brick, place.supercube, place.key, 0});
-  group->slots |= std::uint64_t(1) << place.slot;
+  const SlotGroup update{place.brick, place.supercube, place.key, std::uint64_t(1) << place.slot};
+  if (builder.bytes + builder.bytes_of(update, 1) > builder.max_bytes || !has_room(builder, 1)) return false;
   sent_.insert(place.index);
-  ++sent_count_;
-  Pending& w = pending_[place.brick];
-  --w.unsent;
-  if (w.wanted > w.unsent) set_pending(place.brick, w.rank, w.unsent);
+  put(update, builder);
   return true;
+}
+
+// Adds unsent updates of a supercube and their missing ancestors at once. Adds nothing and returns false if the batch
+// may be full first.
+bool StreamPlan::add_all(const SlotGroup& group, BatchBuilder& builder) {
+  const auto inserted = builder.inserter.insert(group);
+  std::size_t bytes = 0, updates = 0;
+  for (const SlotGroup& g : inserted) {
+    const auto count = std::size_t(std::popcount(g.slots));
+    updates += count;
+    bytes += builder.most_bytes_of(count);
+  }
+  if (builder.bytes + bytes > builder.max_bytes || !has_room(builder, updates)) {
+    builder.inserter.take_back();
+    return false;
+  }
+  for (const SlotGroup& g : inserted) put(g, builder);
+  return true;
+}
+
+// Adds updates that are in sent_ by now.
+void StreamPlan::put(const SlotGroup& updates, BatchBuilder& builder) {
+  const auto count = unsigned(std::popcount(updates.slots));
+  builder.put(updates, count);
+  sent_count_ += count;
+  Pending& w = pending_[updates.brick];
+  w.unsent = std::uint16_t(w.unsent - count);
+  if (w.wanted > w.unsent) set_pending(updates.brick, w.rank, w.unsent);
+}
+
+bool StreamPlan::has_room(const BatchBuilder& builder, std::size_t updates) const {
+  return builder.updates + updates <= kBatchUpdatesMost && sent_count_ + updates <= room_;
 }
 
 // Adds the updates of a brick that belong to the band. False if the batch is full first.
@@ -231,7 +266,6 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
     return rest;
   }
   builder.visited += count;
-  builder.around.move_to(first.key);
   rest = {};
   if (!add_band(ranking, first, candidates, builder, rest)) return {};
   for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
@@ -245,7 +279,9 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
 bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest) {
   const float in_band = ranking.least(band_), least = budget_ ? ranking.least(1) : 0;
   const UpdateIndex first = place.index;
-  std::uint64_t slots = volume_->set().occupancy()[place.supercube];  // those of the updates from `at` on
+  const std::uint64_t occupancy = volume_->set().occupancy()[place.supercube];
+  std::uint64_t slots = occupancy;  // those of the updates from `at` on
+  SlotGroup in_it{place.brick, place.supercube, place.key, 0};
   float greatest = 0;
   unsigned at = 0;
   for (; candidates != 0; candidates &= candidates - 1) {
@@ -256,8 +292,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
     if (importance > 0 && !ranking.meets_roi(place.slot)) importance = 0;
     importance = std::max(importance, least);
     if (importance > 0 && importance >= in_band) {
-      place.index = first + k;
-      if (!add_with_ancestors(place, builder.around, builder)) return false;
+      in_it.slots |= std::uint64_t(1) << place.slot;
       continue;
     }
     rest.error_step = std::max(rest.error_step, error_step);
@@ -265,11 +300,17 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
     greatest = std::max(greatest, importance);
   }
   rest.rank = ranking.rank(greatest);
+  if (in_it.slots == 0 || add_all(in_it, builder)) return true;
+  builder.around.move_to(place.key);  // the batch is nearly full: one at a time
+  for (const Slot slot : set_bits<Slot>(in_it.slots)) {
+    if (!add_with_ancestors({place.key, place.brick, place.supercube, slot, first + count_below(occupancy, slot)}, builder.around, builder))
+      return false;
+  }
   return true;
 }
 
 std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
-  BatchBuilder builder(*volume_, max_bytes);
+  BatchBuilder builder(*volume_, sent_, max_bytes);
   while (!done()) {
     if (next_brick_ == 0) {
       if (builder.bytes >= kSmallBatch) break;

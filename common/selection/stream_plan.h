@@ -102,6 +102,9 @@ class StreamPlan {
   bool add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest);
   bool add_with_ancestors(const Place& place, SetNeighbours& around, BatchBuilder& builder);
   bool add(const Place& place, BatchBuilder& builder);
+  bool add_all(const SlotGroup& group, BatchBuilder& builder);
+  void put(const SlotGroup& updates, BatchBuilder& builder);
+  [[nodiscard]] bool has_room(const BatchBuilder& builder, std::size_t updates) const;
 
   std::shared_ptr<const IntervalVolume> volume_;
   SplitSet sent_;

@@ -6,6 +6,7 @@
 #include <bit>
 #include <random>
 
+#include "common/diamond/ancestor_inserter.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
@@ -72,6 +73,56 @@ TEST_P(SplitSets, NeighboursAreTheSupercubesFoundByTheirPlaces) {
         }
       }
     }
+  }
+}
+
+TEST_P(SplitSets, SlotsAreInsertedAndErasedTogether) {
+  const SupercubeSet& set = volume_.set();
+  SplitSet expected = some_of(volume_, 0.3, random_), split = expected;
+  for (const bool inserts : {true, false}) {
+    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+        const std::uint64_t slots = set.occupancy()[s] & (std::uint64_t(random_()) << 32 | random_());
+        for (const Slot slot : set_bits<Slot>(slots)) {
+          const UpdateIndex i = set.place_in(b, s, key, slot).index;
+          inserts ? expected.insert(i) : expected.erase(i);
+        }
+        inserts ? split.insert(set.first(b, s), set.occupancy()[s], slots) : split.erase(set.first(b, s), set.occupancy()[s], slots);
+      });
+    }
+    ASSERT_EQ(split, expected);
+  }
+}
+
+TEST_P(SplitSets, AncestorsAreInsertedBeforeTheirDescendants) {
+  const SupercubeSet& set = volume_.set();
+  SplitSet split(set.size());
+  AncestorInserter inserter(set, split);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Place place = set.place(UpdateIndex(random_() % set.size()));
+    const std::uint64_t occupancy = set.occupancy()[place.supercube];
+    const std::uint64_t slots = occupancy & random_() * 0x100000001u & ~split.slots(set.first(place.brick, place.supercube), occupancy);
+    if (slots == 0) continue;
+    const SplitSet before = split;
+    SplitSet expected = before;
+    const SplitSet closed = select(set, [&](const Place& p) { return p.supercube == place.supercube && (slots >> p.slot & 1) != 0; });
+    for (UpdateIndex i{0}; i < set.size(); ++i) {
+      if (closed.contains(i)) expected.insert(i);
+    }
+    SplitSet replayed = before;
+    for (const SlotGroup& g : inserter.insert({place.brick, place.supercube, place.key, slots})) {
+      for (const Slot slot : set_bits<Slot>(g.slots)) {
+        const Place p = set.place_in(g.brick, g.supercube, g.key, slot);
+        for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_TRUE(replayed.contains(parent)); });
+        ASSERT_FALSE(replayed.contains(p.index));
+        replayed.insert(p.index);
+      }
+    }
+    ASSERT_EQ(replayed, expected);
+    ASSERT_EQ(split, expected);
+    if (trial % 2 != 0) continue;
+    inserter.take_back();
+    ASSERT_EQ(split, before);
   }
 }
 
