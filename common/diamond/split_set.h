@@ -1,14 +1,10 @@
-// The split diamonds as a set of updates, and the diamonds that can be split next: all that a server knows of a
-// client's mesh.
+// The split diamonds as a set of updates.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
-#include "common/diamond/domain.h"
 #include "common/diamond/supercube.h"
-#include "common/diamond/supercube_neighbours.h"
 
 namespace intervale {
 
@@ -38,32 +34,6 @@ class SplitSet {
 
  private:
   std::vector<std::uint64_t> words_;
-};
-
-// Tells which diamonds of a supercube have all their parents split.
-class SplittableSlots {
- public:
-  // All must outlive it; `split` must not change between move_to() and slots().
-  SplittableSlots(const SupercubeSet& set, const Domain& domain, const SplitSet& split) : domain_(domain), split_(split), around_(set) {}
-
-  void move_to(SupercubeKey key);
-
-  // At the supercube that it moved to.
-  [[nodiscard]] SetNeighbours& around() { return around_; }
-
-  // The slots of diamonds that exist, whose split would not be a no-op, and whose parents are split, whether they are
-  // split themselves or not.
-  [[nodiscard]] std::uint64_t slots();
-
- private:
-  // The split slots of a neighbour.
-  [[nodiscard]] std::uint64_t split_slots(int where);
-  [[nodiscard]] std::uint64_t slots_inside();
-  const Domain& domain_;
-  const SplitSet& split_;
-  SetNeighbours around_;
-  std::array<std::uint64_t, kCorner> split_slots_{};  // by neighbour
-  std::uint64_t known_ = 0;                           // a bit for each that was looked up
 };
 
 }  // namespace intervale

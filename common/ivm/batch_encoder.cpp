@@ -1,14 +1,18 @@
 #include "common/ivm/batch_encoder.h"
 
+#include <array>
 #include <bit>
 #include <memory>
 
 #include "common/codec/byte_planes.h"
 #include "common/codec/split_names.h"
-#include "common/ivm/vertex_keys.h"
+#include "common/ivm/split_lattice.h"
 
 namespace intervale {
 namespace {
+
+constexpr std::array<int, 3> kVertices{8, 6, 10};  // by class
+constexpr std::uint64_t kAllSlots = (std::uint64_t(1) << kSlots) - 1;
 
 // A diamond that can be split when its turn comes.
 struct Candidate {
@@ -23,24 +27,29 @@ class BatchEncoder {
     const SupercubeSet& set = volume.set();
     const Description& d = volume.description();
     const KeySides sides(d.format, d.range);
-    SplittableSlots splittable(set, volume.domain(), split);
+    SplitLattice lattice(volume, split);
     VertexKeys around{};
     ready_.reserve(groups.size());
     first_.reserve(groups.size());
+    candidates_.reserve(16 * groups.size());  // about as many as there are
     for (const SlotGroup& g : groups) {
-      splittable.move_to(g.key);
+      lattice.move_to(g.key);
       const std::uint64_t occupancy = set.occupancy()[g.supercube];
       const UpdateIndex first = set.first(g.brick, g.supercube);
-      ready_.push_back(splittable.slots() & (~split.slots(first, occupancy) | g.slots));
+      ready_.push_back(lattice.splittable(kAllSlots & (~split.slots(first, occupancy) | g.slots)));
       first_.push_back(candidates_.size());
+      candidates_.resize(candidates_.size() + std::size_t(std::popcount(ready_.back())));
+      Candidate* c = &candidates_[first_.back()];
       for (const Slot slot : set_bits<Slot>(ready_.back())) {
-        gather_vertex_keys(volume, splittable.around(), slot, around);
-        Candidate& c = candidates_.emplace_back();
-        c.near = std::uint8_t(nearness(sides, d.refine, around, diamond_type(kTypeOfSlot[slot]).vertices));
-        if ((g.slots >> slot & 1) == 0) continue;
-        ++updates_;
-        c.key = volume.key(first + count_below(occupancy, slot));
-        c.predicted = predict_value(class_of_slot(slot), scale_of_key(g.key), around, d.weights, d.format.last);
+        lattice.gather(slot, around);
+        const int cls = class_of_slot(slot);
+        c->near = std::uint8_t(nearness(sides, d.refine, around, kVertices[std::size_t(cls)]));
+        if ((g.slots >> slot & 1) != 0) {
+          ++updates_;
+          c->key = volume.key(first + count_below(occupancy, slot));
+          c->predicted = predict_value(cls, scale_of_key(g.key), around, d.weights, d.format.last);
+        }
+        ++c;
       }
     }
   }

@@ -10,7 +10,7 @@
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/refinement.h"
-#include "common/ivm/vertex_keys.h"
+#include "common/ivm/split_lattice.h"
 #include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
 #include "server/builder/field_hierarchy.h"
@@ -28,9 +28,13 @@ struct Fixture {
   std::shared_ptr<const IntervalVolume> sigma = std::make_shared<const IntervalVolume>(*hierarchy.compact());
   std::vector<Place> places;                        // of all updates, coarse to fine
   std::vector<std::vector<std::uint8_t>> payloads;  // of the whole stream
+  SplitSet all{sigma->size()};
 
   Fixture() {
-    sigma->set().for_each_down([this](const Place& p) { places.push_back(p); });
+    sigma->set().for_each_down([this](const Place& p) {
+      places.push_back(p);
+      all.insert(p.index);
+    });
     StreamPlan plan(sigma);
     plan.set_lod(Lod{});
     while (auto batch = plan.next(protocol::kMaxBatchPayload)) payloads.push_back(std::move(batch->payload));
@@ -58,10 +62,11 @@ void look_up_update(benchmark::State& state) {
   const auto& f = fixture();
   VertexKeys around{};
   for (auto _ : state) {
-    SetNeighbours neighbours(f.sigma->set());
+    SplitLattice lattice(*f.sigma, f.all);
     for (const Place& p : f.places) {
-      neighbours.move_to(p.key);
-      gather_vertex_keys(*f.sigma, neighbours, p.slot, around);
+      lattice.move_to(p.key);
+      benchmark::DoNotOptimize(lattice.splittable(std::uint64_t(1) << p.slot));
+      lattice.gather(p.slot, around);
       benchmark::DoNotOptimize(around);
       benchmark::DoNotOptimize(f.sigma->key(p.index));
     }
@@ -73,11 +78,11 @@ BENCHMARK(look_up_update)->Unit(benchmark::kMillisecond);
 void predict_values(benchmark::State& state) {
   const auto& f = fixture();
   const Description& d = f.sigma->description();
-  SetNeighbours neighbours(f.sigma->set());
+  SplitLattice lattice(*f.sigma, f.all);
   std::vector<VertexKeys> around(f.places.size());
   for (std::size_t i = 0; i < f.places.size(); ++i) {
-    neighbours.move_to(f.places[i].key);
-    gather_vertex_keys(*f.sigma, neighbours, f.places[i].slot, around[i]);
+    lattice.move_to(f.places[i].key);
+    if (lattice.splittable(std::uint64_t(1) << f.places[i].slot) != 0) lattice.gather(f.places[i].slot, around[i]);
   }
   for (auto _ : state) {
     for (std::size_t i = 0; i < f.places.size(); ++i) {
@@ -113,9 +118,7 @@ void encode_one_batch(benchmark::State& state) {
       groups.push_back({b, s, key, set.occupancy()[s]});
     });
   }
-  SplitSet split(f.sigma->size());
-  for (const Place& p : f.places) split.insert(p.index);
-  for (auto _ : state) benchmark::DoNotOptimize(encode_batch(*f.sigma, split, groups));
+  for (auto _ : state) benchmark::DoNotOptimize(encode_batch(*f.sigma, f.all, groups));
   count_items(state, updates);
 }
 BENCHMARK(encode_one_batch)->Unit(benchmark::kMillisecond);

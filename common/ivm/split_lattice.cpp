@@ -1,0 +1,176 @@
+#include "common/ivm/split_lattice.h"
+
+namespace intervale {
+
+SplitLattice::Tables SplitLattice::make_tables() {
+  Tables t;
+  for (Slot slot{0}; slot < kSlots; ++slot) {
+    const unsigned type = kTypeOfSlot[slot];
+    const DiamondType& row = diamond_type(type);
+    const std::array<int, 3> c{int(type & 3), int(type >> 2 & 3), int(type >> 4 & 3)};
+    const auto point = [&c](Offset to) { return Point(point_of(c[0] + to.x, c[1] + to.y, c[2] + to.z)); };
+    t.centre[slot] = point({});
+    for (std::size_t v = 0; v < kMaxVertices; ++v) t.vertex[slot][v] = point(row.vertex[v < row.vertices ? v : 0]);
+    for (std::size_t k = 0; k < kMaxParents; ++k) {
+      const Offset to = row.parent[k < row.parents ? k : 0];
+      t.parent[slot][k] = point(to);
+      while (row.vertex[t.parent_vertex[slot][k]] != to) ++t.parent_vertex[slot][k];
+    }
+    for (unsigned n = 0; n < 8; ++n) {
+      bool behind = row.cls < 2, ahead = true;  // no vertex is of class 2 and the same scale
+      for (unsigned k = 0; k < 3; ++k) {
+        if ((n >> k & 1) == 0) continue;
+        behind = behind && c[k] == 3;
+        ahead = ahead && c[k] == 0;
+      }
+      bool uses = false;
+      for (std::size_t v = 0; v < row.vertices; ++v) {
+        const Offset to = row.vertex[v];
+        uses = uses || (unsigned(c[0] + to.x < 0) | unsigned(c[1] + to.y < 0) << 1 | unsigned(c[2] + to.z < 0) << 2) == n;
+      }
+      t.users[n] |= std::uint64_t(uses) << slot;
+      t.behind[n] |= std::uint64_t(behind) << slot;
+      t.ahead[n] |= std::uint64_t(ahead) << slot;
+    }
+  }
+  return t;
+}
+
+const SplitLattice::Tables& SplitLattice::tables() {
+  static const Tables made = make_tables();
+  return made;
+}
+
+SplitLattice::SplitLattice(const IntervalVolume& volume, const SplitSet& split)
+    : volume_(volume),
+      split_(split),
+      coarser_(std::size_t(volume.domain().levels()) + 1, Coarser{.finder = SetFinder(volume.set())}),
+      finder_(volume.set()) {
+  const int levels = volume.domain().levels();
+  Keys& corners = coarser_.back().keys;
+  corners.fill(kNoKey);
+  const Diamond root(volume.domain().root());
+  for (int v = 0; v < kRootVertices; ++v) {
+    const Vertex c = root.vertex(v);
+    corners[std::size_t(point_of(c.x >> levels, c.y >> levels, c.z >> levels))] = volume.description().corners[std::size_t(v)];
+  }
+}
+
+// Loads the points of coarser scales.
+void SplitLattice::load_coarser(int scale, Vertex position, Keys& keys) {
+  const Keys& even = coarser(scale + 1, {position.x >> 1, position.y >> 1, position.z >> 1}, parity_of(position));
+  const std::int32_t first = point_of(2 * (position.x & 1), 2 * (position.y & 1), 2 * (position.z & 1));
+  keys.fill(kNoKey);
+  for (int z = 0; z < 3; ++z) {
+    for (int y = 0; y < 3; ++y) {
+      for (int x = 0; x < 3; ++x) {
+        keys[std::size_t(point_of(2 * x, 2 * y, 2 * z))] = even[std::size_t(first + point_of(x, y, z) - point_of(0, 0, 0))];
+      }
+    }
+  }
+}
+
+// Loads the points of one supercube of the same scale. neighbour: a bit for each axis; towards: -1 if it lies behind, 1
+// if it lies ahead. finder: at `from`.
+void SplitLattice::load_neighbour(SetFinder& finder, const SupercubePlace& from, unsigned neighbour, int towards, Keys& keys) {
+  const int x = towards * int(neighbour & 1), y = towards * int(neighbour >> 1 & 1), z = towards * int(neighbour >> 2);
+  const SupercubePlace place{from.scale, {from.position.x + x, from.position.y + y, from.position.z + z}};
+  if (!place.exists()) return;
+  const SetFinder::Found found = finder.find(kHere + x + 3 * y + 9 * z, place);
+  if (found.occupancy == 0) return;
+  const std::uint64_t used = (towards < 0 ? tables_.behind : tables_.ahead)[neighbour];
+  ValueKey* const first = keys.data() + 4 * (point_of(x, y, z) - point_of(0, 0, 0));
+  const ValueKeys& all = volume_.keys();
+  const std::uint8_t* const bytes = all.width() == 1 ? all.bytes().data() : nullptr;
+  for (const Slot slot : set_bits<Slot>(split_.slots(found.first, found.occupancy) & used)) {
+    const UpdateIndex i = found.index(slot);
+    first[tables_.centre[slot]] = bytes != nullptr ? bytes[i] : all[i];
+  }
+}
+
+// half: of the finer supercube whose points are needed, a bit for each axis.
+const SplitLattice::Keys& SplitLattice::coarser(int scale, Vertex position, unsigned half) {
+  Coarser& here = coarser_[std::size_t(scale)];
+  if (&here == &coarser_.back()) return here.keys;  // the corners of the domain
+  const SupercubeKey key = supercube_key(scale, position);
+  if (here.key != key) {
+    load_coarser(scale, position, here.keys);
+    here.finder.move_to(scale, position);
+    here.key = key;
+    here.loaded = 0;
+  }
+  for (unsigned n = 0; n < 8; ++n) {
+    if ((n & ~half) == 0 && (here.loaded >> n & 1) == 0) load_neighbour(here.finder, {scale, position}, n, 1, here.keys);
+    here.loaded |= unsigned((n & ~half) == 0) << n;
+  }
+  return here.keys;
+}
+
+void SplitLattice::move_to(SupercubeKey key) {
+  place_ = {scale_of_key(key), position_of_key(key)};
+  is_interior_ = is_interior(volume_.domain(), place_.scale, place_.position);
+  load_coarser(place_.scale, place_.position, keys_);
+  finder_.move_to(place_.scale, place_.position);
+  for (const unsigned n : {0u, 1u, 2u, 4u}) load_neighbour(finder_, place_, n, -1, keys_);  // the parents are in these
+}
+
+std::uint64_t SplitLattice::splittable(std::uint64_t slots) {
+  const std::uint64_t ready = is_interior_ ? splittable_inside(slots) : splittable_at_border(slots);
+  for (const unsigned n : {3u, 5u, 6u}) {
+    if ((ready & tables_.users[n]) != 0) load_neighbour(finder_, place_, n, -1, keys_);
+  }
+  return ready;
+}
+
+std::uint64_t SplitLattice::splittable_inside(std::uint64_t slots) const {
+  const auto split = [this](Point p) { return unsigned(keys_[p] != kNoKey); };
+  std::uint64_t ready = 0;
+  for (const Slot slot : set_bits<Slot>(slots)) {
+    const auto& parent = tables_.parent[slot];
+    ready |= std::uint64_t(split(parent[0]) & split(parent[1]) & split(parent[2]) & split(parent[3])) << slot;
+  }
+  return ready;
+}
+
+std::uint64_t SplitLattice::splittable_at_border(std::uint64_t slots) {
+  const Tables& t = tables_;
+  const Domain& domain = volume_.domain();
+  const int scale = place_.scale;
+  const Vertex p = place_.position;
+  std::array<std::array<unsigned, 4>, 3> squeezed{};  // by axis and coordinate
+  for (int i = 0; i < 4; ++i) {
+    const auto on_axis = [&](int axis, std::int32_t at) { return domain.squeezed(axis, (4 * at + i) << scale, 1 << scale); };
+    squeezed[0][std::size_t(i)] = on_axis(0, p.x);
+    squeezed[1][std::size_t(i)] = on_axis(1, p.y);
+    squeezed[2][std::size_t(i)] = on_axis(2, p.z);
+  }
+  std::uint64_t ready = 0;
+  for (const Slot slot : set_bits<Slot>(slots)) {
+    const unsigned type = kTypeOfSlot[slot];
+    const DiamondType& row = diamond_type(type);
+    const std::array<unsigned, 3> here{squeezed[0][type & 3], squeezed[1][type >> 2 & 3], squeezed[2][type >> 4 & 3]};
+    // A no-op: the spine of a class 2 diamond lies along its odd axis.
+    if (scale == 0 && row.cls == 2 && here[(type & 1) != 0 ? 0 : (type >> 2 & 1) != 0 ? 1 : 2] != 0) continue;
+    const unsigned tets = Domain::tets(row, here);
+    const bool is_whole = tets + 1 == 1u << row.tets;
+    exist_[slot] = is_whole ? (1u << row.vertices) - 1 : Domain::vertices(row, tets);
+    bool all = tets != 0;
+    for (std::size_t k = 0; k < kMaxParents; ++k) {
+      const bool exists = (exist_[slot] >> t.parent_vertex[slot][k] & 1) != 0;
+      all = all && (!exists || keys_[t.parent[slot][k]] != kNoKey);
+    }
+    ready |= std::uint64_t(all) << slot;
+  }
+  return ready;
+}
+
+void SplitLattice::replace_missing(Slot slot, VertexKeys& keys) const {
+  const int count = diamond_type(kTypeOfSlot[slot]).vertices;
+  if (exist_[slot] == (1u << count) - 1) return;
+  for (int v = 0; v < count; ++v) {
+    if ((exist_[slot] >> v & 1) == 0) keys[std::size_t(v)] = kNoKey;
+  }
+  fill_missing(keys, count);
+}
+
+}  // namespace intervale
