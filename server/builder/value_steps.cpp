@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::size_t kMostExact = std::size_t(1) << 16;  // values of an exact format that is chosen unasked
 constexpr std::size_t kGrain = 1 << 14;                   // samples that a thread takes at once
+constexpr int kDefaultBits = 11;                          // 2^11 steps or more where nothing else is asked for
 constexpr double kMostSteps = 0x1p53;                     // from 0: whole numbers that a double distinguishes
 
 using Indices = tbb::blocked_range<std::size_t>;
@@ -123,7 +124,7 @@ double default_step(SampleType type, double least, double greatest) {
   std::frexp(greatest / 2 - least / 2, &exponent);  // halved: the difference of two doubles can overflow
   std::frexp(std::max(std::fabs(least), std::fabs(greatest)), &largest);
   const int ulp = type == SampleType::f32 ? std::max(largest - 24, -149) : std::max(largest - 53, -1074);
-  return std::ldexp(1.0, std::max(exponent - 16, ulp));
+  return std::ldexp(1.0, std::max(exponent - kDefaultBits, ulp));
 }
 
 // The numbers of the type f32 from the least sample to the greatest one.

@@ -17,7 +17,7 @@ namespace intervale {
 // Whole numbers are exact, with step 1; `step` may be left out, 0 or 1. Fails if they span all 2^32 values of a type.
 // Floats without `step`: exact if there is a step of which at most 2^16 values, and no more between the least and the
 // greatest one, are whole multiples (exact_step.h). If not, a power of two: the greatest one that divides the distance
-// of the least and the greatest sample into at least 2^16 steps, or the distance of neighbouring numbers of the type
+// of the least and the greatest sample into at least 2^11 steps, or the distance of neighbouring numbers of the type
 // around the largest sample, whichever is greater.
 // Floats with a step greater than 0: the nearest multiples of the step.
 // Floats with step 0: exact. As without `step` if that is exact; otherwise f32 in the type's own numbers (step 0 of the

@@ -150,8 +150,8 @@ void add_build_command(Program& program) {
       "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range, and cannot be served yet");
   command
       .add_option("--step", o->step,
-                  "Distance of the values that floats are rounded to; 0: exact. Default: exact if 65536 steps are enough, else a power of "
-                  "two")
+                  "Distance of the values that floats are rounded to, so that each is off by S/2 at most; 0: exact. Default: exact if 65536 "
+                  "steps are enough, else a power of two: 2048 to 4096 steps from the least to the greatest value")
       ->type_name("S");
   command.add_option("--refine", o->refine, "What to refine: boundary: the surfaces of the range only; uniform: the inside too")
       ->check(CLI::IsMember({"boundary", "uniform"}))
