@@ -12,17 +12,17 @@
 namespace intervale {
 
 // A whole number of either sign that is mostly small: whether it is 0, its sign, how many bits its size has, the two
-// below the highest, and the rest as raw bits. Sizes below 2^33.
+// below the highest, and the rest as raw bits. Sizes below 2^33. What is likely may depend on a quarter, 0 to 3.
 struct SignedModel {
-  static constexpr int kLengths = 18;  // lengths with models of their own; longer numbers say theirs in raw bits
-  BitModel is_zero, is_negative;
+  static constexpr int kLengths = 18;            // lengths with models of their own; longer numbers say theirs in raw bits
+  std::array<BitModel, 4> is_zero, is_negative;  // by quarter
   std::array<BitModel, kLengths> longer;
   std::array<std::array<BitModel, 3>, kLengths> below;
 
   template <class Coder>
-  std::int64_t code(Coder& coder, std::int64_t value = 0) {
-    if (coder.bit(is_zero, value == 0)) return 0;
-    const bool negative = coder.bit(is_negative, value < 0);
+  std::int64_t code(Coder& coder, std::int64_t value = 0, std::uint8_t quarter = 0) {
+    if (coder.bit(is_zero[quarter], value == 0)) return 0;
+    const bool negative = coder.bit(is_negative[quarter], value < 0);
     const std::uint64_t size = std::uint64_t(negative ? -value : value);
     const int length = int(std::bit_width(size)) - 1;  // below the highest bit
     int n = 0;
@@ -50,13 +50,17 @@ struct SignedModel {
 
 // What is known of a value before it is coded.
 struct PredictedValue {
-  ValueKey key = 0;        // the prediction
-  std::uint8_t level = 0;  // of activity
+  ValueKey key = 0;          // the prediction
+  std::uint8_t level = 0;    // of activity
+  std::uint8_t quarter = 0;  // of the prediction; 0 where residuals are so large that it tells nothing
 };
+inline constexpr int kSharpLevels = 18;  // of activity: where the quarter counts
 // cls, scale: of the diamond. around: the keys at its vertices, none of which is kNoKey.
 [[nodiscard]] inline PredictedValue predict_value(int cls, int scale, const VertexKeys& around, const ValueWeights& weights, ValueKey last) {
   const PredictorValues values = predictor_values(cls, around);
-  return {predict(values, weights.of[std::size_t(scale)][std::size_t(cls)], last), std::uint8_t(activity_level(values.activity))};
+  const Prediction prediction = predict(values, weights.of[std::size_t(scale)][std::size_t(cls)], last);
+  const int level = activity_level(values.activity);
+  return {prediction.key, std::uint8_t(level), level < kSharpLevels ? prediction.quarter : std::uint8_t(0)};
 }
 
 // All models of values.
@@ -73,7 +77,7 @@ struct ValueModels {
   template <class Coder>
   ValueKey code(Coder& coder, int cls, int scale, const PredictedValue& predicted, ValueKey key = 0) {
     SignedModel& model = of[std::size_t(cls)][scale == 0][predicted.level];
-    const std::int64_t coded = std::int64_t(predicted.key) + model.code(coder, std::int64_t(key) - std::int64_t(predicted.key));
+    const std::int64_t coded = std::int64_t(predicted.key) + model.code(coder, std::int64_t(key) - std::int64_t(predicted.key), predicted.quarter);
     return coded < 0 || coded > std::int64_t(kNoKey) ? kNoKey : ValueKey(coded);
   }
 };

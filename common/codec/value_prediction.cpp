@@ -67,11 +67,11 @@ PredictorValues predictor_values(int cls, const VertexKeys& keys) {
   return cls == 0 ? values_of<0>(keys) : cls == 1 ? values_of<1>(keys) : values_of<2>(keys);
 }
 
-ValueKey predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last) {
+Prediction predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last) {
   std::int64_t more = 128;
   for (int i = 0; i < kPredictors; ++i) more += weights[std::size_t(i)] * values.difference[std::size_t(i)];
-  const std::int64_t key = (values.spine + (more >> 8) + 8) >> 4;
-  return ValueKey(std::clamp<std::int64_t>(key, 0, last));
+  const std::int64_t sixteenths = values.spine + (more >> 8) + 8;
+  return {ValueKey(std::clamp<std::int64_t>(sixteenths >> 4, 0, last)), std::uint8_t(sixteenths >> 2 & 3)};
 }
 
 int activity_level(std::uint64_t activity) {

@@ -31,8 +31,11 @@ struct PredictorValues {
 // cls: the diamond's class, 0 to 2.
 [[nodiscard]] PredictorValues predictor_values(int cls, const VertexKeys& keys);
 
-// The predicted key, in [0, last].
-[[nodiscard]] ValueKey predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last);
+struct Prediction {
+  ValueKey key = 0;          // the nearest one, in [0, last]
+  std::uint8_t quarter = 0;  // of the half open interval from half a key below to half a key above, 0 to 3
+};
+[[nodiscard]] Prediction predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last);
 
 // A class of diamonds whose predictions are about equally far off: the activity in half octaves, at most
 // kActivityLevels - 1.

@@ -76,16 +76,15 @@ class PageCoder {
   bool code_error_levels(const BrickRun& block) {
     least_.assign(std::size_t(BlockLattice::kSide) * BlockLattice::kSide * BlockLattice::kSide, 0);
     bool is_valid = true;
-    std::int64_t last = 0;
     for (int cls = 2; cls >= 0; --cls) {
       for_each_in_block(block, cls, [&](UpdateIndex i, Slot slot, BlockLattice::Point centre) {
         const auto vertex = [&](int v) { return centre + BlockLattice::to_vertex(slot, v); };
-        const double error = spine_error(values_.format, lattice_.key(vertex(0)), lattice_.key(vertex(1)), lattice_.key(centre));
-        const std::int64_t least = std::max(least_[std::size_t(centre)], ValueVolume::level_of_error(values_.max_error, error));
-        const std::int64_t near = cls < 2 ? 0 : std::clamp<std::int64_t>(last - least, 0, kNear - 1);
-        last = least + error_models_[std::size_t(cls)][std::size_t(near)].code(coder_, kDecodes ? 0 : (*values_.error_levels)[i] - least);
-        is_valid = is_valid && last >= 0 && last < kErrorLevels;
-        const auto level = ErrorLevel(last);
+        const ErrorLevel of_spine = level_of(spine_error(values_.format, lattice_.key(vertex(0)), lattice_.key(vertex(1)), lattice_.key(centre)));
+        const std::int64_t least = std::max(least_[std::size_t(centre)], of_spine);
+        SignedModel& model = cls < 2 ? parent_models_[std::size_t(cls)] : model_of_class_2(slot, centre, int(least));
+        const std::int64_t coded = least + model.code(coder_, kDecodes ? 0 : (*values_.error_levels)[i] - least);
+        is_valid = is_valid && coded >= 0 && coded < kErrorLevels;
+        const auto level = ErrorLevel(coded);
         if constexpr (kDecodes) (*to_.error_levels)[i] = level;
         for (int v = 0; v < diamond_type(kTypeOfSlot[slot]).vertices; ++v) {
           ErrorLevel& of_vertex = least_[std::size_t(vertex(v))];
@@ -96,15 +95,38 @@ class PageCoder {
     return is_valid;
   }
 
+  [[nodiscard]] ErrorLevel level_of(double error) const { return ValueVolume::level_of_error(values_.max_error, error); }
+
+  // The children of class 2 are of a finer scale, and not known. What is: the error at the centre of each pair of
+  // vertices, and the levels of diamonds with the same parents.
+  SignedModel& model_of_class_2(Slot slot, BlockLattice::Point centre, int least) {
+    VertexKeys around{};
+    lattice_.gather(centre, slot, around);
+    fill_missing(around, diamond_type(kTypeOfSlot[slot]).vertices);
+    const ValueKey key = lattice_.key(centre);
+    double error = 0;
+    int parents = 0, sum = 0;
+    for (std::size_t v = 2; v < 6; ++v) error = std::max(error, spine_error(values_.format, around[v], around[v + 4], key));
+    for (int v = 2; v < 10; v += 2) {
+      const int level = least_[std::size_t(centre + BlockLattice::to_vertex(slot, v))];
+      parents += int(level != 0);
+      sum += level;
+    }
+    const int pairs = std::clamp(int(level_of(error)) - least, 0, kByPairs - 1);
+    const int mean = parents == 0 ? kByParents - 1 : std::clamp((2 * sum + parents) / (2 * parents) - least + 1, 0, kByParents - 2);
+    return class_2_models_[std::size_t(pairs)][std::size_t(mean)];
+  }
+
   static constexpr bool kDecodes = std::is_same_v<Values, DecodedValues>;
-  static constexpr int kNear = 7;  // how far the level coded before may lie above the least one, and make a difference
+  static constexpr int kByPairs = 7, kByParents = 8;
   Coder& coder_;
   const Values& to_;
   const PagedValues& values_;
   BlockLattice lattice_;
-  std::vector<ErrorLevel> least_;  // by point: the highest level of a child, so far
+  std::vector<ErrorLevel> least_;  // by point: the highest level of a diamond so far that has it as a vertex
   ValueModels models_;
-  std::array<std::array<SignedModel, kNear>, 3> error_models_;  // by class
+  std::array<SignedModel, 2> parent_models_;  // of error levels, of classes 0 and 1
+  std::array<std::array<SignedModel, kByParents>, kByPairs> class_2_models_;
 };
 
 }  // namespace

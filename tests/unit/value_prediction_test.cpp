@@ -26,7 +26,7 @@ TEST(ValuePrediction, IsExactForALinearField) {
   for (const Vertex centre : {Vertex{5, 3, 7}, Vertex{6, 3, 7}, Vertex{6, 4, 7}, Vertex{20, 12, 4}, Vertex{8, 12, 4}}) {
     for (const PredictorWeights& weights : {PredictorWeights{}, PredictorWeights{100, -50, 300}, PredictorWeights{-1024, 1024, 77}}) {
       const Case c = linear_case(centre, {7, -11, 5});
-      EXPECT_EQ(predict(predictor_values(c.diamond.row->cls, c.keys), weights, 5000), c.centre);
+      EXPECT_EQ(predict(predictor_values(c.diamond.row->cls, c.keys), weights, 5000).key, c.centre);
     }
   }
 }
@@ -38,7 +38,18 @@ TEST(ValuePrediction, StaysWithinTheKeys) {
     VertexKeys keys{};
     for (ValueKey& key : keys) key = ValueKey(random() % (std::uint64_t(last) + 1));
     const PredictorWeights weights{std::int16_t(random()), std::int16_t(random()), std::int16_t(random())};
-    EXPECT_LE(predict(predictor_values(i % 3, keys), weights, last), last);
+    EXPECT_LE(predict(predictor_values(i % 3, keys), weights, last).key, last);
+  }
+}
+
+TEST(ValuePrediction, TellsTheQuarterOfAKey) {
+  PredictorValues values;
+  const std::pair<int, int> rounded[]{{99, 2}, {100, 3}, {103, 3}, {104, 0}, {107, 0}, {108, 1}, {111, 1}, {112, 2}};  // of sixteenths
+  for (const auto& [spine, quarter] : rounded) {
+    values.spine = spine;
+    const Prediction prediction = predict(values, {}, 1000);
+    EXPECT_EQ(prediction.key, ValueKey((spine + 8) / 16));
+    EXPECT_EQ(prediction.quarter, quarter) << spine;
   }
 }
 
@@ -66,11 +77,13 @@ TEST(SignedModel, GivesBackEveryNumber) {
   }
   RangeEncoder encoder;
   SignedModel model;
-  for (const std::int64_t number : numbers) EXPECT_EQ(model.code(encoder, number), number);
+  std::uint8_t quarter = 0;
+  for (const std::int64_t number : numbers) EXPECT_EQ(model.code(encoder, number, quarter++ % 4), number);
   const auto bytes = encoder.finish();
   RangeDecoder decoder(bytes);
   model = {};
-  for (const std::int64_t number : numbers) ASSERT_EQ(model.code(decoder), number);
+  quarter = 0;
+  for (const std::int64_t number : numbers) ASSERT_EQ(model.code(decoder, 0, quarter++ % 4), number);
   EXPECT_TRUE(decoder.is_spent());
 }
 
