@@ -56,18 +56,43 @@ struct NormalEquations {
   }
 };
 
+constexpr std::uint32_t kMostFitted = 1 << 20;  // diamonds of a scale; of more, those of a quarter of the supercubes
+
+// Supercubes of a brick, a bit each: one in each row of four, along each axis.
+constexpr std::uint64_t kQuarter = [] {
+  std::uint64_t mask = 0;
+  for (unsigned bit = 0; bit < 64; ++bit) {
+    unsigned sum = 0;  // of its coordinates, whose bits take turns
+    for (unsigned axis = 0; axis < 3; ++axis) sum += (bit >> axis & 1) + 2 * (bit >> (axis + 3) & 1);
+    if (sum % 4 == 0) mask |= std::uint64_t(1) << bit;
+  }
+  return mask;
+}();
+
 using ByClass = std::array<NormalEquations, 3>;
 
-ByClass equations_of(const PagedValues& values, BlockLattice& lattice, const BrickRun& block) {
+std::uint32_t diamonds_of_scale(const SupercubeSet& set, int scale) {
+  const auto [begin, end] = set.of_scale(scale);
+  const std::uint32_t first_after = end < set.bricks().size() ? std::uint32_t(set.bricks()[end].first) : set.size();
+  return begin == end ? 0 : first_after - std::uint32_t(set.bricks()[begin].first);
+}
+
+// supercubes: of each brick, those that are taken
+ByClass equations_of(const PagedValues& values, BlockLattice& lattice, const BrickRun& block, std::uint64_t supercubes) {
   ByClass equations;
   VertexKeys around{};
   lattice.move_to(block_of(values.set.bricks()[block.first].key), BlockLattice::Load::own);
   for (BrickIndex brick = block.first; brick < block.end; ++brick) {
-    values.set.for_each_in_brick(brick, ~std::uint64_t(0), [&](const Place& p) {
-      lattice.gather(lattice.at(p.key) + BlockLattice::of_slot(p.slot), p.slot, around);
-      fill_missing(around, diamond_type(kTypeOfSlot[p.slot]).vertices);
-      const int cls = class_of_slot(p.slot);
-      equations[std::size_t(cls)].add(predictor_values(cls, around), values.keys[p.index]);
+    values.set.for_each_supercube(brick, [&](SupercubeIndex supercube, SupercubeKey key) {
+      if ((supercubes >> (key & 63) & 1) == 0) return;
+      const BlockLattice::Point at = lattice.at(key);
+      UpdateIndex next = values.set.first(brick, supercube);
+      for (const Slot slot : set_bits<Slot>(values.set.occupancy()[supercube])) {
+        lattice.gather(at + BlockLattice::of_slot(slot), slot, around);
+        fill_missing(around, diamond_type(kTypeOfSlot[slot]).vertices);
+        const int cls = class_of_slot(slot);
+        equations[std::size_t(cls)].add(predictor_values(cls, around), values.keys[next++]);
+      }
     });
   }
   return equations;
@@ -77,14 +102,16 @@ ByClass equations_of(const PagedValues& values, BlockLattice& lattice, const Bri
 
 ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel) {
   const std::vector<BrickRun> blocks = blocks_of(values.set);
+  const auto scale_of_block = [&values](const BrickRun& block) { return scale_of_key(values.set.bricks()[block.first].key); };
   std::vector<ByClass> found(blocks.size());
   parallel(blocks.size(), [&](std::size_t i) {
     BlockLattice lattice(values);
-    found[i] = equations_of(values, lattice, blocks[i]);
+    const bool is_large = diamonds_of_scale(values.set, scale_of_block(blocks[i])) > kMostFitted;
+    found[i] = equations_of(values, lattice, blocks[i], is_large ? kQuarter : ~std::uint64_t(0));
   });
   std::array<ByClass, kMaxLevels> sums{};
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    ByClass& sum = sums[std::size_t(scale_of_key(values.set.bricks()[blocks[i].first].key))];
+    ByClass& sum = sums[std::size_t(scale_of_block(blocks[i]))];
     for (std::size_t cls = 0; cls < 3; ++cls) sum[cls].add(found[i][cls]);
   }
   ValueWeights weights;

@@ -33,7 +33,7 @@ inline constexpr std::uint32_t kPageValuesMost = 1 << 18;  // in a page of more 
 [[nodiscard]] bool decode_page(const DecodedValues& to, const ValuePage& page, std::span<const std::uint8_t> bytes);
 
 // The least-squares coefficients that predict the values best, by class and scale. Set, keys and description are known;
-// the weights are not read. The same for any number of threads.
+// the weights are not read. Of very many diamonds of a scale, a quarter is enough. The same for any number of threads.
 [[nodiscard]] ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

@@ -4,13 +4,15 @@
 
 #include <algorithm>
 #include <span>
+#include <type_traits>
 
 #include "common/diamond/domain.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 namespace {
 
-// The key of the sample at a vertex, which is clamped to the box.
+// The keys of samples.
 template <class T>
 class KeyAt {
  public:
@@ -20,10 +22,17 @@ class KeyAt {
         format_(format),
         row_(std::size_t(domain.last().x) + 1),
         slice_(row_ * (std::size_t(domain.last().y) + 1)) {}
-  ValueKey operator()(Vertex v) const {
-    const Vertex s = domain_.clamp(v);
-    return format_.key(double(samples_[std::size_t(s.z) * slice_ + std::size_t(s.y) * row_ + std::size_t(s.x)]));
+  // Of the sample that a vertex clamps to.
+  ValueKey operator()(Vertex v) const { return of(index(domain_.clamp(v))); }
+  // Of a sample, by its place among the samples.
+  [[nodiscard]] ValueKey of(std::size_t sample) const {
+    if constexpr (std::is_integral_v<T>) {
+      return ValueKey(samples_[sample]) - ValueKey(format_.first);  // modulo 2^32
+    } else {
+      return format_.key(double(samples_[sample]));
+    }
   }
+  [[nodiscard]] std::size_t index(Vertex v) const { return std::size_t(v.z) * slice_ + std::size_t(v.y) * row_ + std::size_t(v.x); }
 
  private:
   std::span<const T> samples_;
@@ -32,15 +41,38 @@ class KeyAt {
   std::size_t row_, slice_;
 };
 
+// The centre of a diamond. corner: of its supercube, with the least coordinates.
+Vertex centre_from(Vertex corner, Slot slot, int scale) {
+  const int type = kTypeOfSlot[slot];
+  return {corner.x + ((type & 3) << scale), corner.y + ((type >> 2 & 3) << scale), corner.z + ((type >> 4 & 3) << scale)};
+}
+
+template <class T>
+void find_in_brick(const KeyAt<T>& key, const Domain& domain, const SupercubeSet& set, BrickIndex brick, ValueKeys& keys) {
+  const int scale = scale_of_key(set.bricks()[brick].key);
+  std::array<std::size_t, kSlots> offset{};  // by slot, between samples
+  for (Slot slot{0}; slot < kSlots; ++slot) offset[slot] = key.index(centre_from({}, slot, scale));
+  set.for_each_supercube(brick, [&](SupercubeIndex supercube, SupercubeKey name) {
+    const Vertex p = position_of_key(name), corner{p.x << (scale + 2), p.y << (scale + 2), p.z << (scale + 2)};
+    const int furthest = 3 << scale;
+    const bool is_inside = domain.contains({corner.x + furthest, corner.y + furthest, corner.z + furthest});
+    const std::size_t first = is_inside ? key.index(corner) : 0;
+    UpdateIndex next = set.first(brick, supercube);
+    for (const Slot slot : set_bits<Slot>(set.occupancy()[supercube])) {
+      const UpdateIndex i = next++;
+      keys.set(i, is_inside ? key.of(first + offset[slot]) : key(centre_from(corner, slot, scale)));
+    }
+  });
+}
+
 }  // namespace
 
 void find_keys(const Volume& volume, const ValueFormat& format, const SupercubeSet& set, ValueKeys& keys) {
   const Domain domain(volume.grid.dims);
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
     const KeyAt<T> key(samples, domain, format);
-    tbb::parallel_for(std::uint32_t(0), std::uint32_t(set.bricks().size()), [&](std::uint32_t brick) {
-      set.for_each_in_brick(BrickIndex(brick), ~std::uint64_t(0), [&](const Place& p) { keys.set(p.index, key(SupercubeSet::centre(p))); });
-    });
+    tbb::parallel_for(std::uint32_t(0), std::uint32_t(set.bricks().size()),
+                      [&](std::uint32_t brick) { find_in_brick(key, domain, set, BrickIndex(brick), keys); });
   });
 }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -20,6 +21,8 @@ namespace intervale {
 namespace {
 
 constexpr double kUnit = 1 << 24;  // of a tetrahedron's volume: sums of whole numbers do not depend on their order
+
+constexpr std::size_t kCells = 1 << 19;  // of a larger volume, about so many are summed
 
 // The place of a value among the positions: 2j + 1 at position j, 2j between positions j - 1 and j.
 using PlaceCode = std::uint16_t;  // few enough positions: a tolerance lies between every other two
@@ -111,11 +114,13 @@ class TetShares {
   float b_, c_, per_ab_, per_bc_, per_cd_, per_ac_, per_bd_;
 };
 
+// The sums over all cells of a volume; over about kCells of a larger one, which lie evenly in it.
 template <class T>
 class CellSums {
  public:
   CellSums(std::span<const T> samples, const std::array<std::int32_t, 3>& dims, std::span<const double> positions)
       : samples_(samples), row_(dims[0]), slice_(row_ * dims[1]), dims_(dims), positions_(positions), places_(positions) {
+    stride_ = std::max<std::size_t>(1, samples.size() / kCells);
     for (const double p : positions) scaled_.push_back(p * kScale);
     scaled_.resize(positions.size() + TetShares::kLanes, std::numeric_limits<double>::infinity());
   }
@@ -143,6 +148,13 @@ class CellSums {
   }
 
  private:
+  // The first of the cells summed in a row. (y, z) times these constants spreads evenly over the numbers of 32 bits:
+  // Martin Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
+  [[nodiscard]] std::ptrdiff_t first_cell(std::int32_t y, std::int32_t z) const {
+    const std::uint32_t place = std::uint32_t(y) * 0xc13fa9a9u + std::uint32_t(z) * 0x91e10da5u;
+    return std::ptrdiff_t(std::uint64_t(place) * stride_ >> 32);
+  }
+
   void encode(std::int32_t z, std::vector<PlaceCode>& codes) const {
     const T* const from = &samples_[std::size_t(z * slice_)];
     PlaceCode* const to = codes.data() + (z & 1) * slice_;
@@ -157,7 +169,7 @@ class CellSums {
     const std::array<std::array<std::ptrdiff_t, 8>, 2> coded{cell_corners({0, y, z}, row_, up), cell_corners({1, y, z}, row_, up)};
     const T* const values = &samples_[std::size_t(z * slice_ + y * row_)];
     const PlaceCode* const code = codes.data() + (z & 1) * slice_ + y * row_;
-    for (std::ptrdiff_t x = 0; x + 1 < row_; ++x) {
+    for (std::ptrdiff_t x = first_cell(y, z); x + 1 < row_; x += std::ptrdiff_t(stride_)) {
       std::array<PlaceCode, 8> k{};
       for (int i = 0; i < 8; ++i) k[i] = code[x + coded[x & 1][i]];
       const bool undivided = std::all_of(k.begin() + 1, k.end(), [&k](PlaceCode other) { return other == k[0]; });
@@ -189,6 +201,7 @@ class CellSums {
   std::span<const T> samples_;
   std::ptrdiff_t row_, slice_;
   std::array<std::int32_t, 3> dims_;
+  std::uint64_t stride_ = 1;                  // between the cells summed in a row
   static constexpr std::int32_t kSlices = 4;  // of cells, that a thread takes at once
   // Of values in computations: the difference of two doubles can overflow.
   static constexpr double kScale = sizeof(T) == sizeof(double) ? 0.25 : 1;
@@ -200,8 +213,7 @@ class CellSums {
 VolumeTable table_at(const Volume& volume, std::vector<double> positions) {
   const Sums sums =
       visit_samples(volume, [&]<class T>(std::span<const T> samples) { return CellSums<T>(samples, volume.grid.dims, positions).run(); });
-  double tets = double(kCellTets.size());
-  for (const std::int32_t side : volume.grid.dims) tets *= double(side - 1);
+  const auto tets = double(std::accumulate(sums.whole.begin(), sums.whole.end(), std::uint64_t(0)));
   VolumeTable table{std::move(positions), {}, {}};
   std::uint64_t whole = 0;
   for (std::size_t j = 0; j < table.position.size(); ++j) {
