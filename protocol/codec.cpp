@@ -44,7 +44,12 @@ Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
     camera = fbs::Camera(to_vector(c->eye), to_vector(c->look_at), to_vector(c->up), c->fov, c->viewport[0], c->viewport[1], c->pixel_error);
   const auto table = fbs::CreateLod(out, lod.error, lod.error_percent, lod.roi ? &box : nullptr, lod.max_updates, lod.camera ? &camera : nullptr);
   const auto forget = message.forget.empty() ? 0 : out.CreateVector(encode_splits(message.forget));
-  return fbs::CreateView(out, message.epoch, table, message.room, forget);
+  const RangeRequest& shown = message.shown;
+  std::vector<fbs::Range> ranges;
+  if (shown.range) ranges.emplace_back(shown.range->alpha, shown.range->beta);
+  const auto in_order = ranges.empty() ? 0 : out.CreateVectorOfStructs(ranges);
+  const auto refine = std::uint8_t(shown.refine ? 1 + int(*shown.refine) : 0);
+  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine);
 }
 
 Offset<fbs::Credit> encode_body(FlatBufferBuilder& out, const Credit& message) { return fbs::CreateCredit(out, message.bytes); }
@@ -65,7 +70,7 @@ Offset<fbs::Description> encode_description(FlatBufferBuilder& out, const Descri
   const ValueFormat& format = d.format;
   return fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine), d.max_error, d.updates,
                                 d.coefficients, d.full.vertices, d.full.tets, d.content_hash, std::uint8_t(format.type), format.step, format.first,
-                                format.last, d.is_exact, corners, weights);
+                                format.last, d.is_exact, corners, weights, d.has_every_range);
 }
 
 Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
@@ -114,7 +119,15 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
                         .pixel_error = c->pixel_error()};
   }
   if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
-  View view{table.epoch(), lod, table.room(), {}};
+  View view{table.epoch(), lod, table.room(), {}, {}};
+  if (const auto* ranges = table.ranges(); VectorLength(ranges) > 0) {
+    if (ranges->size() > kMaxRanges) return malformed("a view of " + std::to_string(ranges->size()) + " ranges, of which one can be shown");
+    const fbs::Range& range = *ranges->Get(0);
+    if (!(range.alpha() <= range.beta())) return malformed("a range's alpha is greater than its beta, or is no number");
+    view.shown.range = Range{range.alpha(), range.beta()};
+  }
+  if (table.refine() > 1 + std::uint8_t(Refine::uniform)) return malformed("an unknown way to refine");
+  if (table.refine() > 0) view.shown.refine = Refine(table.refine() - 1);
   if (const auto* forget = table.forget()) {
     auto splits = decode_splits({forget->data(), forget->size()}, kMaxHave);
     if (!splits) return malformed(splits.error().message);
@@ -153,6 +166,7 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
   d.grid = {{wire.dims()->x(), wire.dims()->y(), wire.dims()->z()}, to_array(*wire.spacing()), to_array(*wire.origin())};
   d.range = {wire.alpha(), wire.beta()};
   d.refine = Refine(wire.refine());
+  d.has_every_range = wire.has_every_range();
   d.max_error = wire.max_error();
   d.updates = wire.updates();
   d.coefficients = wire.coefficients();

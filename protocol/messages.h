@@ -35,10 +35,11 @@ enum class CloseCode : std::uint16_t {
   unauthorized = 4401,  // no valid token
   forbidden = 4403,     // the token does not grant this data set
   no_such_dataset = 4404,
-  timed_out = 4408,     // no Open, or no credit, in time
-  out_of_order = 4409,  // a message that is not allowed in this state
-  too_large = 4413,     // a message or the credit exceeds its limit
-  other_version = 4426  // the client reads batches of another version than the server sends
+  timed_out = 4408,      // no Open, or no credit, in time
+  out_of_order = 4409,   // a message that is not allowed in this state
+  too_large = 4413,      // a message or the credit exceeds its limit
+  no_such_range = 4416,  // the data set has not what the view is to show
+  other_version = 4426   // the client reads batches of another version than the server sends
 };
 
 // Client to server.
@@ -64,6 +65,8 @@ struct View {
   // Updates that the client forgets: at most kMaxHave; keys ascending; only keys and slots are sent. Both sides apply
   // the rule of Front::forget().
   std::vector<SlotGroup> forget = {};
+  // What is shown of the data set; both sides code the answers for it (common/codec/batch.h).
+  RangeRequest shown = {};
   friend bool operator==(const View&, const View&) = default;
 };
 struct Credit {

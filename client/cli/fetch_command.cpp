@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/net/fetch.h"
@@ -16,6 +17,7 @@
 #include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
 #include "common/program/progress.h"
+#include "common/program/range_option.h"
 #include "common/util/printable.h"
 
 namespace intervale {
@@ -25,6 +27,8 @@ struct FetchCommand {
   std::string url;
   Access access;
   FetchOptions fetch;
+  std::vector<std::string> range;
+  std::optional<std::string> refine;
   std::optional<std::filesystem::path> output;
   std::optional<PictureOptions> picture;
   bool digest = false;
@@ -101,7 +105,11 @@ Result<void> run(const FetchCommand& options) {
   if (options.picture) {
     if (auto possible = check_picture(*options.picture, options.fetch.lod.camera); !possible) return possible;
   }
-  const auto fetched = fetch_with_progress(*url, options.fetch);
+  const auto range = parse_range(options.range);
+  if (!range) return tl::unexpected(range.error());
+  FetchOptions fetch = options.fetch;
+  fetch.shown = {*range, parse_refine(options.refine)};
+  const auto fetched = fetch_with_progress(*url, fetch);
   if (!fetched) return tl::unexpected(fetched.error());
   const Mesh mesh = fetched->client.mesh();
   if (options.output) {
@@ -121,6 +129,8 @@ void add_fetch_command(Program& program) {
   CLI::App& command = program.add_command("fetch", "Receive a mesh, and write or draw it", [options] { return run(*options); });
   command.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
   command.add_option("-o,--output", options->output, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")->type_name("MESH");
+  add_range_option(command, options->range, kShownRangeHelp);
+  add_refine_option(command, options->refine, kShownRefineHelp);
   add_lod_options(command, options->fetch.lod);
   add_picture_options(command, options->picture);
   add_max_bytes_option(command, options->fetch.max_bytes);

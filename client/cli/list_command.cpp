@@ -28,11 +28,16 @@ std::string shown(const nlohmann::ordered_json& value) { return printable(value.
 
 std::string line_of(const nlohmann::ordered_json& dataset) {
   const auto& dims = dataset.at("dims");
+  const std::string name =
+      fmt::format("{}: {} x {} x {} samples", shown(dataset.at("name")), shown(dims.at(0)), shown(dims.at(1)), shown(dims.at(2)));
+  if (dataset.at("scope") == "every") {
+    const auto& values = dataset.at("values");
+    return fmt::format("{}, every range, values {:g} to {:g}, {} updates\n", name, values.at("least").get<double>(),
+                       values.at("greatest").get<double>(), shown(dataset.at("updates")));
+  }
   const auto& range = dataset.at("range");
-  const auto& full = dataset.at("full");
-  return fmt::format("{}: {} x {} x {} samples, range [{}, {}], {} updates, {} tetrahedra in full\n", shown(dataset.at("name")), shown(dims.at(0)),
-                     shown(dims.at(1)), shown(dims.at(2)), shown(range.at(0)), shown(range.at(1)), shown(dataset.at("updates")),
-                     shown(full.at("tets")));
+  return fmt::format("{}, range [{}, {}], {} updates, {} tetrahedra in full\n", name, shown(range.at(0)), shown(range.at(1)),
+                     shown(dataset.at("updates")), shown(dataset.at("full").at("tets")));
 }
 
 Result<void> list(const ListOptions& options) {

@@ -19,10 +19,14 @@ bool may_reconnect(protocol::CloseCode code) { return code == protocol::CloseCod
 
 ClientSession::ClientSession(Options options) : options_(std::move(options)), credit_(options_.max_bytes ? 0 : UINT64_MAX, options_.window) {}
 
-void ClientSession::look(ViewRequest request) {
+Result<void> ClientSession::look(ViewRequest request) {
+  if (mesh_) {
+    if (auto shown = mesh_->show(request.shown); !shown) return shown;
+  }
   view_ = request;
   if (mesh_ && view_->camera) mesh_->look(*view_->camera);
   if (state_ != State::connecting) send_view();
+  return {};
 }
 
 // With max_bytes, Open grants nothing: first it must be known how many bytes Opened takes.
@@ -109,17 +113,21 @@ Result<ClientSession::Event> ClientSession::take(const protocol::Done& done, Clo
 Result<ClientSession::Event> ClientSession::take(const protocol::Fault& fault, Clock::time_point /*now*/) {
   fault_ = fault;
   if (may_reconnect(fault.code)) disconnected();
+  if (fault.code == protocol::CloseCode::no_such_range) return misuse("--range: " + printable(fault.text));
   return fail(options_.server + " ended the session: " + printable(fault.text) + " (code " + std::to_string(unsigned(fault.code)) + ")");
 }
 
 Result<void> ClientSession::start_mesh() {
   updates_ = stats_.updates = stats_.forgotten = 0;
-  const auto invalid = [this](const Error& error) { return violation("an invalid description: " + error.message); };
+  // Misuse is the user's: the server's description is in order.
+  const auto invalid = [this](const Error& error) {
+    return error.usage ? tl::unexpected(error) : violation("an invalid description: " + error.message);
+  };
   if (!options_.has_mesh) {
     if (auto ok = check_description(*description_); !ok) return invalid(ok.error());
     return {};
   }
-  auto mesh = StreamClient::start(*description_, view_ ? view_->budget : Budget{});
+  auto mesh = view_ ? StreamClient::start(*description_, view_->budget, view_->shown) : StreamClient::start(*description_);
   if (!mesh) return invalid(mesh.error());
   mesh_ = std::move(*mesh);
   if (view_ && view_->camera) mesh_->look(*view_->camera);
@@ -131,6 +139,7 @@ Result<void> ClientSession::accept_answer(std::uint64_t epoch) {
   if (state_ == State::greeted) return violation("no Opened at first");
   if (state_ != State::viewing || epoch < answered_ || epoch > epoch_) return violation("an answer to a view that is not open");
   answered_ = epoch;
+  while (shown_.size() > 1 && shown_[1].epoch <= epoch) shown_.pop_front();
   if (!mesh_) return {};
   mesh_->arrived(epoch);
   stats_.forgotten += updates_ - mesh_->updates();
@@ -143,7 +152,7 @@ Result<void> ClientSession::apply(const protocol::Batch& batch) {
   stats_.updates += batch.updates;
   if (!mesh_) return {};
   const auto start = Clock::now();
-  const auto applied = mesh_->apply(batch.payload, batch.epoch);
+  const auto applied = mesh_->apply(batch.payload, batch.epoch, shown_in(batch.epoch));
   stats_.seconds_applying += std::chrono::duration<double>(Clock::now() - start).count();
   if (!applied) return violation(applied.error().message);
   if (mesh_->updates() != updates_) return violation("a batch has not as many updates as it says");
@@ -165,6 +174,8 @@ void ClientSession::send_haves() {
 // A view is sent before Opened has arrived. It gives nothing up then: the data may be other data than before.
 void ClientSession::send_view() {
   protocol::View view{++epoch_, view_->lod};
+  view.shown = view_->shown;
+  if (shown_.empty() || shown_.back().shown != view.shown) shown_.push_back({epoch_, view.shown});
   if (mesh_) {
     mesh_->set_budget(view_->budget, epoch_);
     if (is_open()) view.forget = mesh_->give_up(epoch_, protocol::kMaxHave);
@@ -173,6 +184,13 @@ void ClientSession::send_view() {
   if (is_open()) state_ = State::viewing;
   stats_.is_full = false;
   send(view);
+}
+
+// epoch: no earlier than the last answered.
+const RangeRequest& ClientSession::shown_in(std::uint64_t epoch) const {
+  auto at = shown_.begin();
+  while (at + 1 != shown_.end() && (at + 1)->epoch <= epoch) ++at;
+  return at->shown;
 }
 
 void ClientSession::send_credit() {

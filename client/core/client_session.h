@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <span>
 #include <string>
@@ -29,6 +30,7 @@ struct ViewRequest {
   // Likewise. A mesh at its budget keeps what is largest on this camera's screen; without one, what came first.
   std::optional<Camera> camera = {};
   Budget budget = {};
+  RangeRequest shown = {};  // of the data set
 };
 
 // On one thread.
@@ -82,8 +84,9 @@ class ClientSession {
 
   explicit ClientSession(Options options);
 
-  // What is wanted from now on. Before connected(), and while there is no connection, it is only kept.
-  void look(ViewRequest request);
+  // What is wanted from now on. Before connected(), and while there is no connection, it is only kept. Fails, and changes
+  // nothing, if the data set is known and has not all that is to be shown.
+  Result<void> look(ViewRequest request);
   // Asks for the same view again, and gives up more: there was no room for all of it.
   void look_again() { send_view(); }
 
@@ -125,6 +128,7 @@ class ClientSession {
   void send_haves();
   void send_view();
   void send_credit();
+  [[nodiscard]] const RangeRequest& shown_in(std::uint64_t epoch) const;
   [[nodiscard]] bool is_open() const { return state_ == State::viewing || state_ == State::idle; }
   [[nodiscard]] tl::unexpected<Error> other_version(std::uint32_t payload) const;
   [[nodiscard]] tl::unexpected<Error> violation(const std::string& what) const;
@@ -135,6 +139,12 @@ class ClientSession {
   std::optional<Description> description_;
   std::optional<StreamClient> mesh_;
   std::optional<ViewRequest> view_;
+  // What the views show that answers may still arrive for: from each of these epochs on.
+  struct ShownFrom {
+    std::uint64_t epoch = 0;
+    RangeRequest shown;
+  };
+  std::deque<ShownFrom> shown_;
   CreditWindow credit_;
   Stats stats_;
   std::optional<protocol::Fault> fault_;

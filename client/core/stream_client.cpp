@@ -6,19 +6,30 @@
 
 namespace intervale {
 
-Result<StreamClient> StreamClient::start(Description description, const Budget& budget) {
+Result<StreamClient> StreamClient::start(Description description, const Budget& budget, const RangeRequest& request) {
   if (auto ok = check_description(description); !ok) return tl::unexpected(ok.error());
-  Front front(description.grid, description.format, description.corners, description.range, description.refine);
+  const ShownRange shown = resolve(description, request);
+  if (auto held = check_held(description, shown); !held) return tl::unexpected(held.error());
+  Front front(description.grid, description.format, description.corners, shown.range, shown.refine);
   return StreamClient(std::move(description), std::move(front), budget);
 }
 
-Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch) {
+Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch, const RangeRequest& shown) {
   keep_to_budget(epoch);
   forget(epoch);
   const std::uint64_t before = updates();
-  const auto applied = apply_batch(front_, description_, payload, budget_.max_tets);
+  const auto applied = apply_batch(front_, description_, resolve(description_, shown), payload, budget_.max_tets);
   if (!applied) return tl::unexpected(applied.error());
   if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than the room that the view names");
+  rebalance();
+  return {};
+}
+
+Result<void> StreamClient::show(const RangeRequest& request) {
+  const ShownRange shown = resolve(description_, request);
+  if (shown == ShownRange{front_.range(), front_.refine()}) return {};
+  if (auto held = check_held(description_, shown); !held) return held;
+  front_.set_range(shown.range, shown.refine, budget_.max_tets);
   rebalance();
   return {};
 }

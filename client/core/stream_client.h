@@ -25,14 +25,19 @@ struct Budget {
 
 class StreamClient {
  public:
-  // Checks everything in a description from outside. The mesh is then the patch of the root.
-  static Result<StreamClient> start(Description description, const Budget& budget = {});
+  // Checks everything in a description from outside, and that the data set has what is to be shown (misuse). The mesh is
+  // then the patch of the root.
+  static Result<StreamClient> start(Description description, const Budget& budget = {}, const RangeRequest& shown = {});
 
-  // Applies one batch: the payload of a Batch, and the epoch of its view. The mesh is conforming after each successful
+  // Applies one batch: the payload of a Batch, the epoch of its view, and what that view shows. The mesh is conforming after each successful
   // call. A payload that is damaged, or does not fit the batches before it, is an error; this object must not be used
   // again then. Updates that the mesh has no room for within max_tets are kept, but hidden: those that came last or,
   // once look() was called, the least important ones.
-  Result<void> apply(std::span<const std::uint8_t> payload, std::uint64_t epoch = 0);
+  Result<void> apply(std::span<const std::uint8_t> payload, std::uint64_t epoch = 0, const RangeRequest& shown = {});
+
+  // What the mesh shows from now on, of the updates that are here. Fails, and changes nothing, if the data set has not
+  // all of it. Linear in the updates.
+  Result<void> show(const RangeRequest& shown);
 
   // Where the mesh is seen from now on. camera: one that check_lod accepts.
   void look(const Camera& camera);

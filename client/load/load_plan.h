@@ -36,7 +36,8 @@ struct LoadOptions {
   unsigned threads = 1;
   // Keep a mesh for each client, and compare them at the end: see verify_meshes.
   bool verify = false;
-  Budget budget;  // of each of these meshes
+  Budget budget;       // of each of these meshes
+  RangeRequest shown;  // of the data set; needed if it has every range
   // How long a client tries to reach a lost server again; off: the client has failed. Requires verify: without a mesh
   // there is nothing to resume with.
   std::optional<LoadClock::duration> reconnect;

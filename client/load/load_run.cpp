@@ -103,9 +103,12 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   if (auto allowed = allow_files(options.clients); !allowed) return tl::unexpected(allowed.error());
   const auto description = describe(url);
   if (!description) return tl::unexpected(description.error());
+  if (description->has_every_range && !options.shown.range) return misuse("'" + url.name + "' has every range: say which with --range LO HI");
+  if (auto held = check_held(*description, resolve(*description, options.shown)); !held) return tl::unexpected(held.error());
   std::optional<StreamClient> reference;
   if (options.verify) {
     FetchOptions everything;
+    everything.shown = options.shown;
     everything.reconnect = std::chrono::seconds(0);
     auto fetched = fetch(url, everything, {});
     if (!fetched) return tl::unexpected(fetched.error());

@@ -148,7 +148,7 @@ class LoadClient {
 
   void look() {
     const Lod lod = views_.lod();
-    session_.look({lod, lod.camera, plan_.budget});
+    (void)session_.look({lod, lod.camera, plan_.budget, plan_.shown});  // the plan's range is one of the data set
   }
 
   asio::awaitable<void> read_messages() {

@@ -22,7 +22,7 @@ class Fetch {
                   .client = "intervale-client " INTERVALE_VERSION,
                   .server = "the server at " + url.authority(),
                   .max_bytes = options.max_bytes}) {
-    session_.look({options.lod, {}, {.max_tets = options.lod.max_tets.value_or(UINT64_MAX)}});
+    (void)session_.look({options.lod, {}, {.max_tets = options.lod.max_tets.value_or(UINT64_MAX)}, options.shown});  // no data set is known yet
   }
 
   Result<void> run() {
@@ -57,6 +57,9 @@ class Fetch {
     const bool had_mesh = session_.mesh() != nullptr;
     const auto event = connection_->receive(session_);
     if (!event) return tl::unexpected(event.error());
+    if (event->kind == ClientSession::Event::Kind::opened && session_.description()->has_every_range && !options_.shown.range) {
+      return misuse("'" + url_.name + "' has every range: say which with --range LO HI");
+    }
     if (event->is_new_mesh && had_mesh) notice("the data at " + url_.authority() + " changed meanwhile; starting again");
     const StreamClient& client = *session_.mesh();
     if (stats_.seconds_first_mesh == 0 && client.tet_count() > 0) stats_.seconds_first_mesh = elapsed();

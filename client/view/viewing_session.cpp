@@ -9,10 +9,10 @@ Result<void> ViewingSession::look(const WantedView& view) {
   if (auto ok = check_lod(lod); !ok) return ok;
   if (view.budget.max_updates < kMinRoom) return fail("there must be room for at least " + std::to_string(kMinRoom) + " updates");
   if (view_ == view) return {};
+  if (view.region) lod.camera.reset();
+  if (auto looked = session_.look({lod, view.camera, view.budget, view.shown}); !looked) return looked;
   view_ = view;
   gave_up_more_ = false;
-  if (view.region) lod.camera.reset();
-  session_.look({lod, view.camera, view.budget});
   return {};
 }
 

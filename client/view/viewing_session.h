@@ -19,6 +19,7 @@ struct WantedView {
   Camera camera;              // pixel_error: how far surfaces may be off, if there is no region
   std::optional<Box> region;  // refined to error 0; the rest only as far as conformity requires
   Budget budget;              // max_updates: at least kMinRoom
+  RangeRequest shown;         // of the data set
   friend bool operator==(const WantedView&, const WantedView&) = default;
 };
 
@@ -31,7 +32,8 @@ class ViewingSession {
   // client: name and version, for the server's log.
   ViewingSession(std::string dataset, std::string client) : session_({.dataset = std::move(dataset), .client = std::move(client)}) {}
 
-  // What is wanted from now on. Fails, and changes nothing, if check_lod refuses the camera or the region.
+  // What is wanted from now on. Fails, and changes nothing, if check_lod refuses the camera or the region, or
+  // the data set has not all that is to be shown.
   Result<void> look(const WantedView& view);
 
   void connected(Clock::time_point now) { session_.connected(now); }  // after the first look()

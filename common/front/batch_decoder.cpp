@@ -16,10 +16,11 @@ tl::unexpected<Error> damaged(const char* what) { return fail(std::string("a bat
 // Reads the flags and values of a batch, and splits diamonds of a front.
 class BatchDecoder {
  public:
-  BatchDecoder(Front& front, const Description& description, std::span<const std::uint8_t> bytes, std::uint64_t max_tets)
+  BatchDecoder(Front& front, const Description& description, const ShownRange& shown, std::span<const std::uint8_t> bytes, std::uint64_t max_tets)
       : front_(front),
         description_(description),
-        sides_(description.format, description.range),
+        refine_(shown.refine),
+        sides_(description.format, shown.range),
         max_tets_(max_tets),
         coder_(bytes),
         cursor_(front.state()) {
@@ -43,7 +44,7 @@ class BatchDecoder {
   bool take_found(int cls) {
     const int vertices = cursor_.context().row->vertices;
     const VertexKeys& around = keys_around(vertices);
-    const bool is_split = models_.code_flag(coder_, cls, nearness(sides_, description_.refine, around, vertices));
+    const bool is_split = models_.code_flag(coder_, cls, nearness(sides_, refine_, around, vertices));
     if (coder_.is_overdrawn()) return stop("it has fewer flags than its supercubes call for");
     if (!is_split) return true;
     if (updates_ == kBatchUpdatesMost) return stop("it has too many updates");
@@ -71,6 +72,7 @@ class BatchDecoder {
 
   Front& front_;
   const Description& description_;
+  const Refine refine_;
   const KeySides sides_;
   const std::uint64_t max_tets_;
   RangeDecoder coder_;
@@ -83,12 +85,13 @@ class BatchDecoder {
 
 }  // namespace
 
-Result<std::uint64_t> apply_batch(Front& front, const Description& description, std::span<const std::uint8_t> bytes, std::uint64_t max_tets) {
+Result<std::uint64_t> apply_batch(Front& front, const Description& description, const ShownRange& shown, std::span<const std::uint8_t> bytes,
+                                  std::uint64_t max_tets) {
   const auto keys = take_supercubes(bytes, kBatchUpdatesMost);
   if (!keys) return damaged(keys.error().message.c_str());
   const auto length = take_varint(bytes);
   if (!length || *length != bytes.size()) return damaged("its length is wrong");
-  const auto decoder = std::make_unique<BatchDecoder>(front, description, bytes, max_tets);
+  const auto decoder = std::make_unique<BatchDecoder>(front, description, shown, bytes, max_tets);
   for_each_class(
       keys->size(), [&](std::size_t g) { return (*keys)[g]; }, [&](std::size_t g, int cls) { return decoder->take((*keys)[g], cls); });
   if (decoder->wrong() != nullptr) return damaged(decoder->wrong());

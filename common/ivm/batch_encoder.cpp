@@ -23,10 +23,11 @@ struct Candidate {
 
 class BatchEncoder {
  public:
-  BatchEncoder(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) : volume_(volume), groups_(groups) {
+  BatchEncoder(const IntervalVolume& volume, const ShownRange& shown, const SplitSet& split, std::span<const SlotGroup> groups)
+      : volume_(volume), groups_(groups) {
     const SupercubeSet& set = volume.set();
     const Description& d = volume.description();
-    const KeySides sides(d.format, d.range);
+    const KeySides sides(d.format, shown.range);
     SplitLattice lattice(volume, split);
     VertexKeys around{};
     ready_.reserve(groups.size());
@@ -39,11 +40,11 @@ class BatchEncoder {
       ready_.push_back(lattice.splittable(kAllSlots & (~split.slots(first, occupancy) | g.slots)));
       first_.push_back(candidates_.size());
       candidates_.resize(candidates_.size() + std::size_t(std::popcount(ready_.back())));
-      Candidate* c = &candidates_[first_.back()];
+      Candidate* c = candidates_.data() + first_.back();
       for (const Slot slot : set_bits<Slot>(ready_.back())) {
         lattice.gather(slot, around);
         const int cls = class_of_slot(slot);
-        c->near = std::uint8_t(nearness(sides, d.refine, around, kVertices[std::size_t(cls)]));
+        c->near = std::uint8_t(nearness(sides, shown.refine, around, kVertices[std::size_t(cls)]));
         if ((g.slots >> slot & 1) != 0) {
           ++updates_;
           c->key = volume.key(first + count_below(occupancy, slot));
@@ -96,8 +97,9 @@ class BatchEncoder {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups) {
-  const std::vector<std::uint8_t> diamonds = BatchEncoder(volume, split, groups).code();
+std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const ShownRange& shown, const SplitSet& split,
+                                       std::span<const SlotGroup> groups) {
+  const std::vector<std::uint8_t> diamonds = BatchEncoder(volume, shown, split, groups).code();
   std::vector<std::uint8_t> out;
   append_supercubes(out, groups);
   append_varint(out, diamonds.size());

@@ -11,8 +11,10 @@
 
 namespace intervale {
 
-// The batch of these groups: keys strictly ascending, slots not 0; at most kBatchUpdatesMost updates. split: what the
-// client has split once the batch is applied, closed under parents; the groups' updates are in it.
-[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const SplitSet& split, std::span<const SlotGroup> groups);
+// The batch of these groups: keys strictly ascending, slots not 0; at most kBatchUpdatesMost updates. shown: what the
+// client looks at. split: what it has split once the batch is applied, closed under parents; the groups' updates are in
+// it.
+[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const ShownRange& shown, const SplitSet& split,
+                                                     std::span<const SlotGroup> groups);
 
 }  // namespace intervale

@@ -16,13 +16,13 @@ tl::unexpected<Error> misfit(Vertex c) {
 
 }  // namespace
 
-Front root_front(const Description& d) { return {d.grid, d.format, d.corners, d.range, d.refine}; }
+Front root_front(const Description& d, const ShownRange& shown) { return {d.grid, d.format, d.corners, shown.range, shown.refine}; }
 
-Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const ParallelFor& parallel) {
+Result<Extraction> extract(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const ParallelFor& parallel) {
   if (auto ok = check_lod(lod); !ok) return tl::unexpected(ok.error());
   const SupercubeSet& set = volume.set();
-  const SplitSet chosen = select(volume, lod);
-  Extraction result{root_front(volume.description())};
+  const SplitSet chosen = select(volume, relevant, lod);
+  Extraction result{root_front(volume.description(), relevant.shown())};
   Front& front = result.front;
   if (!lod.max_tets && !lod.max_updates) {
     const auto keys_of = [&](const SlotGroup& g, std::span<ValueKey, kSlots> keys) {
@@ -33,7 +33,7 @@ Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const P
     result.updates = front.shown_count();
     return result;
   }
-  for (const UpdateIndex i : in_order(volume, chosen, lod)) {
+  for (const UpdateIndex i : in_order(volume, relevant, chosen, lod)) {
     if (lod.max_updates && front.split_count() == *lod.max_updates) break;
     const Place p = set.place(i);
     FrontCursor cursor(front.state());

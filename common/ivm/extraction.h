@@ -19,9 +19,15 @@ struct Extraction {
 // The mesh of a level of detail within its budgets: most important updates first, never more than max_tets tetrahedra
 // or max_updates updates. Fails if check_lod fails, and on a volume whose updates contradict each other (validate()
 // says which).
-[[nodiscard]] Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const ParallelFor& parallel = serial);
+[[nodiscard]] Result<Extraction> extract(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod,
+                                         const ParallelFor& parallel = serial);
+// The same, for the range of the data set.
+[[nodiscard]] inline Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const ParallelFor& parallel = serial) {
+  return extract(volume, volume.relevant(), lod, parallel);
+}
 
 // The front of a data set before the first split.
-[[nodiscard]] Front root_front(const Description& description);
+[[nodiscard]] Front root_front(const Description& description, const ShownRange& shown);
+[[nodiscard]] inline Front root_front(const Description& description) { return root_front(description, description.whole()); }
 
 }  // namespace intervale

@@ -108,11 +108,11 @@ Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes) {
   return head;
 }
 
-// The same, of a file that must have a scope.
-Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes, Scope scope) {
+// The same, of a file that must have a scope, if there is one.
+Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes, std::optional<Scope> scope) {
   auto head = read_head(start, bytes);
-  if (!head || head->scope() == scope) return head;
-  if (scope == Scope::one_range) return fail("a data set of every range, which cannot be used here yet: build it with --range");
+  if (!head || !scope || head->scope() == *scope) return head;
+  if (*scope == Scope::one_range) return fail("a data set of every range, not of one range");
   return fail("a data set of one range, not of every range");
 }
 
@@ -128,7 +128,7 @@ Result<std::vector<std::byte>> read_start(std::ifstream& in, std::uint64_t& byte
   return start;
 }
 
-Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, Scope scope) {
+Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std::optional<Scope> scope) {
   std::error_code code;
   if (std::filesystem::is_directory(path, code)) return fail("is a folder, not an interval volume file (.ivm)");
   std::ifstream in(path, std::ios::binary | std::ios::ate);
@@ -193,6 +193,11 @@ Result<std::span<const std::byte>> Container::stream(StreamType type, std::size_
   return fail(name_of(std::uint32_t(type)) + " has " + std::to_string(found.size()) + " bytes, " + std::to_string(bytes) + " expected");
 }
 
+std::optional<Scope> scope_of(std::span<const std::byte> file) {
+  const auto head = read_head(file, file.size());
+  return head ? std::optional(head->scope()) : std::nullopt;
+}
+
 std::optional<Scope> scope_of(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   std::uint64_t size = 0;
@@ -204,7 +209,7 @@ std::optional<Scope> scope_of(const std::filesystem::path& path) {
   return head->scope();
 }
 
-Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, Scope scope) {
+Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<Scope> scope) {
   auto bytes = read_bytes(path, scope);
   if (!bytes) return fail(path.string() + ": " + bytes.error().message);
   return bytes;

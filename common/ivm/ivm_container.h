@@ -84,9 +84,12 @@ class Container {
 // who open it say why.
 [[nodiscard]] std::optional<Scope> scope_of(const std::filesystem::path& path);
 
-// The bytes of a file, for Container::open. Checks the header, the scope and the length first, and allocates nothing for
-// another file. Errors begin with the path.
-[[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, Scope scope);
+// The same, from all of a file's bytes.
+[[nodiscard]] std::optional<Scope> scope_of(std::span<const std::byte> file);
+
+// The bytes of a file, for Container::open. Checks the header, the scope if one is given, and the length first, and
+// allocates nothing for another file. Errors begin with the path.
+[[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<Scope> scope);
 
 // Writes a temporary file and renames it. Errors name the path.
 [[nodiscard]] Result<void> save_container(const std::filesystem::path& path, std::span<const std::byte> bytes);

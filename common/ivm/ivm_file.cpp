@@ -55,8 +55,8 @@ std::vector<std::uint8_t> contents_of(const IntervalVolume& volume, StreamType t
     contents.assign(bytes.begin(), bytes.end());
   }
   if (type == StreamType::error_to_distance) {
-    contents.reserve(volume.error_to_distance().size());
-    for (const ErrorToDistance code : volume.error_to_distance()) contents.push_back(code.code());
+    contents.reserve(volume.relevant().error_to_distance().size());
+    for (const ErrorToDistance code : volume.relevant().error_to_distance()) contents.push_back(code.code());
   }
   return contents;
 }
@@ -216,10 +216,8 @@ Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& v
   return save_container(path, encode_ivm(volume, parallel));
 }
 
-Result<std::vector<std::byte>> read_ivm(const std::filesystem::path& path) { return read_container(path, Scope::one_range); }
-
 Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel) {
-  const auto bytes = read_ivm(path);
+  const auto bytes = read_container(path, Scope::one_range);
   if (!bytes) return tl::unexpected(bytes.error());
   auto volume = decode_ivm(*bytes, path.stem().string(), parallel);
   if (!volume) return fail(path.string() + ": " + volume.error().message);

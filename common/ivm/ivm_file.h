@@ -26,11 +26,7 @@ namespace intervale {
 // Writes a temporary file and renames it.
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
-// The bytes of an .ivm file of one range, for decode_ivm. Checks the header and the length first, and allocates nothing
-// for another file. Errors begin with the path.
-[[nodiscard]] Result<std::vector<std::byte>> read_ivm(const std::filesystem::path& path);
-
-// read_ivm, then decode_ivm; the name is the file's, without folders and extension. Errors begin with the path.
+// Reads a file of one range, then decode_ivm; the name is the file's, without folders and extension. Errors begin with the path.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

@@ -8,7 +8,7 @@
 
 namespace intervale {
 
-Ranking::Ranking(const IntervalVolume& volume, const Lod& lod) : volume_(volume) {
+Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod) : volume_(volume), relevant_(relevant) {
   const double threshold = error_of(lod, volume.description().max_error);
   const auto steps = volume.error_steps();
   while (threshold > 0 && least_step_ < steps.size() && steps[least_step_] <= threshold) ++least_step_;

@@ -20,8 +20,10 @@ namespace intervale {
 
 class Ranking {
  public:
-  // volume must outlive it; lod: one that check_lod lets pass.
-  Ranking(const IntervalVolume& volume, const Lod& lod);
+  // volume and relevant, to the range that is looked at, must outlive it; lod: one that check_lod lets pass.
+  Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod);
+  // The same, for the range of the data set.
+  Ranking(const IntervalVolume& volume, const Lod& lod) : Ranking(volume, volume.relevant(), lod) {}
 
   // 0: not wanted for its own sake. Otherwise what matters more has a higher rank.
   using Rank = std::uint16_t;
@@ -34,7 +36,7 @@ class Ranking {
     [[nodiscard]] float importance(unsigned step) const {
       if (step < ranking_->least_step_) return 0;
       if (!ranking_->screen_) return float(step + 1);
-      const float pixels = ranking_->volume_.object_error(supercube_, scale_, step) * pixels_;
+      const float pixels = ranking_->relevant_.object_error(supercube_, scale_, step) * pixels_;
       return pixels > ranking_->pixel_error_ ? pixels : 0;
     }
     // The least importance of this rank, 1 or more; and the rank of an importance.
@@ -81,7 +83,9 @@ class Ranking {
     float pixels_ = 0;
     Rank bound_ = 0;
   };
-  [[nodiscard]] Brick of_brick(BrickIndex brick) const { return of_brick(brick, volume_.brick_error_step(brick), volume_.brick_object_error(brick)); }
+  [[nodiscard]] Brick of_brick(BrickIndex brick) const {
+    return of_brick(brick, relevant_.brick_error_step(brick), relevant_.brick_object_error(brick));
+  }
   // The same, if only updates with no higher error step and no larger object error remain.
   [[nodiscard]] Brick of_brick(BrickIndex brick, unsigned step, float object_error) const;
 
@@ -106,6 +110,7 @@ class Ranking {
   [[nodiscard]] static float pixels_of(int rank) { return std::bit_cast<float>(std::uint32_t(rank + kRankFrom) << kRankShift); }
 
   const IntervalVolume& volume_;
+  const RelevantUpdates& relevant_;
   unsigned least_step_ = 0;  // the lowest error step that is wanted
   std::optional<SampleBox> roi_;
   std::optional<ScreenError> screen_;

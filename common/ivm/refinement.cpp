@@ -20,9 +20,9 @@ SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>
   return chosen;
 }
 
-SplitSet select(const IntervalVolume& volume, const Lod& lod) {
+SplitSet select(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod) {
   // Skips bricks in which nothing is wanted.
-  const Ranking ranking(volume, lod);
+  const Ranking ranking(volume, relevant, lod);
   SplitSet wanted(volume.size());
   const SupercubeSet& set = volume.set();
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
@@ -30,9 +30,10 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
     if (brick.bound() == 0) continue;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
+      const std::uint64_t occupancy = set.occupancy()[s], slots = relevant.slots(s, occupancy);
       UpdateIndex i = set.first(b, s);
-      for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
-        if (rank(i, slot) != 0) wanted.insert(i);
+      for (const Slot slot : set_bits<Slot>(occupancy)) {
+        if ((slots >> slot & 1) != 0 && rank(i, slot) != 0) wanted.insert(i);
         ++i;
       }
     });
@@ -41,8 +42,8 @@ SplitSet select(const IntervalVolume& volume, const Lod& lod) {
   return select(set, [&wanted](const Place& p) { return wanted.contains(p.index); });
 }
 
-std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& updates, const Lod& lod) {
-  const Ranking ranking(volume, lod);
+std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const RelevantUpdates& relevant, const SplitSet& updates, const Lod& lod) {
+  const Ranking ranking(volume, relevant, lod);
   const SupercubeSet& set = volume.set();
   std::vector<Ranking::Rank> ranks(volume.size());
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {

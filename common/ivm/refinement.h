@@ -21,11 +21,18 @@ namespace intervale {
 // The updates of `set` for which `wants` returns true, and all their ancestors.
 [[nodiscard]] SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>& wants);
 
-// The updates that a level of detail needs, closed under parents. Budgets are not applied.
-[[nodiscard]] SplitSet select(const IntervalVolume& volume, const Lod& lod);
+// The relevant updates that a level of detail needs, closed under parents. Budgets are not applied.
+[[nodiscard]] SplitSet select(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod);
+// The same, for the range of the data set.
+[[nodiscard]] inline SplitSet select(const IntervalVolume& volume, const Lod& lod) { return select(volume, volume.relevant(), lod); }
 
 // `updates`, closed under parents, in descending order of rank (ranking.h), where an ancestor has at least the rank of
 // its descendants; equal ranks from coarse to fine, then by number. So parents always come before children.
-[[nodiscard]] std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& updates, const Lod& lod);
+[[nodiscard]] std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const RelevantUpdates& relevant, const SplitSet& updates,
+                                                const Lod& lod);
+// The same, for the range of the data set.
+[[nodiscard]] inline std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const SplitSet& updates, const Lod& lod) {
+  return in_order(volume, volume.relevant(), updates, lod);
+}
 
 }  // namespace intervale

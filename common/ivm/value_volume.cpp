@@ -29,21 +29,6 @@ ValueVolume::ValueVolume(Parts parts) : parts_(std::move(parts)), domain_(parts_
 
 std::size_t ValueVolume::memory_bytes() const { return parts_.set.memory_bytes() + parts_.keys.memory_bytes() + parts_.error_levels.size(); }
 
-ErrorLevel ValueVolume::error_level(UpdateIndex i, SetNeighbours& around, Slot slot) const {
-  if (i < parts_.error_levels.size()) return parts_.error_levels[i];
-  const auto key_at = [&](int v) {
-    const auto vertex = around.at(around.links(slot).vertex[std::size_t(v)]);
-    if (vertex.supercube.has(vertex.slot)) return key(vertex.supercube.index(vertex.slot));
-    const Diamond root(domain_.root());
-    const Vertex c = Diamond(centre_of(around.scale(), around.position(), slot)).vertex(v);
-    for (std::size_t corner = 0; corner < kRootVertices; ++corner) {
-      if (root.vertex(int(corner)) == c) return description().corners[corner];
-    }
-    return ValueKey(0);
-  };
-  return level_of_error(description().max_error, spine_error(description().format, key_at(0), key_at(1), key(i)));
-}
-
 double ValueVolume::error_of_level(double max_error, ErrorLevel level) {
   if (level == 0) return 0;
   return std::ldexp(max_error, level - (kErrorLevels - 1));
@@ -51,6 +36,7 @@ double ValueVolume::error_of_level(double max_error, ErrorLevel level) {
 
 ErrorLevel ValueVolume::level_of_error(double max_error, double error) {
   if (!(error > 0)) return 0;
+  if (error >= max_error) return kErrorLevels - 1;
   int exponent = 0;
   const double ratio = std::frexp(error / max_error, &exponent);  // in [0.5, 1) * 2^exponent
   return ErrorLevel(std::clamp(kErrorLevels - 1 + exponent - int(ratio == 0.5), 1, kErrorLevels - 1));

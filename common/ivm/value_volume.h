@@ -10,13 +10,13 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/codec/value_prediction.h"
 #include "common/diamond/domain.h"
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
-#include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/value_keys.h"
 #include "common/ivm/volume_table.h"
 #include "common/patch/value_format.h"
@@ -70,13 +70,12 @@ class ValueVolume {
   explicit ValueVolume(Parts parts);
 
   [[nodiscard]] const Parts& parts() const { return parts_; }
+  [[nodiscard]] Parts take() && { return std::move(parts_); }
   [[nodiscard]] const FieldDescription& description() const { return parts_.description; }
   [[nodiscard]] const Domain& domain() const { return domain_; }
   [[nodiscard]] const ValueWeights& weights() const { return parts_.weights; }
   [[nodiscard]] const SupercubeSet& set() const { return parts_.set; }
   [[nodiscard]] ValueKey key(UpdateIndex i) const { return parts_.keys[i]; }
-  // The error level of a diamond: saturated, but at scale 0 that of its spine alone. around: at its supercube.
-  [[nodiscard]] ErrorLevel error_level(UpdateIndex i, SetNeighbours& around, Slot slot) const;
   // The error of a level, in the field's units: 0 for level 0.
   [[nodiscard]] double error(ErrorLevel level) const { return error_of_level(description().max_error, level); }
   [[nodiscard]] std::size_t memory_bytes() const;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "common/diamond/diamond.h"
@@ -22,6 +23,20 @@ struct Range {
   friend bool operator==(const Range&, const Range&) = default;
 };
 
+// What a mesh is made for: a range, and which diamonds are relevant to it.
+struct ShownRange {
+  Range range;
+  Refine refine = Refine::boundary;
+  friend bool operator==(const ShownRange&, const ShownRange&) = default;
+};
+
+// What somebody asks to be shown of a data set; what is not said follows from the data set (resolve()).
+struct RangeRequest {
+  std::optional<Range> range;
+  std::optional<Refine> refine;
+  friend bool operator==(const RangeRequest&, const RangeRequest&) = default;
+};
+
 // Size of the mesh at error 0.
 struct FullMesh {
   std::uint64_t vertices = 0;
@@ -34,8 +49,10 @@ struct FullMesh {
 struct Description {
   std::string name;
   Grid grid;
+  // What the data set has the updates for. Of every range: from -inf to inf, refined uniformly.
   Range range;
   Refine refine = Refine::boundary;
+  bool has_every_range = false;                   // built for every range, and not for this one
   ValueFormat format;                             // of the values
   bool is_exact = true;                           // whether every sample is the value of its key
   std::array<ValueKey, kRootVertices> corners{};  // at the root's vertices, in local order
@@ -45,8 +62,18 @@ struct Description {
   std::uint64_t coefficients = 0;                 // cuts on their subdivision edges, at full detail
   FullMesh full;
   std::uint64_t content_hash = 0;  // of the contents; the name does not count
+  // What is shown if nothing else is asked for.
+  [[nodiscard]] ShownRange whole() const { return {range, refine}; }
   friend bool operator==(const Description&, const Description&) = default;
 };
+
+// What a request means: without a range, that of the data set. Another range than that, or one of every range, is refined
+// at its surfaces if the request does not say how.
+[[nodiscard]] ShownRange resolve(const Description& description, const RangeRequest& request);
+
+// Whether a data set has all that a range needs: its own range, or if it was refined uniformly any range within it.
+// Otherwise misuse, with what the data set has.
+[[nodiscard]] Result<void> check_held(const Description& description, const ShownRange& shown);
 
 // Checks a grid from outside: sides within bounds, a box that is finite and not flat.
 [[nodiscard]] Result<void> check_grid(const Grid& grid);

@@ -22,6 +22,15 @@ CLI::Option* add_range_option(CLI::App& app, std::vector<std::string>& bounds, c
   return app.add_option("--range", bounds, help)->expected(2)->type_name("LO HI");
 }
 
+CLI::Option* add_refine_option(CLI::App& app, std::optional<std::string>& refine, const std::string& help) {
+  return app.add_option("--refine", refine, help)->check(CLI::IsMember({"boundary", "uniform"}));
+}
+
+std::optional<Refine> parse_refine(const std::optional<std::string>& refine) {
+  if (!refine) return {};
+  return *refine == "uniform" ? Refine::uniform : Refine::boundary;
+}
+
 Result<std::optional<Range>> parse_range(const std::vector<std::string>& bounds) {
   if (bounds.empty()) return std::optional<Range>{};
   const auto low = parse_bound(bounds.at(0)), high = parse_bound(bounds.at(1));

@@ -57,15 +57,24 @@ struct StreamPlan::BatchBuilder {
 };
 
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()) {
-  const auto bricks = volume_->set().bricks();
-  pending_.resize(bricks.size());
-  for (BrickIndex b{0}; b < bricks.size(); ++b) {
-    const std::uint32_t end = b + 1 < bricks.size() ? bricks[b + 1].first : volume_->size();
-    pending_[b].unsent = std::uint16_t(end - bricks[b].first);
-    pending_[b].error_step = std::uint16_t(volume_->brick_error_step(b));
-    pending_[b].object_error = Up16(volume_->brick_object_error(b));
+  set_relevant({volume_, &volume_->relevant()});
+}
+
+void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant) {
+  relevant_ = std::move(relevant);
+  const SupercubeSet& set = volume_->set();
+  pending_.assign(set.bricks().size(), {});
+  wanted_count_ = pending_bricks_ = 0;
+  for (BrickIndex b{0}; b < pending_.size(); ++b) {
+    Pending& pending = pending_[b];
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
+      const std::uint64_t occupancy = set.occupancy()[s];
+      pending.unsent = std::uint16_t(pending.unsent + std::popcount(relevant_->slots(s, occupancy) & ~sent_.slots(set.first(b, s), occupancy)));
+    });
+    pending.error_step = std::uint16_t(relevant_->brick_error_step(b));
+    pending.object_error = Up16(relevant_->brick_object_error(b));
   }
-  const auto steps = volume_->supercube_error_steps();
+  const auto steps = relevant_->supercube_error_steps();
   supercube_steps_.assign(steps.begin(), steps.end());
 }
 
@@ -73,12 +82,13 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   const SupercubeSet& set = volume_->set();
   const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
   if (!found || (slots & ~set.occupancy()[found->supercube]) != 0) return false;
-  for (; slots != 0; slots &= slots - 1) {
-    const UpdateIndex i = set.place_in(found->brick, found->supercube, key, Slot(std::countr_zero(slots))).index;
+  const std::uint64_t relevant = relevant_->slots(found->supercube, set.occupancy()[found->supercube]);
+  for (const Slot slot : set_bits<Slot>(slots)) {
+    const UpdateIndex i = set.place_in(found->brick, found->supercube, key, slot).index;
     if (sent_.contains(i)) continue;
     sent_.insert(i);
     ++sent_count_;
-    --pending_[found->brick].unsent;
+    if ((relevant >> slot & 1) != 0) --pending_[found->brick].unsent;
   }
   return true;
 }
@@ -96,11 +106,12 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const UpdateIndex i = here.index(slot);
     sent_.erase(i);
     --sent_count_;
+    if ((relevant_->slots(here.supercube, here.occupancy) >> slot & 1) == 0) return;
     Pending& pending = pending_[here.brick];
     ++pending.unsent;
     const unsigned error_step = volume_->error_step(i);
     pending.error_step = std::max(pending.error_step, std::uint16_t(error_step));
-    pending.object_error = Up16(std::max(float(pending.object_error), volume_->object_error(here.supercube, scale_of_key(g.key), error_step)));
+    pending.object_error = Up16(std::max(float(pending.object_error), relevant_->object_error(here.supercube, scale_of_key(g.key), error_step)));
     supercube_steps_[here.supercube] = std::max(supercube_steps_[here.supercube], std::uint8_t(error_step));
   });
   return true;
@@ -109,14 +120,14 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
 void StreamPlan::set_lod(const Lod& lod) {
   budget_.reset();
   if (lod.max_updates) {
-    SplitSet wanted = select(*volume_, lod);
+    SplitSet wanted = select(*volume_, *relevant_, lod);
     if (wanted.count() > *lod.max_updates) {
-      const auto order = in_order(*volume_, wanted, lod);
+      const auto order = in_order(*volume_, *relevant_, wanted, lod);
       for (std::size_t i = *lod.max_updates; i < order.size(); ++i) wanted.erase(order[i]);
     }
     budget_ = std::move(wanted);
   }
-  ranking_.emplace(*volume_, lod);
+  ranking_.emplace(*volume_, *relevant_, lod);
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     const Pending& w = pending_[b];
     if (w.unsent == 0) continue;
@@ -230,8 +241,8 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
     if (full) return;
     ++builder.visited;
     const UpdateIndex first = set.first(brick, s);
-    const auto count = unsigned(std::popcount(set.occupancy()[s]));
-    const std::uint64_t unsent = ~sent_.some(first, count) & (~std::uint64_t(0) >> (64 - count));
+    const std::uint64_t occupancy = set.occupancy()[s];
+    const std::uint64_t unsent = ~sent_.some(first, unsigned(std::popcount(occupancy))) & extract_bits(relevant_->slots(s, occupancy), occupancy);
     if (unsent == 0) return;
     const auto here = visit_supercube(ranking, {key, brick, s, {}, first}, unsent, builder);
     full = !here;
@@ -239,7 +250,7 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
     rest.rank = std::max(rest.rank, here->rank);
     rest.wanted += here->wanted;
     rest.error_step = std::max(rest.error_step, here->error_step);
-    object_error = std::max(object_error, volume_->object_error(s, scale_of_key(key), here->error_step));
+    object_error = std::max(object_error, relevant_->object_error(s, scale_of_key(key), here->error_step));
   });
   if (full) return false;
   set_pending(brick, rest.rank, rest.wanted);
@@ -327,7 +338,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   if (builder.updates == 0) return {};
   std::vector<SlotGroup>& groups = builder.groups;
   std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
-  return Batch{encode_batch(*volume_, sent_, groups), builder.updates};
+  return Batch{encode_batch(*volume_, relevant_->shown(), sent_, groups), builder.updates};
 }
 
 }  // namespace intervale

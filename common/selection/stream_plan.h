@@ -38,6 +38,7 @@ inline constexpr std::size_t kFirstPayload = 8 << 10;
 // update (two with max_updates), a byte for each supercube and ten bytes for each brick.
 class StreamPlan {
  public:
+  // At first everything that the range of the data set needs is relevant.
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
   // Marks the updates that a resuming client has as sent: slots of a supercube. False if the data set has no such
@@ -52,6 +53,10 @@ class StreamPlan {
 
   // The most updates that the client holds.
   void set_room(std::uint64_t updates) { room_ = updates; }
+
+  // Replaces the range that is looked at: updates that are not relevant to it are not sent, nor any twice. relevant: of
+  // this volume. Before the set_lod() of the same view. O(supercubes).
+  void set_relevant(std::shared_ptr<const RelevantUpdates> relevant);
 
   // Replaces the level of detail; check_lod(lod) must hold. O(bricks); with max_updates O(updates).
   void set_lod(const Lod& lod);
@@ -82,7 +87,7 @@ class StreamPlan {
     explicit Up16(float value) : bits(std::uint16_t((std::bit_cast<std::uint32_t>(value) + 0xffff) >> 16)) {}
     explicit operator float() const { return std::bit_cast<float>(std::uint32_t(bits) << 16); }
   };
-  // The unsent updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
+  // The unsent relevant updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
   struct Pending {
     Rank rank = 0;             // of those that are wanted; 0: there are none
     std::uint16_t unsent = 0;  // their number
@@ -107,6 +112,7 @@ class StreamPlan {
   [[nodiscard]] bool has_room(const BatchBuilder& builder, std::size_t updates) const;
 
   std::shared_ptr<const IntervalVolume> volume_;
+  std::shared_ptr<const RelevantUpdates> relevant_;  // not null
   SplitSet sent_;
   std::vector<Pending> pending_;               // by brick
   std::vector<std::uint8_t> supercube_steps_;  // by supercube: bound on the error step of the unsent updates

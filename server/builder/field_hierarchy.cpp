@@ -11,16 +11,17 @@
 #include <tuple>
 
 #include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/saturate.h"
 #include "common/ivm/value_page.h"
 #include "common/patch/tet_cases.h"
 #include "common/util/bits.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/error_steps.h"
+#include "server/builder/error_to_distance.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/interpolation_error.h"
 #include "server/builder/relevance.h"
 #include "server/builder/supercube_family.h"
-#include "server/builder/surface_deviation.h"
 #include "server/builder/value_steps.h"
 
 namespace intervale {
@@ -174,7 +175,7 @@ FieldHierarchy::FieldHierarchy(const Volume& volume, const BuildOptions& options
   set_ = std::move(found.set);
   unit_cuts_ = found.unit_cuts;
   measure_errors(options.progress);
-  saturate(errors_);
+  saturate(set_, errors_, domain_.levels(), on_all_cores);
 }
 
 void FieldHierarchy::measure_errors(const std::function<void(double)>& progress) {
@@ -201,61 +202,6 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
       if (progress) progress(double(scale + 1) / domain_.levels());
     }
   });
-}
-
-// Raises each error to at least those of the diamond's relevant children. So the diamonds with an error above any
-// threshold include all their ancestors, and form a conforming mesh (paper, section 3: Gerstner and Pajarola).
-void FieldHierarchy::saturate(std::vector<float>& errors) const {
-  for (int scale = 0; scale < domain_.levels(); ++scale) {
-    const auto [begin, end] = set_.of_scale(scale);
-    for (int cls = scale > 0 ? 2 : 1; cls >= 0; --cls) {
-      tbb::parallel_for<std::uint32_t>(begin, end, [&](std::uint32_t b) {
-        const BrickIndex brick(b);
-        SetNeighbours neighbours(set_);
-        set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-          const std::uint64_t slots = set_.occupancy()[s] & kSlotsOfClass[cls];
-          if (slots == 0) return;
-          neighbours.move_to(key);
-          UpdateIndex next = set_.first(brick, s) + std::popcount(set_.occupancy()[s] & (slots - 1) & ~slots);
-          for (const Slot slot : set_bits<Slot>(slots)) {
-            float& error = errors[next++];
-            for (const Link link : neighbours.children(slot)) {
-              const SetFinder::Found& found = neighbours.at(link.where);
-              if (found.has(link.slot)) error = std::max(error, errors[found.index(link.slot)]);
-            }
-          }
-        });
-      });
-    }
-  }
-}
-
-// Converts errors to object errors, supercube by supercube. An object error is half of the deviation, but no less than
-// twice the mean deviation of surface points, so that 99 % of them are within it also where all of a surface moves
-// alike, as with labels.
-std::vector<ErrorToDistance> FieldHierarchy::error_to_distance(const IntervalVolume::Parts& parts) const {
-  SurfaceDeviation deviation = surface_deviation(volume_, range_, domain_, set_);
-  saturate(deviation.largest);
-  const double unit = error_to_distance_unit(volume_.grid, parts.description.max_error);
-  std::vector<ErrorToDistance> result(set_.supercubes());
-  tbb::parallel_for(std::uint32_t(0), std::uint32_t(set_.bricks().size()), [&](std::uint32_t b) {
-    const BrickIndex brick(b);
-    set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-      const UpdateIndex first = set_.first(brick, s), end = first + std::popcount(set_.occupancy()[s]);
-      const double width = diamond_width(volume_.grid) * double(1 << scale_of_key(key));
-      double furthest = 0, ratio = 0;
-      for (UpdateIndex i = first; i < end; ++i) {
-        const double error = double(parts.error_steps[parts.steps[i]]);
-        if (error == 0) continue;
-        furthest = std::max(furthest, double(deviation.largest[i]));
-        ratio = std::max(ratio, double(deviation.largest[i]) / error);
-      }
-      const double share = furthest > 0 ? std::clamp(2 * double(deviation.mean[s]) / furthest, 0.5, 1.0) : 1;
-      constexpr double kRounding = 1e-6;
-      result[s] = ErrorToDistance::at_least(share * ratio, unit, furthest > width * (1 + kRounding));
-    });
-  });
-  return result;
 }
 
 double FieldHierarchy::value(Vertex v) const {
@@ -387,7 +333,8 @@ Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>&
   });
   for (const BrickPart& part : by_brick) d.coefficients += part.coefficients;
   d.full = full_mesh(by_brick);
-  parts.error_to_distance = error_to_distance(parts);
+  parts.error_to_distance = measure_error_to_distance(
+      volume_, range_, domain_, set_, [&parts](UpdateIndex i) { return double(parts.error_steps[parts.steps[i]]); }, d.max_error);
   return IntervalVolume::assemble(std::move(parts));
 }
 

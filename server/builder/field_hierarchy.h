@@ -57,8 +57,6 @@ class FieldHierarchy {
  private:
   [[nodiscard]] double value(Vertex v) const;  // of any vertex: the sample it clamps to
   void measure_errors(const std::function<void(double)>& progress);
-  void saturate(std::vector<float>& errors) const;
-  [[nodiscard]] std::vector<ErrorToDistance> error_to_distance(const IntervalVolume::Parts& parts) const;
   struct BrickPart;
   template <class T>
   [[nodiscard]] BrickPart count_brick(const Field<T>& field, BrickIndex brick) const;

@@ -6,7 +6,7 @@
 #include <exception>
 #include <system_error>
 
-#include "common/ivm/ivm_file.h"
+#include "common/ivm/load_volume.h"
 #include "server/serve/admission.h"
 
 namespace intervale {
@@ -46,7 +46,7 @@ Result<Catalogue> CatalogueWatcher::load(const std::function<bool()>& keep_going
       if (auto loaded = load_folder(input, keep_going); !loaded) return tl::unexpected(loaded.error());
       continue;
     }
-    auto volume = catching(input, [&] { return load_ivm(input); });
+    auto volume = catching(input, [&] { return load_volume(input); });
     if (!volume) return tl::unexpected(volume.error());
     files_.emplace_back(input, std::move(*volume));
   }
@@ -83,12 +83,12 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
   };
   const std::string name = path.stem().string();
   if (auto fit = Catalogue::check_name(name); !fit) return skip(path.string() + ": " + fit.error().message);
-  const auto bytes = catching(path, [&] { return read_ivm(path); });
+  const auto bytes = catching(path, [&] { return read_volume_file(path); });
   // Not the file's fault, perhaps: out of descriptors, or no permission; tried again even if the file stays as it is.
   if (!bytes) return skip(bytes.error().message);
   file.stamp = stamp;
   file.last_warning.clear();
-  auto volume = catching(path, [&] { return decode_ivm(*bytes, name); });
+  auto volume = catching(path, [&] { return decode_volume(*bytes, name); });
   if (!volume) return skip(path.string() + ": " + volume.error().message);
   // It includes a hash of the contents.
   if (file.volume && file.volume->description() == volume->description()) return false;

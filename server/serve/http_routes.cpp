@@ -40,8 +40,8 @@ std::string front_page(const Catalogue& catalogue, const Scope* scope) {
     if (scope == nullptr || !scope->allows(name)) continue;
     const Description& d = volume->description();
     page += "<li>" + html_escaped(name) + ": " + std::to_string(d.grid.dims[0]) + " × " + std::to_string(d.grid.dims[1]) + " × " +
-            std::to_string(d.grid.dims[2]) + " samples, " + std::to_string(d.updates) + " updates, " + std::to_string(d.full.tets) +
-            " tetrahedra in full</li>\n";
+            std::to_string(d.grid.dims[2]) + " samples, " + std::to_string(d.updates) + " updates, " +
+            (d.has_every_range ? "every range" : std::to_string(d.full.tets) + " tetrahedra in full") + "</li>\n";
   }
   return page + "</ul>\n<p><a href=\"/api/datasets\">As JSON</a>. This server has no viewer: see its option <code>--viewer</code>.</p>\n</html>\n";
 }

@@ -33,6 +33,7 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   if (!volume_) return Fault{CloseCode::no_such_dataset, "no such data set; see /api/datasets"};
   dataset_ = open.dataset;
   plan_.emplace(volume_);
+  planned_ = volume_->description().whole();
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
 }
@@ -50,10 +51,13 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (!opened()) return Fault{CloseCode::out_of_order, "View before Open"};
   if (view_ != ViewState::none && view.epoch <= epoch_)
     return Fault{CloseCode::out_of_order, "the epoch of a View must be greater than the last one"};
+  const ShownRange shown = resolve(volume_->description(), view.shown);
+  if (auto held = check_held(volume_->description(), shown); !held) return Fault{CloseCode::no_such_range, held.error().message};
   if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
   plan_->set_room(view.room.value_or(UINT64_MAX));
   epoch_ = view.epoch;
   new_lod_ = view.lod;
+  shown_ = shown;
   view_ = ViewState::unanswered;
   target_ = kFirstPayload;
   return {};
@@ -75,7 +79,11 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   if (!opened()) return {};
   if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
   if (!has_work()) return {};
-  if (new_lod_) plan_->set_lod(*std::exchange(new_lod_, std::nullopt));
+  if (new_lod_) {
+    if (planned_ != shown_) plan_->set_relevant(ranges_.get(volume_, shown_));
+    planned_ = shown_;
+    plan_->set_lod(*std::exchange(new_lod_, std::nullopt));
+  }
   // A batch does not use all the credit: the connection would be idle until the client's next grant arrives. Clients
   // grant a quarter of their window or more, and a batch takes about half of its bound.
   const std::uint64_t bound =

@@ -13,6 +13,7 @@
 #include "server/serve/access.h"
 #include "server/serve/atomic_shared_ptr.h"
 #include "server/serve/catalogue.h"
+#include "server/serve/range_cache.h"
 
 namespace intervale {
 
@@ -20,15 +21,16 @@ namespace intervale {
 // catalogue changes.
 class SessionState {
  public:
-  // scope: the data sets that may be opened; nullptr: none.
-  SessionState(const AtomicSharedPtr<Catalogue>& catalogue, std::shared_ptr<const Scope> scope) : catalogue_(catalogue), scope_(std::move(scope)) {}
+  // scope: the data sets that may be opened; nullptr: none. ranges must outlive the session, too.
+  SessionState(const AtomicSharedPtr<Catalogue>& catalogue, RangeCache& ranges, std::shared_ptr<const Scope> scope)
+      : catalogue_(catalogue), ranges_(ranges), scope_(std::move(scope)) {}
 
   // Handles a client's message. A fault ends the session: call nothing afterwards.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
   // The next message to send. nullopt: none now; call again if has_work(). max_payload bounds a batch's payload. With
-  // has_work() a call takes about a millisecond for each 16 KiB of max_payload, and the first call for a view with
-  // max_updates O(updates of the data set) in addition.
+  // has_work() a call takes about a millisecond for each 16 KiB of max_payload, and in addition the first call for a view
+  // with max_updates O(updates of the data set), and for a new range the time of RangeCache::get().
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
   // There may be a batch to select and encode.
@@ -53,11 +55,14 @@ class SessionState {
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
 
   const AtomicSharedPtr<Catalogue>& catalogue_;
+  RangeCache& ranges_;
   std::shared_ptr<const Scope> scope_;
   Catalogue::Volume volume_;
   std::string dataset_;
   std::optional<StreamPlan> plan_;
   std::optional<Lod> new_lod_;  // the last view, until the plan has it
+  ShownRange shown_;            // of the last view
+  ShownRange planned_;          // that the plan has
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding
   std::uint64_t last_grant_ = 0;

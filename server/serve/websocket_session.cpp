@@ -43,7 +43,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         read_delay_(ws_.get_executor()),
         context_(context),
         peer_(std::move(peer)),
-        state_(context.catalogue, peer_.scope),
+        state_(context.catalogue, context.ranges, peer_.scope),
         messages_(context.options.messages_per_second),
         views_(context.options.views_per_second),
         id_(context.next_session_id++) {}

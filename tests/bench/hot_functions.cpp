@@ -98,7 +98,8 @@ void apply_batches(benchmark::State& state) {
   const auto& f = fixture();
   for (auto _ : state) {
     Front front = root_front(f.sigma->description());
-    for (const auto& payload : f.payloads) benchmark::DoNotOptimize(apply_batch(front, f.sigma->description(), payload).has_value());
+    for (const auto& payload : f.payloads)
+      benchmark::DoNotOptimize(apply_batch(front, f.sigma->description(), f.sigma->description().whole(), payload).has_value());
   }
   count_items(state, f.places.size());
 }
@@ -118,7 +119,7 @@ void encode_one_batch(benchmark::State& state) {
       groups.push_back({b, s, key, set.occupancy()[s]});
     });
   }
-  for (auto _ : state) benchmark::DoNotOptimize(encode_batch(*f.sigma, f.all, groups));
+  for (auto _ : state) benchmark::DoNotOptimize(encode_batch(*f.sigma, f.sigma->description().whole(), f.all, groups));
   count_items(state, updates);
 }
 BENCHMARK(encode_one_batch)->Unit(benchmark::kMillisecond);

@@ -66,6 +66,44 @@ TEST_F(EveryRange, ADataSetThatIsRefinedUniformlyHasEveryRangeWithinItsOwn) {
   expect_complaint(run({program("intervale"), "extract", one, "--range", "20", "61"}), 2, "within [0, 60]", "intervale: ");
 }
 
+// Cameras and budgets, too.
+TEST_F(EveryRange, AClientReceivesTheMeshThatExtractMakes) {
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", "-0.5", "1", "--refine", "uniform"}).status, 0);
+  const ServerProgram server(folder.path().string());
+  const std::string url = server.url();
+  const std::vector<std::vector<std::string>> levels{{},
+                                                     {"--error-percent", "10"},
+                                                     {"--refine", "uniform", "--error-percent", "20"},
+                                                     {"--eye", "3", "2", "1", "--look-at", "0", "0", "0", "--pixel-error", "8"},
+                                                     {"--max-updates", "500"}};
+  for (const std::string& file : {every, one}) {
+    const std::string name = std::filesystem::path(file).stem();
+    for (const auto& [low, high] : {std::pair{"-0.5", "0.25"}, std::pair{"0", "0"}, std::pair{"-0.2", "1"}}) {
+      for (std::vector<std::string> options : levels) {
+        options.insert(options.end(), {"--range", low, high, "--digest"});
+        std::vector<std::string> extract{program("intervale"), "extract", file, "--json"};
+        extract.insert(extract.end(), options.begin(), options.end());
+        const auto expected = json_of(run(extract)), got = fetch_json(options, server.url(name));
+        for (const char* key : {"updates", "vertices", "tets", "digest"})
+          EXPECT_EQ(got.at(key), expected.at(key)) << name << " " << low << " " << key;
+      }
+    }
+  }
+  const auto list = json_of(run({client(), "list", url, "--json"})).at("datasets");
+  ASSERT_EQ(list.size(), 2u);
+  EXPECT_EQ(list.at(0).at("scope"), "every");
+  EXPECT_FALSE(list.at(0).contains("range") || list.at(0).contains("full"));
+  EXPECT_THAT(run({client(), "list", url}).out, HasSubstr("every: 20 x 20 x 20 samples, every range, values -1.495 to 1.495"));
+  expect_complaint(run({client(), "fetch", server.url("every")}), 2, "--range LO HI");
+  expect_complaint(run({client(), "fetch", server.url("one"), "--range", "0", "1.5"}), 2, "within [-0.5, 1]");
+  expect_complaint(run({client(), "fetch", server.url("every"), "--range", "1", "0"}), 2, "is greater than HI");
+  const std::string load = program("intervale-load");
+  EXPECT_EQ(run({load, server.url("every"), "--range", "0", "1", "--clients", "3", "--duration", "0.5", "--verify"}).status, 0);
+  expect_complaint(run({load, server.url("every"), "--clients", "1", "--duration", "0.1"}), 2, "--range LO HI", "intervale-load: ");
+  expect_complaint(run({load, server.url("one"), "--range", "0", "9", "--clients", "1", "--duration", "0.1"}), 2, "within [-0.5, 1]",
+                   "intervale-load: ");
+}
+
 TEST_F(EveryRange, WrongUsageIsSaid) {
   ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", "0", "1"}).status, 0);
   const auto complains = [](const std::vector<std::string>& arguments, const std::string& about, int status = 2) {
@@ -75,12 +113,10 @@ TEST_F(EveryRange, WrongUsageIsSaid) {
   };
   complains({"extract", every}, "--range LO HI");
   complains({"extract", every, "--range", "1", "0"}, "is greater than HI");
-  complains({"extract", every, "--range", "0", "1", "--eye", "3", "3", "3", "--look-at", "0", "0", "0"}, "--eye");
   complains({"extract", one, "--range", "0", "0.5"}, "was built for the range [0, 1] alone");
   complains({"extract", one, "--refine", "uniform"}, "--refine");
   complains({"build", volume, "-o", every, "--refine", "uniform"}, "--refine");
   for (const char* step : {"-1", "nan", "1e-300"}) complains({"build", volume, "-o", every, "--step", step}, "step");
-  complains({"serve", every, "--listen", "127.0.0.1:0"}, "every range", 1);
 }
 
 }  // namespace

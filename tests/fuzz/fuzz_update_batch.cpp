@@ -24,7 +24,9 @@ const std::vector<std::vector<Front>>& clients() {
       auto& stages = made.emplace_back();
       for (std::size_t stage = 0; stage < kStages; ++stage) {
         Front& front = stages.emplace_back(root_front(v.description()));
-        if (!apply_batch(front, v.description(), testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages)))) std::abort();
+        if (!apply_batch(front, v.description(), v.description().whole(),
+                         testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages))))
+          std::abort();
       }
     }
     return made;
@@ -40,7 +42,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Front front = clients()[volume][data[1] % kStages];
   std::uint64_t max_tets = ~std::uint64_t(0);
   if (data[1] & 0x80) max_tets = front.tet_count() + (data[1] >> 3 & 15);
-  const auto applied = apply_batch(front, testing::small_volumes()[volume].description(), {data + 2, size - 2}, max_tets);
+  const Description& description = testing::small_volumes()[volume].description();
+  const auto applied = apply_batch(front, description, description.whole(), {data + 2, size - 2}, max_tets);
   if (!applied) {
     if (applied.error().message.empty()) std::abort();
     return 0;

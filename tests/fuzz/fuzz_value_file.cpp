@@ -1,7 +1,8 @@
 // Bytes as a file of every range, without the shield of checksums (plain_sections.cpp).
 #include <cstdlib>
 
-#include "common/ivm/value_extraction.h"
+#include "common/ivm/every_range.h"
+#include "common/ivm/extraction.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_verify.h"
 #include "tests/fuzz/small_volumes.h"
@@ -29,7 +30,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   (void)validate(*decoded);
   const intervale::ValueFormat& format = decoded->description().format;
   const double middle = format.value(format.last / 2);
-  if (const auto mesh = extract(*decoded, {{middle, middle}, {}, {}}); !mesh || mesh->front.validate()) std::abort();
+  const auto volume = intervale::of_every_range(intervale::ValueVolume::Parts(decoded->parts()));
+  if (!volume) std::abort();
+  const intervale::ShownRange shown{{middle, middle}, {}};
+  const intervale::RelevantUpdates relevant(volume->description().grid, volume->set(), {volume->steps(), volume->error_steps()}, shown,
+                                            relevant_slots(*volume, shown), std::vector<intervale::ErrorToDistance>(volume->set().supercubes()));
+  if (const auto mesh = extract(*volume, relevant, {}); !mesh || mesh->front.validate()) std::abort();
   if (!intervale::decode_values(intervale::encode_values(*decoded), "again")) std::abort();
   return 0;
 }

@@ -11,7 +11,7 @@ inline IntervalVolume::Parts parts_of(const IntervalVolume& v) {
           v.keys(),
           {v.steps().begin(), v.steps().end()},
           {v.error_steps().begin(), v.error_steps().end()},
-          {v.error_to_distance().begin(), v.error_to_distance().end()}};
+          {v.relevant().error_to_distance().begin(), v.relevant().error_to_distance().end()}};
 }
 
 }  // namespace intervale::testing

@@ -10,6 +10,7 @@
 
 #include "client/core/client_session.h"
 #include "protocol/codec.h"
+#include "server/builder/find_relevant_updates.h"
 #include "server/serve/access.h"
 #include "server/serve/atomic_shared_ptr.h"
 #include "server/serve/catalogue.h"
@@ -58,7 +59,8 @@ class SessionServer {
   }
 
   AtomicSharedPtr<Catalogue> catalogue_;
-  SessionState state_{catalogue_, Scope::everything()};
+  RangeCache ranges_{[](const RangeCache::Volume& of, const ShownRange& shown) { return find_relevant_updates(of, shown, true); }};
+  SessionState state_{catalogue_, ranges_, Scope::everything()};
   Client& client_;
   std::vector<protocol::ClientMessage> received_;
   bool resumed_ = false;

@@ -138,6 +138,7 @@ TEST(ClientSession, TellsBothVersionsOfBatches) {
 // The server's side of the same.
 TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
   const AtomicSharedPtr<Catalogue> catalogue;
+  RangeCache ranges({});
   const struct {
     std::uint32_t payload;
     const char* text;
@@ -145,7 +146,7 @@ TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
                {1, "the client reads batches of version 1, and this server sends version 2: update the client"},
                {3, "the client reads batches of version 3, and this server sends version 2: update the server"}};
   for (const auto& c : cases) {
-    SessionState state(catalogue, Scope::everything());
+    SessionState state(catalogue, ranges, Scope::everything());
     const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});
     ASSERT_TRUE(fault);
     EXPECT_EQ(fault->code, CloseCode::other_version);

@@ -47,6 +47,9 @@ std::vector<ClientMessage> client_messages() {
           View{2, {}, 12345, {{{}, {}, supercube_key(3, {1, 0, 2}), 5}, {{}, {}, supercube_key(0, {7, 8, 9}), 1}}},
           View{std::numeric_limits<std::uint64_t>::max(),
                {.error = 0.5, .error_percent = 10, .roi = Box{{-1, 0, 1}, {2, 0, 3}}, .max_updates = 1ull << 60}},
+          View{3, {}, {}, {}, {Range{-1.5, std::numeric_limits<double>::infinity()}, {}}},
+          View{4, {}, {}, {}, {Range{2, 2}, Refine::uniform}},
+          View{6, {}, {}, {}, {{}, Refine::boundary}},
           View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}},
           Credit{65536},
           Open{"buckyball", "test 1", 0, 0xfedcba9876543210u},
@@ -223,6 +226,10 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
   wrong[7].roi = box;
   wrong[7].roi->min[0] = kNan;
   wrong[8].error_percent = -0.5;
+  for (const Range& range : {Range{1, 0}, Range{std::nan(""), 0}, Range{0, std::nan("")}}) {
+    EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {range, {}}}))));
+  }
+  EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {{}, Refine(2)}}))));
   for (const Lod& lod : wrong) EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, lod})))) << &lod - wrong.data();
 }
 

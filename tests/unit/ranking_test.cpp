@@ -55,7 +55,7 @@ void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const Visit&
 // Half of how far the surfaces can move in an update's diamond, from what is stored.
 double object_error(const IntervalVolume& v, const Place& p) {
   const Grid& g = v.description().grid;
-  const std::uint8_t code = v.error_to_distance()[p.supercube].code();
+  const std::uint8_t code = v.relevant().error_to_distance()[p.supercube].code();
   const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) / 2 * h;
   if (code == 0 || v.error(p.index) == 0) return 0;
   if (code == 191) return widest;
@@ -120,7 +120,7 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
   for (int trial = 0; trial < 40; ++trial) {
     const Ranking ranking(volume_, random_lod(volume_, random_));
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
-      const unsigned level = volume_.supercube_error_steps()[p.supercube];
+      const unsigned level = volume_.relevant().supercube_error_steps()[p.supercube];
       ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level), rank) << "trial " << trial;
     });
   }

@@ -61,7 +61,7 @@ class Receiver {
   }
   // Takes a batch; what was sent before, or before its parents, is refused.
   Result<std::uint64_t> take(const Batch& batch) {
-    auto applied = apply_batch(front_, volume_->description(), batch.payload);
+    auto applied = apply_batch(front_, volume_->description(), volume_->description().whole(), batch.payload);
     // A diamond whose parents are all split is in the front, or split.
     volume_->set().for_each_down([&](const Place& p) {
       if (sent_[p.index]) return;

@@ -65,6 +65,7 @@ class Viewer {
                      .fov = camera["fov"].as<double>(),
                      .viewport = {camera["viewport"][0].as<int>(), camera["viewport"][1].as<int>()},
                      .pixel_error = view["pixelError"].as<double>()};
+    if (!view["range"].isNull()) wanted.shown.range = Range{view["range"][0].as<double>(), view["range"][1].as<double>()};
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
     stale_ = true;  // a budget hides and shows at once

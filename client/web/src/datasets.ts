@@ -7,6 +7,9 @@ export interface Dataset {
   spacing: Vec3;
   origin: Vec3;
   range: [number, number]; // closed, field units; may be infinite
+  values: [number, number]; // the least and the greatest of the field
+  hasEveryRange: boolean; // range is then from -Infinity to Infinity
+  hasRangesWithin: boolean; // any range within `range` can be shown
   maxError: number; // of the coarsest mesh, field units
   updates: number; // of the full mesh
   fullTets: number;
@@ -48,13 +51,18 @@ function parsed(entry: unknown): Dataset | null {
   const d = entry as Record<string, unknown>;
   if (typeof d?.['name'] !== 'string') return null;
   const full = (d['full'] ?? {}) as Record<string, unknown>;
-  const range = Array.isArray(d['range']) ? d['range'] : [];
+  const values = (d['values'] ?? {}) as Record<string, unknown>;
+  const hasEveryRange = d['scope'] === 'every';
+  const range = hasEveryRange ? ['-inf', 'inf'] : Array.isArray(d['range']) ? d['range'] : [];
   return {
     name: d['name'],
     dims: vec(d['dims']),
     spacing: vec(d['spacing']),
     origin: vec(d['origin']),
     range: [number(range[0]), number(range[1])],
+    values: [number(values['least']), number(values['greatest'])],
+    hasEveryRange,
+    hasRangesWithin: hasEveryRange || d['refine'] === 'uniform',
     maxError: number(d['max_error']),
     updates: number(d['updates']),
     fullTets: number(full['tets']),

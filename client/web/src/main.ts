@@ -11,6 +11,7 @@ import { showLegend } from './legend';
 import { watchPanel } from './panel';
 import { watchPointers } from './pointer';
 import { watchProgress } from './progress';
+import { rangeOf } from './range';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
 import { fromHash, toHash, type ViewState } from './state';
@@ -134,10 +135,11 @@ class Page {
     const pose = this.viewer.pose();
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
-    const { pixelError, region, maxTets, memory, clip, tets, wireframe } = view.value;
+    const { range, pixelError, region, maxTets, memory, clip, tets, wireframe } = view.value;
     const viewport: [number, number] = [canvas.width, canvas.height];
+    const { dataset } = status.value;
     return {
-      view: { camera: { ...pose, viewport }, pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
+      view: { camera: { ...pose, viewport }, range: dataset && rangeOf(dataset, range), pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,

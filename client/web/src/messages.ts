@@ -37,6 +37,7 @@ export type Request =
 
 export interface View {
   camera: Pose & { viewport: [number, number] }; // viewport: device pixels
+  range: [number, number] | null; // of values; null: the data set's own
   pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null;
   maxTets: number | null; // in the mesh; null: no limit

@@ -2,6 +2,7 @@
 import type { Dataset } from './datasets';
 import { create, element, input, onClick, setText } from './dom';
 import { bytes, count, short } from './format';
+import { rangeOf, watchRange } from './range';
 import { kSurfaces, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
@@ -10,8 +11,8 @@ import type { Store } from './store';
 const kTetBudgets = [null, 10e3, 20e3, 50e3, 100e3, 200e3, 500e3, 1e6, 2e6, 5e6, 10e6];
 const kMemoryBudgets = [null, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]; // MB
 
-// What is reset when another data set is chosen: coordinates in the box of the last one.
-const kReset: Partial<ViewState> = { pose: null, clip: null, region: null, tets: false };
+// What is reset when another data set is chosen: values of the last one, and coordinates in its box.
+const kReset: Partial<ViewState> = { range: null, pose: null, clip: null, region: null, tets: false };
 
 // The slider of the screen-space error: from 0.5 pixels, ten positions per doubling.
 const kLeastPixels = 0.5;
@@ -26,6 +27,7 @@ function nearest(choices: (number | null)[], value: number | null): number {
 }
 
 export function watchPanel(view: Store<ViewState>, status: Store<Status>): void {
+  watchRange(view, status);
   watchSurfaces(view, status);
   watchSwitches(view);
   watchSliders(view);
@@ -57,10 +59,14 @@ function watchSurfaces(view: Store<ViewState>, status: Store<Status>): void {
       setText(element(`${name}-out`), `${Math.round(style.opacity * 100)} %`);
     });
   }
-  status.watch(['dataset'], ({ dataset }) => {
-    setText(element('alpha-value'), dataset ? `field = ${short(dataset.range[0])}` : '');
-    setText(element('beta-value'), dataset ? `field = ${short(dataset.range[1])}` : '');
-  });
+  const showValues = () => {
+    const { dataset } = status.value;
+    const range = dataset && (rangeOf(dataset, view.value.range) ?? dataset.range);
+    setText(element('alpha-value'), range ? `field = ${short(range[0])}` : '');
+    setText(element('beta-value'), range ? `field = ${short(range[1])}` : '');
+  };
+  status.watch(['dataset'], showValues);
+  view.watch(['range'], showValues);
 }
 
 function watchSwitches(view: Store<ViewState>): void {
@@ -108,8 +114,9 @@ function showDatasets(datasets: Dataset[] | null, open: Dataset | null, choose: 
   list.replaceChildren(...choices);
 }
 
-function summary({ dims, range, fullTets, fullBytes }: Dataset): HTMLElement {
+function summary({ dims, range, values, hasEveryRange, fullTets, fullBytes }: Dataset): HTMLElement {
   const size = fullTets > 0 ? [`${count(fullTets)} tetrahedra`, bytes(fullBytes)] : [];
-  const parts = [dims.join(' × '), `${short(range[0])} to ${short(range[1])}`, ...size];
+  const [low, high] = hasEveryRange ? values : range;
+  const parts = [dims.join(' × '), `${short(low)} to ${short(high)}`, ...(hasEveryRange ? ['every range'] : []), ...size];
   return create('small', {}, ...parts.map((part) => create('span', {}, part)));
 }

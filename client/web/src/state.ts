@@ -3,7 +3,7 @@
 //
 //   #data=NAME&eye=x,y,z&at=x,y,z&up=x,y,z&fov=30
 //
-// and, where they differ from the defaults: px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset,
+// and, where they differ from the defaults: range=low,high (either may be -inf or inf), px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset,
 // roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe), shrink, and alpha, beta and box
 // (each rrggbb,opacity).
 import { kFov, type Pose } from './camera';
@@ -21,6 +21,7 @@ export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // th
 export class ViewState {
   dataset: string | null = null; // null: the server's first
   pose: Pose | null = null; // null: shows the whole data set
+  range: [number, number] | null = null; // of values, ascending; null: see rangeOf()
   pixelError = 1; // largest screen-space error, pixels; 0.1 to 64
   maxTets: number | null = null; // null: no limit
   memory: number | null = null; // MB for updates; null: no limit
@@ -53,6 +54,7 @@ export function toHash(state: ViewState): string {
     put('up', write(state.pose.up));
     if (state.pose.fov !== kFov) put('fov', write([state.pose.fov]));
   }
+  if (state.range) put('range', state.range.map((x) => (Number.isFinite(x) ? write([x]) : x < 0 ? '-inf' : 'inf')).join(','));
   if (state.pixelError !== kDefaults.pixelError) put('px', write([state.pixelError]));
   if (state.maxTets !== null) put('tets', write([state.maxTets]));
   if (state.memory !== null) put('mb', write([state.memory]));
@@ -75,6 +77,16 @@ const kGreatest = 1e30; // greater coordinates would overflow float32 on the gra
 function read(text: string | null, n: number): number[] | null {
   const numbers = text === null ? [] : text.split(',').map((word) => (word.trim() === '' ? NaN : Number(word)));
   return numbers.length === n && numbers.every((x) => Math.abs(x) <= kGreatest) ? numbers : null;
+}
+
+// Two ascending numbers, -inf or inf.
+function readRange(text: string | null): [number, number] | null {
+  const bounds = (text ?? '').split(',').map((word) => {
+    if (word === 'inf' || word === '-inf') return word === 'inf' ? Infinity : -Infinity;
+    return word.trim() === '' ? NaN : Number(word);
+  });
+  const [low, high] = bounds;
+  return bounds.length === 2 && low! <= high! && low !== Infinity && high !== -Infinity ? [low!, high!] : null;
 }
 
 // An up vector that is not parallel to the direction of view: the preferred one if possible.
@@ -100,6 +112,7 @@ export function fromHash(hash: string): ViewState {
   if (eye && lookAt && eye.some((x, i) => x !== lookAt[i])) {
     state.pose = { eye, lookAt, up: upFor(eye, lookAt, up ?? [0, 0, 1]), fov: readClamped(get('fov'), 5, 120) ?? kFov };
   }
+  state.range = readRange(get('range'));
   state.pixelError = readClamped(get('px'), 0.1, 64) ?? kDefaults.pixelError;
   state.maxTets = readClamped(get('tets'), 1, 1e9);
   state.memory = readClamped(get('mb'), 1, 1e5);

@@ -226,6 +226,33 @@ onPage('choosing another data set resets the view', async (page) => {
   await page.waitForFunction(() => document.querySelector('#progress-text').textContent === 'Done: memory limit reached');
 });
 
+onPage('of every range, the range is chosen by two numbers, and stands in the address', async (page) => {
+  assert.equal(await page.isVisible('#range-section'), false, 'this one has one range');
+  await page.evaluate(() => {
+    window.ranges = [];
+    const post = Worker.prototype.postMessage;
+    Worker.prototype.postMessage = function (...message) {
+      if (message[0].view) window.ranges.push(message[0].view.range);
+      post.apply(this, message);
+    };
+  });
+  const shows = (low, high) => page.waitForFunction(([a, b]) => {
+    const range = window.ranges.at(-1);
+    return range?.[0] === a && range[1] === b;
+  }, [low, high]);
+  await page.getByRole('radio', { name: 'any' }).check();
+  await shows(0, 1.5);
+  assert.equal(await page.inputValue('#range-high'), '1.5');
+  await page.fill('#range-low', '-0.25');
+  await page.press('#range-low', 'Enter');
+  await shows(-0.25, 1.5);
+  assert.equal(await page.textContent('#alpha-value'), 'field = −0.25');
+  await page.fill('#range-high', '');
+  await page.press('#range-high', 'Enter');
+  await shows(-0.25, Infinity);
+  await page.waitForFunction(() => location.hash.includes('range=-0.25,inf'));
+});
+
 onPage('the picture returns when a lost WebGL context is restored', async (page) => {
   const old = await pixels(page);
   await page.evaluate(() => {

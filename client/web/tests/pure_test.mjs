@@ -11,8 +11,8 @@ const server = await createServer({
   appType: 'custom',
 });
 const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
-const kModules = ['state', 'camera', 'plane', 'region', 'format', 'vec'];
-const [{ fromHash, toHash, kDefaults }, camera, plane, region, format, vec] = await Promise.all(kModules.map(load));
+const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec'];
+const [{ fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec] = await Promise.all(kModules.map(load));
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -38,6 +38,7 @@ test('an address restores the view that it was written from', () => {
     const state = {
       dataset: ['buckyball', 'a b/ü&=#+', null][i % 3],
       pose: i % 2 ? { ...randomPose(), fov: 45 } : null,
+      range: i % 3 ? [Math.min(a[0], b[0]), Math.max(a[0], b[0])] : null,
       pixelError: random(0.5, 16),
       maxTets: i % 4 ? null : Math.round(random(1e4, 1e7)),
       memory: i % 5 ? null : 20,
@@ -57,12 +58,30 @@ test('an address restores the view that it was written from', () => {
 });
 
 test('an invalid address gives the default view', () => {
-  const invalid = ['#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#eye=1,1,1&at=1,1,1'];
+  const invalid = ['#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#range=2,1', '#range=1', '#range=a,b', '#range=inf,inf', '#range=1,', '#eye=1,1,1&at=1,1,1'];
   for (const hash of ['', '#', ...invalid]) {
     assert.deepEqual(fromHash(hash), kDefaults, hash);
   }
   assert.equal(fromHash('#px=1e9').pixelError, 64);
   assert.equal(fromHash('#show=tets').tets, false, 'tetrahedra need a region');
+});
+
+test('a range is that of the data set, or one within it', () => {
+  for (const range of [[-Infinity, 3], [2, Infinity], [-Infinity, Infinity], [0, 0]]) {
+    assert.deepEqual(fromHash(toHash({ ...kDefaults, range })).range, range);
+  }
+  const every = { range: [-Infinity, Infinity], values: [-1, 5], hasEveryRange: true, hasRangesWithin: true };
+  const uniform = { range: [0, 4], values: [-1, 5], hasEveryRange: false, hasRangesWithin: true };
+  const one = { ...uniform, hasRangesWithin: false };
+  assert.deepEqual(values.rangeOf(every, null), [2, 5], 'the upper half');
+  assert.deepEqual(values.rangeOf(every, [-9, 1]), [-9, 1]);
+  assert.equal(values.rangeOf(uniform, null), null);
+  assert.deepEqual(values.rangeOf(uniform, [-9, 1]), [0, 1]);
+  assert.deepEqual(values.rangeOf(uniform, [7, 9]), [4, 4]);
+  assert.equal(values.rangeOf(one, [1, 2]), null);
+  assert.deepEqual(values.boundMoved([1, 2], 0, 3), [3, 3]);
+  assert.deepEqual(values.boundMoved([1, 2], 1, 0), [0, 0]);
+  assert.deepEqual(values.boundMoved([1, 2], 1, Infinity), [1, Infinity]);
 });
 
 test('a rotation keeps the distance, and its inverse restores the camera', () => {

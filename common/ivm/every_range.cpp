@@ -1,0 +1,157 @@
+#include "common/ivm/every_range.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/block_lattice.h"
+#include "common/ivm/saturate.h"
+#include "common/patch/key_sides.h"
+
+namespace intervale {
+namespace {
+
+float round_up(double error) {
+  const float f = float(error);
+  return double(f) < error ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
+}
+
+// The lowest level among a diamond's nearest ancestors of scale 1 or coarser, which are all as large as its error. around:
+// at its supercube.
+ErrorLevel level_of_ancestors(const SupercubeSet& set, const std::vector<ErrorLevel>& levels, std::size_t coarse, SupercubeKey key, Slot slot) {
+  SetNeighbours around(set);
+  around.move_to(key);
+  const Links& links = around.links(slot);
+  ErrorLevel lowest = kErrorLevels - 1;
+  for (std::size_t k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
+    const auto parent = around.at(links.vertex[links.parent[k]]);
+    if (!parent.supercube.has(parent.slot)) continue;
+    const UpdateIndex i = parent.supercube.index(parent.slot);
+    lowest = std::min(lowest, i < coarse ? levels[i] : level_of_ancestors(set, levels, coarse, parent.supercube.key, parent.slot));
+  }
+  return lowest;
+}
+
+// The levels of the diamonds of scale 0: saturated errors at the middles of spines, which are all that is inside. What
+// the box cuts has that of its ancestors, for there the samples inside are others. levels: of the coarser ones; it gets
+// those of all.
+void add_finest_levels(const ValueVolume& volume, std::vector<ErrorLevel>& levels, const ParallelFor& parallel) {
+  const ValueVolume::Parts& parts = volume.parts();
+  const SupercubeSet& set = parts.set;
+  const std::size_t coarse = levels.size();
+  levels.resize(set.size());
+  std::vector<BrickRun> blocks = blocks_of(set);
+  std::erase_if(blocks, [&set](const BrickRun& block) { return scale_of_key(set.bricks()[block.first].key) != 0; });
+  parallel(blocks.size(), [&](std::size_t block) {
+    BlockLattice lattice(parts);
+    lattice.move_to(block_of(set.bricks()[blocks[block].first].key), BlockLattice::Load::all);
+    VertexKeys around{};
+    for (BrickIndex brick = blocks[block].first; brick < blocks[block].end; ++brick) {
+      set.for_each_in_brick(brick, ~std::uint64_t(0), [&](const Place& p) {
+        if (!volume.domain().is_interior(Diamond(SupercubeSet::centre(p)))) {
+          levels[p.index] = level_of_ancestors(set, levels, coarse, p.key, p.slot);
+          return;
+        }
+        const BlockLattice::Point centre = lattice.at(p.key) + BlockLattice::of_slot(p.slot);
+        lattice.gather(centre, p.slot, around);
+        const double error = spine_error(parts.description.format, around[0], around[1], lattice.key(centre));
+        levels[p.index] = ValueVolume::level_of_error(parts.description.max_error, error);
+      });
+    }
+  });
+  saturate(set, levels, 1, parallel);
+}
+
+// Whether a diamond counts for a range. around: the keys of its vertices, or kNoKey.
+bool counts(const KeySides& sides, Refine refine, int vertices, const VertexKeys& around, ValueKey centre) {
+  ValueKey least = centre, greatest = centre;
+  for (std::size_t v = 0; v < std::size_t(vertices); ++v) {
+    if (around[v] == kNoKey) continue;
+    least = std::min(least, around[v]);
+    greatest = std::max(greatest, around[v]);
+  }
+  const Side low = sides.side(least), high = sides.side(greatest);
+  return low != high || (refine == Refine::uniform && low == Side::inside);
+}
+
+// Adds all ancestors. slots: by supercube.
+void close(const SupercubeSet& set, std::vector<std::uint64_t>& slots) {
+  SetNeighbours around(set);
+  for (int scale = 0; scale < kMaxLevels; ++scale) {
+    const auto [begin, end] = set.of_scale(scale);
+    for (int cls = 2; cls >= 0; --cls) {
+      for (BrickIndex brick = begin; brick < end; ++brick) {
+        set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+          const std::uint64_t chosen = slots[s] & kSlotsOfClass[std::size_t(cls)];
+          if (chosen == 0) return;
+          around.move_to(key);
+          for (const Slot slot : set_bits<Slot>(chosen)) {
+            const Links& links = around.links(slot);
+            for (std::size_t k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
+              const auto parent = around.at(links.vertex[links.parent[k]]);
+              if (parent.supercube.has(parent.slot)) slots[parent.supercube.supercube] |= std::uint64_t(1) << parent.slot;
+            }
+          }
+        });
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelFor& parallel) {
+  IntervalVolume::Parts parts;
+  std::vector<ErrorLevel> levels = std::move(values.error_levels);
+  ValueVolume volume(std::move(values));
+  add_finest_levels(volume, levels, parallel);
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const FieldDescription& d = volume.description();
+  Description& to = parts.description;
+  to.name = d.name;
+  to.grid = d.grid;
+  to.range = {-kInfinity, kInfinity};
+  to.refine = Refine::uniform;
+  to.has_every_range = true;
+  to.format = d.format;
+  to.is_exact = d.is_exact;
+  to.corners = d.corners;
+  to.weights = volume.weights();
+  to.max_error = d.max_error;
+  for (int level = 0; level < kErrorLevels; ++level) parts.error_steps.push_back(round_up(volume.error(ErrorLevel(level))));
+  parts.steps = std::move(levels);
+  parts.error_to_distance.resize(volume.set().supercubes());
+  values = std::move(volume).take();
+  parts.set = std::move(values.set);
+  parts.keys = std::move(values.keys);
+  return IntervalVolume::assemble(std::move(parts));
+}
+
+std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel) {
+  const SupercubeSet& set = volume.set();
+  const KeySides sides(volume.description().format, shown.range);
+  const std::vector<BrickRun> blocks = blocks_of(set);
+  std::vector<std::uint64_t> slots(set.supercubes());
+  parallel(blocks.size(), [&](std::size_t block) {
+    BlockLattice lattice(volume);
+    lattice.move_to(block_of(set.bricks()[blocks[block].first].key), BlockLattice::Load::all);
+    VertexKeys around{};
+    for (BrickIndex brick = blocks[block].first; brick < blocks[block].end; ++brick) {
+      set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey supercube) {
+        const BlockLattice::Point at = lattice.at(supercube);
+        for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
+          const BlockLattice::Point centre = at + BlockLattice::of_slot(slot);
+          lattice.gather(centre, slot, around);
+          if (counts(sides, shown.refine, diamond_type(kTypeOfSlot[slot]).vertices, around, lattice.key(centre)))
+            slots[s] |= std::uint64_t(1) << slot;
+        }
+      });
+    }
+  });
+  close(set, slots);
+  return slots;
+}
+
+}  // namespace intervale

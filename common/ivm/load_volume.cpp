@@ -1,0 +1,29 @@
+#include "common/ivm/load_volume.h"
+
+#include <utility>
+
+#include "common/ivm/every_range.h"
+#include "common/ivm/ivm_container.h"
+#include "common/ivm/ivm_file.h"
+#include "common/ivm/value_file.h"
+
+namespace intervale {
+
+Result<std::vector<std::byte>> read_volume_file(const std::filesystem::path& path) { return read_container(path, {}); }
+
+Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {
+  if (scope_of(bytes) != Scope::every_range) return decode_ivm(bytes, std::move(name), parallel);
+  auto values = decode_values(bytes, std::move(name), parallel);
+  if (!values) return tl::unexpected(values.error());
+  return of_every_range(std::move(*values).take(), parallel);
+}
+
+Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel) {
+  const auto bytes = read_volume_file(path);
+  if (!bytes) return tl::unexpected(bytes.error());
+  auto volume = decode_volume(*bytes, path.stem().string(), parallel);
+  if (!volume) return fail(path.string() + ": " + volume.error().message);
+  return std::make_shared<const IntervalVolume>(std::move(*volume));
+}
+
+}  // namespace intervale

@@ -1,0 +1,78 @@
+#include "common/ivm/relevant_updates.h"
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "common/util/bits.h"
+
+namespace intervale {
+namespace {
+
+// Codes an octave, the code of a ratio of 1, and the code without a bound. Both near and far ratios go from 2^-12 to
+// 2^20.
+constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
+constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
+
+}  // namespace
+
+ErrorToDistance ErrorToDistance::at_least(double ratio, double unit, bool is_far) {
+  if (!(ratio > 0)) return ErrorToDistance(0);
+  const auto code = [&](int steps, int one) { return std::ceil(steps * std::log2(ratio / unit) - 1e-9) + one; };
+  if (is_far) return ErrorToDistance(std::uint8_t(std::clamp(code(kFarSteps, kFarOne), double(kFirstFar), double(kNoBoundFar))));
+  return ErrorToDistance(std::uint8_t(std::clamp(code(kNearSteps, kNearOne), 1.0, double(kNoBound))));
+}
+
+bool ErrorToDistance::is_far() const { return code_ >= kFirstFar; }
+
+float ErrorToDistance::ratio(float unit) const {
+  if (code_ == 0) return 0;
+  if (code_ == kNoBound || code_ == kNoBoundFar) return std::numeric_limits<float>::max();
+  if (is_far()) return unit * std::exp2(float(int(code_) - kFarOne) / kFarSteps);
+  return unit * std::exp2(float(int(code_) - kNearOne) / kNearSteps);
+}
+
+double error_to_distance_unit(const Grid& grid, double max_error) {
+  return max_error > 0 ? std::min({grid.spacing[0], grid.spacing[1], grid.spacing[2]}) / max_error : 1.0;
+}
+
+double diamond_width(const Grid& grid) { return 2 * std::hypot(grid.spacing[0], grid.spacing[1], grid.spacing[2]); }
+
+RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, const ShownRange& shown,
+                                 std::vector<std::uint64_t> slots, std::vector<ErrorToDistance> error_to_distance)
+    : shown_(shown),
+      slots_(std::move(slots)),
+      error_to_distance_(std::move(error_to_distance)),
+      supercube_step_(set.supercubes()),
+      brick_step_(set.bricks().size()),
+      brick_object_error_(set.bricks().size()),
+      error_(errors.values.begin(), errors.values.end()),
+      reach_(float(diamond_width(grid) / 2)) {
+  const auto unit = float(error_to_distance_unit(grid, error_.empty() ? 0.0 : double(error_.back())));
+  for (unsigned code = 0; code < factor_.size(); ++code) factor_[code] = ErrorToDistance(std::uint8_t(code)).ratio(unit);
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+      const UpdateIndex first = set.first(b, s);
+      const std::uint64_t occupancy = set.occupancy()[s], relevant = this->slots(s, occupancy);
+      std::uint8_t most = 0;
+      if (relevant == occupancy) {
+        for (UpdateIndex i = first; i < first + std::popcount(occupancy); ++i) most = std::max(most, errors.steps[i]);
+      } else {
+        for (const Slot slot : set_bits<Slot>(relevant)) most = std::max(most, errors.steps[first + count_below(occupancy, slot)]);
+      }
+      count_ += std::uint64_t(std::popcount(relevant));
+      supercube_step_[s] = most;
+      if (relevant == 0) return;
+      brick_step_[b] = std::max(brick_step_[b], most);
+      brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
+    });
+  }
+}
+
+std::size_t RelevantUpdates::memory_bytes() const {
+  return slots_.size() * sizeof(std::uint64_t) + error_to_distance_.size() + supercube_step_.size() + brick_step_.size() +
+         brick_object_error_.size() * sizeof(float) + error_.size() * sizeof(float);
+}
+
+}  // namespace intervale

@@ -1,0 +1,94 @@
+// Which updates of an interval volume are relevant to a range, and how far the surfaces of that range can move.
+//
+// Weiss and De Floriani 2008, section 6. A data set of one range holds only what its range needs: all of it is relevant.
+// Of a data set that was refined uniformly, or that has every range, any range within needs a part. Immutable, shared by
+// all sessions that look at that range.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/diamond/supercube.h"
+#include "common/patch/description.h"
+
+namespace intervale {
+
+// Converts errors to distances: how far the surfaces can still move, in world units, for each unit of field error. One
+// byte a supercube, a logarithmic code rounded up; 0: nothing moves. Most distances are also bounded by the width of
+// the diamond; their codes are sixths of an octave, and the last one has no other bound. For surface points far from
+// every patch of the coarse mesh (small separate pieces), the bound is kMaxFarDeviation instead of the diamond's width;
+// those codes are halves of an octave, and the last one has no other bound.
+class ErrorToDistance {
+ public:
+  ErrorToDistance() = default;
+  explicit ErrorToDistance(std::uint8_t code) : code_(code) {}
+  // The least code for `ratio`, at least 0 or infinite, in units of `unit`.
+  static ErrorToDistance at_least(double ratio, double unit, bool is_far = false);
+  [[nodiscard]] std::uint8_t code() const { return code_; }
+  [[nodiscard]] bool is_far() const;
+  [[nodiscard]] float ratio(float unit) const;  // the largest float where no bound is known
+
+ private:
+  std::uint8_t code_ = 0;
+};
+
+// The largest distance that is recorded, in widths of a diamond with h = 1.
+inline constexpr float kMaxFarDeviation = 64;
+
+// The unit of the ratios of ErrorToDistance.
+[[nodiscard]] double error_to_distance_unit(const Grid& grid, double max_error);
+// The width of a diamond with h = 1, the diagonal of its two cells a side, in world units.
+[[nodiscard]] double diamond_width(const Grid& grid);
+
+// The errors of an interval volume, by number of the update.
+struct UpdateErrors {
+  std::span<const std::uint8_t> steps;  // which of `values` its error is
+  std::span<const float> values;        // ascending, at most 256
+};
+
+class RelevantUpdates {
+ public:
+  // Of all updates of the set, if slots is empty. slots: by supercube, closed under parents; error_to_distance: by
+  // supercube. shown: what they are relevant to.
+  RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, const ShownRange& shown, std::vector<std::uint64_t> slots,
+                  std::vector<ErrorToDistance> error_to_distance);
+
+  [[nodiscard]] const ShownRange& shown() const { return shown_; }
+  [[nodiscard]] std::uint64_t count() const { return count_; }
+  // Of a supercube with this occupancy.
+  [[nodiscard]] std::uint64_t slots(SupercubeIndex supercube, std::uint64_t occupancy) const {
+    return slots_.empty() ? occupancy : slots_[supercube];
+  }
+
+  // The highest error step of a brick's or a supercube's relevant updates; 0 if there are none.
+  [[nodiscard]] unsigned brick_error_step(BrickIndex brick) const { return brick_step_[brick]; }
+  [[nodiscard]] std::span<const std::uint8_t> supercube_error_steps() const { return supercube_step_; }
+  // How far the surfaces can still move, in world units, while an update's diamond is refined completely. An estimate:
+  // 99 % of the surface should move no further, and nothing more than twice as far (FORMAT.md, "From errors to
+  // distances"). It depends on the update's supercube and scale, and grows with the error step. Not saturated.
+  [[nodiscard]] float object_error(SupercubeIndex supercube, int scale, unsigned step) const {
+    const ErrorToDistance to_distance = error_to_distance_[supercube];
+    const float distance = error_[step] * factor_[to_distance.code()];
+    return std::min(distance, reach_ * (to_distance.is_far() ? kMaxFarDeviation : float(1 << scale)));
+  }
+  [[nodiscard]] float brick_object_error(BrickIndex brick) const { return brick_object_error_[brick]; }  // the largest of its relevant updates
+  [[nodiscard]] std::span<const ErrorToDistance> error_to_distance() const { return error_to_distance_; }
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  ShownRange shown_;
+  std::vector<std::uint64_t> slots_;                // by supercube; empty: all
+  std::vector<ErrorToDistance> error_to_distance_;  // by supercube
+  std::vector<std::uint8_t> supercube_step_;        // by supercube
+  std::vector<std::uint8_t> brick_step_;            // by brick
+  std::vector<float> brick_object_error_;           // by brick
+  std::vector<float> error_;                        // by error step
+  std::array<float, 256> factor_;                   // by code of an ErrorToDistance
+  float reach_ = 0;                                 // the largest object error for h = 1: half a diamond's width
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace intervale

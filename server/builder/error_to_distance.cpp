@@ -1,0 +1,40 @@
+#include "server/builder/error_to_distance.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "common/ivm/saturate.h"
+#include "server/builder/all_cores.h"
+#include "server/builder/surface_deviation.h"
+
+namespace intervale {
+
+// An object error is half of the deviation, but no less than twice the mean deviation of surface points, so that 99 % of
+// them are within it also where all of a surface moves alike, as with labels.
+std::vector<ErrorToDistance> measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
+                                                       const std::function<double(UpdateIndex)>& error_of, double max_error) {
+  SurfaceDeviation deviation = surface_deviation(volume, range, domain, set);
+  saturate(set, deviation.largest, domain.levels(), on_all_cores);
+  const double unit = error_to_distance_unit(volume.grid, max_error);
+  std::vector<ErrorToDistance> result(set.supercubes());
+  on_all_cores(set.bricks().size(), [&](std::size_t b) {
+    const BrickIndex brick{std::uint32_t(b)};
+    set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+      const UpdateIndex first = set.first(brick, s), end = first + std::popcount(set.occupancy()[s]);
+      const double width = diamond_width(volume.grid) * double(1 << scale_of_key(key));
+      double furthest = 0, ratio = 0;
+      for (UpdateIndex i = first; i < end; ++i) {
+        const double error = error_of(i);
+        if (error == 0) continue;
+        furthest = std::max(furthest, double(deviation.largest[i]));
+        ratio = std::max(ratio, double(deviation.largest[i]) / error);
+      }
+      const double share = furthest > 0 ? std::clamp(2 * double(deviation.mean[s]) / furthest, 0.5, 1.0) : 1;
+      constexpr double kRounding = 1e-6;
+      result[s] = ErrorToDistance::at_least(share * ratio, unit, furthest > width * (1 + kRounding));
+    });
+  });
+  return result;
+}
+
+}  // namespace intervale

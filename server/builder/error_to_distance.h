@@ -1,0 +1,19 @@
+// From errors to distances, by measuring how far surfaces move (FORMAT.md, "From errors to distances").
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "common/diamond/domain.h"
+#include "common/ivm/relevant_updates.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+// By supercube of the set, the relevant diamonds. Samples are finite. error: of an update, saturated; max_error: the
+// largest of the data set. Uses all cores that oneTBB may.
+[[nodiscard]] std::vector<ErrorToDistance> measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain,
+                                                                     const SupercubeSet& set, const std::function<double(UpdateIndex)>& error,
+                                                                     double max_error);
+
+}  // namespace intervale

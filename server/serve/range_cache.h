@@ -1,0 +1,44 @@
+// What ranges need of the data sets that are served (RelevantUpdates), shared by all sessions.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <future>
+#include <list>
+#include <memory>
+#include <mutex>
+
+#include "common/ivm/interval_volume.h"
+
+namespace intervale {
+
+// Any thread.
+class RangeCache {
+ public:
+  using Volume = std::shared_ptr<const IntervalVolume>;
+  using Relevant = std::shared_ptr<const RelevantUpdates>;
+  // Computes one. shown: as check_held() accepts it.
+  using Find = std::function<Relevant(const Volume& volume, const ShownRange& shown)>;
+
+  // most_bytes: of the results that are kept for later; those in use stay anyway.
+  explicit RangeCache(Find find, std::size_t most_bytes = std::size_t(256) << 20) : find_(std::move(find)), most_bytes_(most_bytes) {}
+
+  // Computes it if nobody has, or waits for whoever does; about a microsecond for each update of the volume then.
+  [[nodiscard]] Relevant get(const Volume& volume, const ShownRange& shown);
+
+ private:
+  struct Entry {
+    std::weak_ptr<const IntervalVolume> volume;
+    ShownRange shown;
+    std::shared_future<Relevant> relevant;
+    std::size_t bytes = 0;  // 0: not computed yet
+  };
+  void drop_old();
+
+  Find find_;
+  std::size_t most_bytes_;
+  std::mutex mutex_;
+  std::list<Entry> entries_;  // the one used last is the first
+};
+
+}  // namespace intervale

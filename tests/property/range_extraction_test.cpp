@@ -1,0 +1,152 @@
+// Meshes of any range, from a data set of every range or of one that was refined uniformly.
+#include "common/ivm/extraction.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <utility>
+
+#include "common/ivm/every_range.h"
+#include "common/mesh/mesh_digest.h"
+#include "server/builder/field_hierarchy.h"
+#include "server/builder/find_relevant_updates.h"
+#include "server/builder/value_builder.h"
+#include "tests/support/coverage.h"
+#include "tests/support/mesh_laws.h"
+#include "tests/support/value_fields.h"
+
+namespace intervale {
+namespace {
+
+class RangeExtraction : public ::testing::TestWithParam<unsigned> {
+ public:
+  static constexpr std::array<std::array<std::int32_t, 3>, 4> kBoxes{{{9, 9, 9}, {9, 7, 5}, {17, 12, 13}, {6, 21, 4}}};
+  testing::ValueField field = testing::random_value_field(kBoxes[GetParam() % 4], GetParam());
+  Volume samples = field.volume;
+  std::shared_ptr<const IntervalVolume> volume =
+      std::make_shared<const IntervalVolume>(*of_every_range(build_value_volume(samples, field.format).take()));
+  std::mt19937 random{GetParam()};
+
+  [[nodiscard]] static Result<Extraction> mesh_of(const std::shared_ptr<const IntervalVolume>& from, const ShownRange& shown, const Lod& lod = {}) {
+    return extract(*from, *find_relevant_updates(from, shown, lod.camera.has_value()), lod);
+  }
+};
+
+TEST_P(RangeExtraction, EqualsADataSetOfOneRange) {
+  for (int i = 0; i < 6; ++i) {
+    const Range range = testing::random_range(field, random);
+    const Refine refine = random() % 2 == 0 ? Refine::boundary : Refine::uniform;
+    SCOPED_TRACE(testing::text_of(range, refine));
+    const auto one = FieldHierarchy(field.volume, {range, refine}).compact();
+    ASSERT_TRUE(one);
+    const auto expected = extract(*one, Lod{});
+    const auto extracted = mesh_of(volume, {range, refine});
+    ASSERT_TRUE(expected && extracted);
+    EXPECT_EQ(extracted->updates, expected->updates);
+    EXPECT_EQ(mesh_digest(extracted->front.mesh()), mesh_digest(expected->front.mesh()));
+  }
+}
+
+TEST_P(RangeExtraction, ADataSetRefinedUniformlyHasEveryRangeWithinItsOwn) {
+  for (int i = 0; i < 4; ++i) {
+    const Range outer = testing::random_range(field, random);
+    auto made = FieldHierarchy(field.volume, {outer, Refine::uniform}).compact();
+    ASSERT_TRUE(made);
+    const auto uniform = std::make_shared<const IntervalVolume>(std::move(*made));
+    const auto full = extract(*uniform, Lod{});
+    ASSERT_TRUE(full);
+    for (int k = 0; k < 4; ++k) {
+      const Range other = testing::random_range(field, random);
+      const Range inner{std::max(outer.alpha, other.alpha), std::min(outer.beta, other.beta)};
+      if (inner.alpha > inner.beta) continue;
+      const Refine refine = random() % 2 == 0 ? Refine::boundary : Refine::uniform;
+      SCOPED_TRACE(testing::text_of(outer, Refine::uniform) + " " + testing::text_of(inner, refine));
+      const auto one = FieldHierarchy(field.volume, {inner, refine}).compact();
+      ASSERT_TRUE(one);
+      const auto expected = extract(*one, Lod{});
+      ASSERT_TRUE(expected);
+      Front front = full->front;
+      front.set_range(inner, refine);
+      EXPECT_EQ(front.shown_count(), expected->updates);
+      EXPECT_EQ(mesh_digest(front.mesh()), mesh_digest(expected->front.mesh()));
+      const auto extracted = mesh_of(uniform, {inner, refine});
+      ASSERT_TRUE(extracted);
+      EXPECT_EQ(extracted->updates, expected->updates);
+      EXPECT_EQ(mesh_digest(extracted->front.mesh()), mesh_digest(expected->front.mesh()));
+    }
+  }
+}
+
+TEST_P(RangeExtraction, ErrorsAreSaturated) {
+  const SupercubeSet& set = volume->set();
+  set.for_each_down([&](const Place& p) {
+    for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_GE(volume->error_step(parent), volume->error_step(p.index)); });
+  });
+  EXPECT_EQ(volume->error_steps().back(), float(volume->description().max_error));
+}
+
+// What is relevant is what a data set of that range holds; distances are as far as errors are alike.
+TEST_P(RangeExtraction, FindsWhatADataSetOfOneRangeHolds) {
+  for (int i = 0; i < 4; ++i) {
+    const Range range = testing::random_range(field, random);
+    const Refine refine = random() % 2 == 0 ? Refine::boundary : Refine::uniform;
+    SCOPED_TRACE(testing::text_of(range, refine));
+    const auto one = FieldHierarchy(field.volume, {range, refine}).compact();
+    ASSERT_TRUE(one);
+    const auto relevant = find_relevant_updates(volume, {range, refine}, true);
+    EXPECT_EQ(relevant->count(), one->size());
+    const SupercubeSet& all = volume->set();
+    for (BrickIndex b{0}; b < all.bricks().size(); ++b) {
+      all.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+        const auto found = one->set().find_supercube(scale_of_key(key), position_of_key(key));
+        EXPECT_EQ(relevant->slots(s, all.occupancy()[s]), found ? one->set().occupancy()[found->supercube] : 0);
+        if (!found) return;
+        const bool moves = one->relevant().error_to_distance()[found->supercube].code() != 0;
+        const bool has_error = one->error_steps()[one->relevant().supercube_error_steps()[found->supercube]] > 0;
+        if (moves && has_error) {
+          EXPECT_GT(relevant->error_to_distance()[s].code(), 0);
+        }
+      });
+    }
+  }
+}
+
+TEST_P(RangeExtraction, KeepsTheGuaranteeOfItsError) {
+  for (int i = 0; i < 3; ++i) {
+    const Range range = testing::random_range(field, random);
+    SCOPED_TRACE(testing::text_of(range, Refine::boundary));
+    Lod lod;
+    lod.error_percent = 4 + 8 * i;
+    const auto extracted = mesh_of(volume, {range, Refine::boundary}, lod);
+    ASSERT_TRUE(extracted);
+    EXPECT_EQ(extracted->front.validate().value_or(""), "");
+    const Mesh mesh = extracted->front.mesh();
+    EXPECT_EQ(testing::broken_law(mesh, field.volume.grid, range.alpha == range.beta), "");
+    if (range.alpha < range.beta) {
+      EXPECT_EQ(testing::broken_guarantee(field.volume, mesh, range, error_of(lod, volume->description().max_error)), "");
+    }
+  }
+}
+
+TEST_P(RangeExtraction, KeepsItsBudgets) {
+  const Range range = testing::random_range(field, random);
+  const auto all = mesh_of(volume, {range, Refine::boundary});
+  ASSERT_TRUE(all);
+  Lod lod;
+  lod.max_tets = all->front.tet_count() / 3;
+  const auto tets = mesh_of(volume, {range, Refine::boundary}, lod);
+  ASSERT_TRUE(tets);
+  const Front root(field.volume.grid, field.format, volume->description().corners, range);
+  EXPECT_LE(tets->front.tet_count(), std::max(*lod.max_tets, root.tet_count()));
+  lod = {};
+  lod.max_updates = all->updates / 2;
+  const auto updates = mesh_of(volume, {range, Refine::boundary}, lod);
+  ASSERT_TRUE(updates);
+  EXPECT_LE(updates->updates, *lod.max_updates);
+  EXPECT_EQ(testing::broken_law(updates->front.mesh(), field.volume.grid, range.alpha == range.beta), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, RangeExtraction, ::testing::Range(0u, 30u));
+
+}  // namespace
+}  // namespace intervale
