@@ -4,18 +4,22 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "common/diamond/supercube.h"
-#include "common/patch/root_patch.h"
+#include "common/util/bits.h"
 #include "server/builder/border_shape.h"
+#include "server/builder/find_keys.h"
 #include "server/builder/interpolation_error.h"
+#include "server/builder/value_steps.h"
+#include "tests/bench/cases.h"
 
 namespace intervale::bench {
 namespace {
@@ -30,23 +34,23 @@ float round_up(double error) {
   return double(f) < error ? std::nextafter(f, std::numeric_limits<float>::max()) : f;
 }
 
-// Offsets of every type's vertices and children in an array of samples; times h, or for children of class 2 times h /
-// 2.
-struct Steps {
-  std::array<std::ptrdiff_t, kMaxVertices> vertex{};
-  std::array<std::ptrdiff_t, kMaxChildren> child{};
-};
+// Offsets of a type's children in an array of samples; times h, or of class 2 times h / 2.
+using Steps = std::array<std::ptrdiff_t, kMaxChildren>;
 
 template <class T>
 class TypedDelta final : public Delta {
  public:
-  TypedDelta(const Grid& grid, std::span<const T> samples) : grid_(grid), domain_(grid.dims), field_{samples, domain_.last()} {
+  TypedDelta(const Volume& volume, std::span<const T> samples)
+      : grid_(volume.grid),
+        domain_(grid_.dims),
+        field_{samples, domain_.last()},
+        format_(or_throw(choose_value_format(volume, 0.0))),
+        corners_(corner_keys(volume, format_)) {
     const std::ptrdiff_t row = domain_.last().x + 1, slice = row * (domain_.last().y + 1);
     for (unsigned type = 0; type < steps_.size(); ++type) {
       const DiamondType& t = diamond_type(type);
       const auto step = [&](Offset f) { return f.x + f.y * row + f.z * slice; };
-      for (int v = 0; v < t.vertices; ++v) steps_[type].vertex[v] = step(t.vertex[v]);
-      for (int k = 0; k < t.children; ++k) steps_[type].child[k] = step(t.child[k].child);
+      for (int k = 0; k < t.children; ++k) steps_[type][k] = step(t.child[k].child);
     }
     nodes_.resize(samples.size());
     find_outside();
@@ -57,7 +61,7 @@ class TypedDelta final : public Delta {
     }
   }
 
-  [[nodiscard]] Refined refine(const Range& range, Refine mode, double error, Walk walk) const override {
+  [[nodiscard]] Front refine(const Range& range, Refine mode, double error, Walk walk) const override {
     return mode == Refine::boundary ? refine_as<Refine::boundary>(range, error, walk) : refine_as<Refine::uniform>(range, error, walk);
   }
 
@@ -148,36 +152,33 @@ class TypedDelta final : public Delta {
     return mode == Refine::boundary ? low != high : low != Side::above && high != Side::below;
   }
 
-  [[nodiscard]] RootPatch root_patch(const Range& range) const {
-    const Diamond root(domain_.root());
-    const unsigned edges = Domain::edges(*root.row, domain_.tets(root));
-    RootPatch root_patch;
-    for (int v = 0; v < kRootVertices; ++v) root_patch.side[v] = side_of(double(sample(root.vertex(v))), range);
-    for (int e = 0; e < kRootEdges; ++e) {
-      const auto [a, b] = edge_ends(e, root.row->belt);
-      if (edges >> e & 1) root_patch.cuts[e] = cuts_between(double(sample(root.vertex(a))), double(sample(root.vertex(b))), range);
-    }
-    return root_patch;
-  }
-
   template <Refine mode>
-  [[nodiscard]] Refined refine_as(const Range& range, double error, Walk walk) const {
+  [[nodiscard]] Front refine_as(const Range& range, double error, Walk walk) const {
     const double threshold = error > 0 ? error : -0.5;  // at 0 every relevant diamond, also those without an error
-    Refined refined{Front(grid_, root_patch(range))};
+    Front front(grid_, format_, corners_, range, mode);
     const auto wanted = [&](Index i) { return is_wanted<mode>(nodes_[i], range, threshold); };
     if (walk == Walk::diamonds) {
-      refine_diamonds(refined, range, wanted);
+      refine_diamonds(front, wanted);
     } else {
-      refine_supercubes(refined, range, wanted);
+      refine_supercubes(front, wanted);
     }
-    return refined;
+    return front;
+  }
+
+  // From the sample at a diamond's centre.
+  [[nodiscard]] ValueKey key(Vertex centre) const {
+    if constexpr (std::is_integral_v<T>) {
+      return ValueKey(sample(centre)) - ValueKey(format_.first);  // modulo 2^32
+    } else {
+      return format_.key(double(sample(centre)));
+    }
   }
 
   // Top down, generation by generation: all parents of a diamond are of the generation before its own. Errors and
   // values are saturated, so whatever is wanted has all its parents split by the time its turn comes, and none has to
   // be forced.
   template <class Wanted>
-  void refine_diamonds(Refined& refined, const Range& range, const Wanted& wanted) const {
+  void refine_diamonds(Front& front, const Wanted& wanted) const {
     struct Reached {
       Vertex centre;
       Index index;
@@ -192,21 +193,17 @@ class TypedDelta final : public Delta {
       if (wanted(index)) next.push_back({centre, index});
     };
     reach(domain_.root(), index_of(domain_.root()));
-    FrontCursor cursor(refined.front.state());
+    FrontCursor cursor(front.state());
     while (!next.empty()) {
       now.swap(next);
       next.clear();
       for (const Reached& r : now) {
         const Diamond d(r.centre);
-        const bool interior = domain_.is_interior(d);
-        const int up = d.scale + 2;
-        cursor.move_to(d.scale, {d.centre.x >> up, d.centre.y >> up, d.centre.z >> up});
-        if (!cursor.gather(kSlotOfType[d.type])) throw std::logic_error(kTooSoon);
-        const Update u = update(d, interior, range);
-        refined.front.split(cursor, u.side, std::span(u.cuts).first(u.count));
-        for_each_child(d, interior, reach);
+        cursor.move_to(d);
+        if (!cursor.gather_keys(kSlotOfType[d.type])) throw std::logic_error(kTooSoon);
+        front.split(cursor, key(d.centre));
+        for_each_child(d, reach);
       }
-      refined.updates += now.size();
     }
   }
 
@@ -229,10 +226,10 @@ class TypedDelta final : public Delta {
     }
   };
 
-  // The same scale by scale and class by class, which are the generations, in supercubes: there the front looks around
-  // quickest.
+  // The same scale by scale and class by class, which are the generations, in supercubes: of those the front splits all
+  // diamonds at once.
   template <class Wanted>
-  void refine_supercubes(Refined& refined, const Range& range, const Wanted& wanted) const {
+  void refine_supercubes(Front& front, const Wanted& wanted) const {
     std::vector<Level> levels;
     levels.reserve(std::size_t(domain_.levels()));
     for (int scale = 0; scale < domain_.levels(); ++scale) levels.emplace_back(places(scale));
@@ -249,34 +246,31 @@ class TypedDelta final : public Delta {
       word.wanted |= bit;
     };
     reach(domain_.root(), index_of(domain_.root()));
-    FrontCursor cursor(refined.front.state());
+    std::vector<SlotGroup> groups;
     for (int scale = domain_.levels() - 1; scale >= 0; --scale) {
       Level& level = levels[std::size_t(scale)];
       for (const std::uint64_t cls : kSlotsOfClass) {
         for (std::size_t k = 0; k < level.touched.size(); ++k) {  // grows
           const Vertex p = level.position(level.touched[k]);
-          std::uint64_t left = level.words[level.touched[k]].wanted & cls;
-          if (left != 0) cursor.move_to(scale, p);
-          for (; left != 0; left &= left - 1) {
-            const Slot slot(std::countr_zero(left));
-            if (!cursor.gather(slot)) throw std::logic_error(kTooSoon);
-            const Diamond& d = cursor.diamond();
-            const bool interior = domain_.is_interior(d);
-            const Update u = update(d, interior, range);
-            refined.front.split(cursor, u.side, std::span(u.cuts).first(u.count));
-            ++refined.updates;
-            for_each_child(d, interior, reach);
+          for (const Slot slot : set_bits<Slot>(level.words[level.touched[k]].wanted & cls)) {
+            for_each_child(Diamond(centre_of(scale, p, slot), scale, kTypeOfSlot[slot]), reach);
           }
         }
       }
+      for (const std::uint32_t i : level.touched) groups.push_back({{}, {}, supercube_key(scale, level.position(i)), level.words[i].wanted});
     }
+    std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.key < b.key; });
+    const auto keys_of = [this](const SlotGroup& group, std::span<ValueKey, kSlots> keys) {
+      for (const Slot slot : set_bits<Slot>(group.slots)) keys[slot] = key(centre_of(group.key, slot));
+    };
+    if (front.split_all(groups, keys_of)) throw std::logic_error(kTooSoon);
   }
 
   // Calls reach(centre, index) for the children of a diamond that there may be.
   template <class Reach>
-  void for_each_child(const Diamond& d, bool interior, const Reach& reach) const {
+  void for_each_child(const Diamond& d, const Reach& reach) const {
     if (!d.has_children()) return;
-    if (!interior) {
+    if (!domain_.is_interior(d)) {
       for (int k = 0; k < d.row->children; ++k) {
         const Index index = index_of(d.child(k));
         if (index != kNowhere) reach(d.child(k), index);
@@ -285,38 +279,14 @@ class TypedDelta final : public Delta {
     }
     const auto here = std::ptrdiff_t(field_.index(d.centre));
     const std::ptrdiff_t step = d.row->cls == 2 ? d.h / 2 : d.h;
-    for (int k = 0; k < d.row->children; ++k) reach(d.child(k), Index(here + steps_[d.type].child[k] * step));
-  }
-
-  struct Update {
-    Side side;
-    std::size_t count = 0;
-    std::array<std::uint8_t, kMaxCuts> cuts;
-  };
-  [[nodiscard]] Update update(const Diamond& d, bool interior, const Range& range) const {
-    const T* const at_centre = &field_.samples[field_.index(interior ? d.centre : domain_.clamp(d.centre))];
-    const double centre = double(*at_centre);
-    Update u;
-    u.side = side_of(centre, range);
-    const auto cut = [&](double value) {
-      if (side_of(value, range) == u.side) return;
-      const Cuts q = cuts_between(centre, value, range);
-      for (int i = 0; i < q.count; ++i) u.cuts[u.count++] = q.q[i];
-    };
-    if (interior) {
-      for (int v = 0; v < d.row->vertices; ++v) cut(double(at_centre[steps_[d.type].vertex[v] * d.h]));
-    } else {
-      const unsigned vertices = Domain::vertices(*d.row, domain_.tets(d));
-      for (int v = 0; v < d.row->vertices; ++v) {
-        if (vertices >> v & 1) cut(double(sample(d.vertex(v))));
-      }
-    }
-    return u;
+    for (int k = 0; k < d.row->children; ++k) reach(d.child(k), Index(here + steps_[d.type][k] * step));
   }
 
   Grid grid_;
   Domain domain_;
   Field<T> field_;
+  ValueFormat format_;
+  std::array<ValueKey, kRootVertices> corners_;
   std::array<Steps, 64> steps_;
   std::vector<Node> nodes_;
   boost::unordered_flat_map<std::uint64_t, Index> outside_;  // id_of the straddling diamonds whose centre is no sample
@@ -326,7 +296,7 @@ class TypedDelta final : public Delta {
 
 std::unique_ptr<Delta> make_delta(const Volume& volume) {
   return visit_samples(
-      volume, [&]<class T>(std::span<const T> samples) -> std::unique_ptr<Delta> { return std::make_unique<TypedDelta<T>>(volume.grid, samples); });
+      volume, [&]<class T>(std::span<const T> samples) -> std::unique_ptr<Delta> { return std::make_unique<TypedDelta<T>>(volume, samples); });
 }
 
 }  // namespace intervale::bench

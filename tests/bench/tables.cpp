@@ -74,8 +74,8 @@ Extracted extract_mesh(const IntervalVolume& volume, double error, const Paralle
   return {extraction.front.mesh(parallel), extraction.updates};
 }
 Extracted extract_mesh(const Delta& delta, const Case& c, double error, Delta::Walk walk) {
-  const auto refined = delta.refine(c.range, c.refine, error, walk);
-  return {refined.front.mesh(), refined.updates};
+  const Front front = delta.refine(c.range, c.refine, error, walk);
+  return {front.mesh(), front.split_count()};
 }
 
 // What a session sends for the full mesh, batch by batch.
@@ -247,10 +247,11 @@ void print_queries(const std::vector<Row>& rows) {
   fmt::print("| **all** | | | **{:.2f}** | **{:.2f}** | *{:.2f}* |\n", sum / n, sum_of_quick / n, kPaperMean);
   fmt::print(
       "\nError: percent of the largest. One core; from the query to the indexed mesh. Δ descends diamond by diamond, as the\n"
-      "paper's queries do. Δ by supercubes descends and looks up neighbours in the front as Σ does: the part of Σ's advantage\n"
-      "that comes from supercubes. Δ saturates errors over all children. Σ saturates them over relevant children and rounds\n"
-      "them up to one of {} levels. Σ counts the updates that its mesh shows: not those whose vertices and centre lie on one\n"
-      "side, unless a finer one is shown. Hence the updates that differ. At error 0 both produce the same mesh.\n",
+      "paper's queries do. Δ by supercubes descends and splits the front by supercubes as Σ does: the part of Σ's advantage\n"
+      "that comes from supercubes. Δ computes its updates from samples: their keys, for the front derives sides and cuts. Δ\n"
+      "saturates errors over all children. Σ saturates them over relevant children and rounds them up to one of {} levels. Σ\n"
+      "counts the updates that its mesh shows: not those whose vertices and centre lie on one side, unless a finer one is\n"
+      "shown. Hence the updates that differ. At error 0 both produce the same mesh.\n",
       kMaxErrorSteps);
 }
 

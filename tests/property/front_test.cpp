@@ -1,189 +1,230 @@
-// Properties of a front that is split by cuts: the mesh depends only on which diamonds are split, and merging undoes
-// splitting. value_front_test.cpp has those of fronts that are split by values.
+// Properties of fronts: the mesh depends only on the field, the range and which diamonds are split, whatever was shown
+// before.
 #include "common/front/front.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
-#include <set>
 
 #include "common/ivm/extraction.h"
+#include "common/mesh/mesh_digest.h"
 #include "server/builder/field_hierarchy.h"
-#include "tests/support/fronts_by_cuts.h"
+#include "tests/support/front_laws.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/value_fields.h"
 
 namespace intervale {
 namespace {
 
-using testing::all_of;
 using testing::broken_law;
-using testing::canonical;
-using testing::front_by_cuts;
-using testing::split_by_cuts;
+using testing::handle_of;
+using testing::has_naive_points;
+using testing::on_threads;
+using testing::ValueField;
+using testing::wrong_value;
 
-class FrontLaws : public ::testing::TestWithParam<unsigned> {
- protected:
-  FrontLaws() {
-    std::mt19937 random(GetParam());
-    const auto side = [&] { return std::int32_t(2 + random() % 11); };
-    const std::array<std::int32_t, 3> dims{side(), side(), side()};
-    const bool equal = GetParam() % 4 == 0;
-    if (GetParam() % 2 == 0) {
-      volume_ = testing::digits(dims, GetParam());
-      range_ = {3, equal ? 3.0 : 5.5};
-    } else {
-      volume_ = testing::gyroid(GetParam() % 3 == 0 ? std::array<std::int32_t, 3>{9, 9, 9} : dims);
-      range_ = {-0.3, equal ? -0.3 : 0.2};
-    }
-  }
-  [[nodiscard]] FieldHierarchy hierarchy() const { return {volume_, {.range = range_}}; }
-  Volume volume_;
-  Range range_;
+// The mesh of a data set of this range at full detail.
+struct Expected {
+  std::string digest;
+  std::uint64_t updates = 0;
 };
+Expected expected(const ValueField& field, const Range& range, Refine refine) {
+  const IntervalVolume sigma = testing::build(field.volume, {.range = range, .refine = refine});
+  return {mesh_digest(extract(sigma, {})->front.mesh()), sigma.set().size()};
+}
 
-TEST_P(FrontLaws, AnyOrderThatRespectsParentsGivesTheSameMesh) {
-  const FieldHierarchy delta = hierarchy();
-  const testing::Canonical expected = canonical(extract(testing::build(volume_, {.range = range_}), {})->front.mesh());
-  for (unsigned trial = 0; trial < 3; ++trial) {
-    std::mt19937 random(GetParam() * 10 + trial);
-    Front front(volume_.grid, delta.root_patch());
-    std::vector<Place> waiting;
-    delta.set().for_each_down([&](const Place& p) { waiting.push_back(p); });
-    std::size_t steps = 0;
+class FrontMeshes : public testing::FrontLaws {
+ protected:
+  // A front with all diamonds that can be split.
+  [[nodiscard]] Front full(const Range& range, Refine refine, const ParallelFor& parallel = serial) const {
+    Front front = field.front(range, refine);
+    EXPECT_EQ(front.split_all(testing::groups_of(testing::all_centres(field)), testing::keys_of(field), parallel), std::nullopt);
+    return front;
+  }
+  // Splits diamonds in random order, each as soon as it can be.
+  void split_in_random_order(Front& front, std::vector<Vertex> waiting) {
     while (!waiting.empty()) {
       std::shuffle(waiting.begin(), waiting.end(), random);
-      std::vector<Place> later;
-      for (const Place& p : waiting) {
-        const Vertex c = SupercubeSet::centre(p);
-        const auto handle = front.find(c);
-        if (!handle) {
-          later.push_back(p);
-          continue;
-        }
-        split_by_cuts(front, *handle, delta, c);
-        if (++steps % 97 == 0) {
-          ASSERT_EQ(front.validate(), std::nullopt);
-          ASSERT_EQ(broken_law(front.mesh(), volume_.grid, range_.alpha == range_.beta), "");
+      std::vector<Vertex> later;
+      for (const Vertex c : waiting) {
+        if (const auto handle = front.find(c)) {
+          front.split(*handle, field.key(c));
+        } else {
+          later.push_back(c);
         }
       }
       ASSERT_LT(later.size(), waiting.size()) << "nothing can be split";
       waiting = later;
     }
-    EXPECT_EQ(canonical(front.mesh()), expected);
+  }
+  void expect_mesh_of(const Front& front, const Range& range, Refine refine) {
+    SCOPED_TRACE(testing::text_of(range, refine));
+    const Expected right = expected(field, range, refine);
+    EXPECT_EQ(front.validate(), std::nullopt);
+    EXPECT_EQ(front.shown_count(), right.updates);
+    const Mesh mesh = front.mesh();
+    EXPECT_EQ(mesh.tets.size(), front.tet_count());
+    EXPECT_EQ(mesh_digest(mesh), right.digest);
+    EXPECT_EQ(wrong_value(front, field, mesh), "");
+    EXPECT_TRUE(has_naive_points(front, field, mesh));
+  }
+};
+
+TEST_P(FrontMeshes, RelevantSplitsInAnyOrderGiveTheSameMesh) {
+  for (int trial = 0; trial < 4; ++trial) {
+    const Range range = any_range();
+    const Refine refine = any_refine();
+    const FieldHierarchy delta(field.volume, {.range = range, .refine = refine});
+    std::vector<Vertex> centres;
+    delta.set().for_each_down([&](const Place& p) { centres.push_back(delta.set().centre(p)); });
+    Front front = field.front(range, refine);
+    split_in_random_order(front, centres);
+    EXPECT_EQ(front.split_count(), centres.size());
+    expect_mesh_of(front, range, refine);
   }
 }
 
-TEST_P(FrontLaws, MergingIsTheInverseOfSplitting) {
-  const FieldHierarchy delta = hierarchy();
-  std::mt19937 random(GetParam());
-  Front front(volume_.grid, delta.root_patch());
-  const testing::Canonical coarse = canonical(front.mesh());
-  std::set<UpdateIndex> split;
-  std::vector<Place> places;
-  delta.set().for_each_down([&](const Place& p) { places.push_back(p); });
-  if (places.empty()) return;
-  const auto afresh = [&] {  // the mesh of this split set, made afresh
-    SplitSet set(delta.set().size());
-    for (UpdateIndex i : split) set.insert(i);
-    return canonical(front_by_cuts(delta, volume_.grid, set).mesh());
-  };
-  for (int round = 0; round < 12; ++round) {
-    // Some splits, then some merges, of whatever can be.
-    for (int i = 0; i < 400; ++i) {
-      const Place p = places[random() % places.size()];
-      const Vertex c = SupercubeSet::centre(p);
-      const bool split_now = round % 3 == 2 ? random() % 3 == 0 : random() % 3 != 0;
-      if (split_now) {
-        const auto handle = front.find(c);
-        EXPECT_FALSE(handle && split.contains(p.index));
-        if (!handle) continue;
-        split_by_cuts(front, *handle, delta, c);
-        split.insert(p.index);
-      } else {
-        if (front.merge(c)) {
-          EXPECT_EQ(split.erase(p.index), 1u) << "merged what was not split";
-        }
-      }
+TEST_P(FrontMeshes, AllSplitsInAnyOrderShowWhatIsRelevant) {
+  const Range range = any_range();
+  const Refine refine = any_refine();
+  Front front = field.front(range, refine);
+  split_in_random_order(front, testing::all_centres(field));
+  expect_mesh_of(front, range, refine);
+  const Front at_once = full(range, refine);
+  EXPECT_EQ(at_once.split_count(), front.split_count());
+  EXPECT_TRUE(at_once.is_part_of(front));
+  EXPECT_TRUE(front.is_part_of(at_once));
+  expect_mesh_of(at_once, range, refine);
+}
+
+TEST_P(FrontMeshes, AnyRangeHasTheMeshOfAFreshFront) {
+  Front front = full({0, 0}, Refine::boundary, on_threads);
+  for (int trial = 0; trial < 8; ++trial) {
+    const Range range = any_range();
+    const Refine refine = any_refine();
+    const std::uint64_t generation = front.state().point_generation;
+    front.set_range(range, refine, ~std::uint64_t(0), trial % 2 == 0 ? ParallelFor(serial) : on_threads);
+    EXPECT_EQ(front.range(), range);
+    EXPECT_EQ(front.refine(), refine);
+    EXPECT_GT(front.state().point_generation, generation);
+    EXPECT_EQ(front.withheld_count(), 0u);
+    expect_mesh_of(front, range, refine);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, FrontMeshes, ::testing::Range(1u, 41u));
+
+class FrontBudgets : public FrontMeshes {};
+
+// Never more than the budget; what it hid can be shown one by one, and then the mesh is whole.
+TEST_P(FrontBudgets, SplitsStayHiddenUntilThereIsRoom) {
+  const Range range = any_range();
+  const Refine refine = any_refine();
+  const Front whole = full(range, refine);
+  Front front = field.front(range, refine);
+  const std::uint64_t most = std::max(front.tet_count(), random() % (whole.tet_count() + 1));
+  const std::vector<Vertex> centres = testing::all_centres(field);
+  FrontCursor cursor(front.state());
+  std::uint64_t step = 0;
+  for (const Vertex c : centres) {
+    cursor.move_to(Diamond(c));
+    ASSERT_TRUE(cursor.find(handle_of(c).slot));
+    front.split(cursor, field.key(c), most);
+    ASSERT_LE(front.tet_count(), most);
+    if (++step % 200 == 0) {
+      ASSERT_EQ(front.validate(), std::nullopt);
     }
+  }
+  ASSERT_EQ(front.validate(), std::nullopt);
+  EXPECT_EQ(front.split_count(), whole.split_count());
+  EXPECT_EQ(broken_law(front.mesh(), field.volume.grid, range.alpha == range.beta), "");
+  EXPECT_TRUE(has_naive_points(front, field, front.mesh()));
+  for (const Vertex c : centres) {
+    const bool is_hidden = front.is_hidden(handle_of(c));
+    EXPECT_TRUE(!front.show(handle_of(c), ~std::uint64_t(0)) || is_hidden);
+  }
+  EXPECT_EQ(front.withheld_count(), 0u);
+  EXPECT_EQ(mesh_digest(front.mesh()), mesh_digest(whole.mesh()));
+}
+
+TEST_P(FrontBudgets, HoldForAnotherRange) {
+  Front front = full(any_range(), any_refine());
+  for (int trial = 0; trial < 4; ++trial) {
+    const Range range = any_range();
+    const Refine refine = any_refine();
+    SCOPED_TRACE(testing::text_of(range, refine));
+    front.set_range(range, refine);
+    const std::uint64_t whole = front.tet_count(), coarsest = field.front(range, refine).tet_count();
+    const std::uint64_t most = std::max(coarsest, random() % (whole + 2));
+    front.set_range(range, refine, most);
+    EXPECT_LE(front.tet_count(), most);
+    EXPECT_EQ(front.withheld_count() == 0, front.tet_count() == whole);
     ASSERT_EQ(front.validate(), std::nullopt);
-    ASSERT_EQ(broken_law(front.mesh(), volume_.grid, range_.alpha == range_.beta), "");
-    ASSERT_EQ(canonical(front.mesh()), afresh());
+    EXPECT_EQ(broken_law(front.mesh(), field.volume.grid, range.alpha == range.beta), "");
+    EXPECT_EQ(wrong_value(front, field, front.mesh()), "");
+    front.set_range(range, refine, whole);
+    expect_mesh_of(front, range, refine);
   }
-  // All the way back.
-  for (bool any = true; any;) {
-    any = false;
-    for (const Place& p : places) {
-      if (split.contains(p.index) && front.merge(SupercubeSet::centre(p))) split.erase(p.index), any = true;
-    }
-  }
-  EXPECT_TRUE(split.empty());
-  EXPECT_EQ(front.split_count(), 0u);
-  EXPECT_EQ(canonical(front.mesh()), coarse);
 }
 
-// What is hidden is no part of the mesh; what comes back is as it was.
-TEST_P(FrontLaws, HidingIsLeavingOut) {
-  const FieldHierarchy delta = hierarchy();
-  Front front = front_by_cuts(delta, volume_.grid, all_of(delta.set()));
-  const testing::Canonical full = canonical(front.mesh());
-  std::vector<Place> all;
-  delta.set().for_each_down([&](const Place& p) { all.push_back(p); });
-  SplitSet shown = all_of(delta.set());
-  const auto afresh = [&] { return canonical(front_by_cuts(delta, volume_.grid, shown).mesh()); };
-  const auto may_hide = [&](const Place& p) {
-    if (!shown.contains(p.index)) return false;
-    return std::none_of(all.begin(), all.end(), [&](const Place& child) {
-      bool is_child = false;
-      if (!shown.contains(child.index)) return false;
-      for_each_parent(delta.set(), child, [&](UpdateIndex parent) { is_child = is_child || parent == p.index; });
-      return is_child;
-    });
-  };
-  std::mt19937 random(GetParam());
-  for (int step = 0; step < 400 && !all.empty(); ++step) {
-    const Place& p = all[random() % all.size()];
-    const Front::Handle handle{p.key, p.slot};
-    ASSERT_NE(front.is_hidden(handle), shown.contains(p.index));
-    const std::uint64_t before = front.tet_count();
-    if (random() % 3 != 0) {
-      const bool may = may_hide(p);
-      ASSERT_EQ(front.hide(handle), may);
-      if (may) shown.erase(p.index);
-    } else {
-      bool may = !shown.contains(p.index);
-      for_each_parent(delta.set(), p, [&](UpdateIndex parent) { may = may && shown.contains(parent); });
-      if (may && random() % 4 == 0) {
-        const bool fits = front.show(handle, before);  // no more than it had
-        ASSERT_EQ(fits, !front.is_hidden(handle));
-        ASSERT_LE(front.tet_count(), before);
-      } else {
-        ASSERT_EQ(front.show(handle, ~std::uint64_t(0)), may);
-      }
-      if (!front.is_hidden(handle)) shown.insert(p.index);
-    }
-    ASSERT_EQ(front.split_count(), all.size());
-    ASSERT_EQ(front.shown_count(), shown.count());
-    if (step % 40 != 0) continue;
-    ASSERT_EQ(front.validate(), std::nullopt);
-    ASSERT_EQ(broken_law(front.mesh(), volume_.grid, range_.alpha == range_.beta), "");
-    ASSERT_EQ(front.mesh().tets.size(), front.tet_count());
-    ASSERT_EQ(canonical(front.mesh()), afresh());
-  }
-  for (const Place& p : all) {
-    if (!shown.contains(p.index)) {
-      ASSERT_TRUE(front.show({p.key, p.slot}, ~std::uint64_t(0)));
+INSTANTIATE_TEST_SUITE_P(Random, FrontBudgets, ::testing::Range(1u, 41u));
+
+// A box whose sides are no powers of two, of several supercubes along each axis.
+TEST(Front, ALargeClampingBoxHasTheMeshOfAFreshFront) {
+  for (const unsigned seed : {0u, 1u, 2u, 4u}) {
+    const ValueField field = testing::random_value_field({17, 12, 33}, seed);
+    std::mt19937 random(seed);
+    Front front = field.front({0, 0}, Refine::boundary);
+    ASSERT_EQ(front.split_all(testing::groups_of(testing::all_centres(field)), testing::keys_of(field), on_threads), std::nullopt);
+    for (int trial = 0; trial < 4; ++trial) {
+      const Range range = testing::random_range(field, random);
+      const Refine refine = trial % 2 == 0 ? Refine::boundary : Refine::uniform;
+      SCOPED_TRACE(testing::text_of(range, refine));
+      front.set_range(range, refine, ~std::uint64_t(0), on_threads);
+      const Expected right = expected(field, range, refine);
+      const Mesh mesh = front.mesh();
+      EXPECT_EQ(mesh_digest(mesh), right.digest);
+      EXPECT_EQ(front.shown_count(), right.updates);
+      EXPECT_EQ(wrong_value(front, field, mesh), "");
+      EXPECT_TRUE(has_naive_points(front, field, mesh));
+      EXPECT_EQ(front.validate(), std::nullopt);
     }
   }
-  EXPECT_EQ(canonical(front.mesh()), full);
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, FrontLaws, ::testing::Range(1u, 25u));
+TEST(Front, RefusesGroupsThatCannotBeSplit) {
+  const ValueField field = testing::random_value_field({9, 7, 5}, 0);
+  const std::vector<Vertex> all = testing::all_centres(field);
+  const Front root = field.front({2, 5}, Refine::boundary);
+  Front without_root = root, outside = root;
+  EXPECT_EQ(without_root.split_all(testing::groups_of({all.begin() + 1, all.end()}), testing::keys_of(field)).has_value(), true);
+  EXPECT_EQ(outside.split_all(testing::groups_of({all.front(), {8, 8, 12}}), testing::keys_of(field)), (Vertex{8, 8, 12}));
+}
+
+TEST(Front, ACoarserFrontIsPartOfAFinerOne) {
+  const ValueField field = testing::random_value_field({9, 9, 9}, 1);
+  const Range range{-0.3, 0.4};
+  const std::vector<Vertex> all = testing::all_centres(field);
+  Front fine = field.front(range, Refine::boundary), coarse = fine;
+  ASSERT_EQ(fine.split_all(testing::groups_of(all), testing::keys_of(field)), std::nullopt);
+  for (const Vertex c : all) {
+    const auto handle = Diamond(c).scale > 0 ? coarse.find(c) : std::nullopt;
+    if (handle) coarse.split(*handle, field.key(c));
+  }
+  EXPECT_TRUE(coarse.is_part_of(fine));
+  EXPECT_FALSE(fine.is_part_of(coarse));
+  Front other = coarse;
+  other.set_range({-0.2, 0.4}, Refine::boundary);
+  EXPECT_FALSE(other.is_part_of(fine));
+  ASSERT_TRUE(fine.coarsen_to(coarse));
+  EXPECT_EQ(fine.validate(), std::nullopt);
+  EXPECT_EQ(mesh_digest(fine.mesh()), mesh_digest(coarse.mesh()));
+}
 
 TEST(Front, RefusesWhatCannotBeSplit) {
-  const Volume volume = testing::gyroid({9, 9, 9});
-  const Front front(volume.grid, FieldHierarchy(volume, {.range = {-0.3, 0.2}}).root_patch());
+  const Front front = testing::value_field(testing::gyroid({9, 9, 9}), 0).front({-0.3, 0.2}, Refine::boundary);
   EXPECT_TRUE(front.find({4, 4, 4}));
   for (const Vertex v : {Vertex{0, 0, 0}, Vertex{8, 8, 8}, Vertex{2, 2, 2}, Vertex{-4, 4, 4}, Vertex{4, 4, 1 << 30}}) EXPECT_FALSE(front.find(v));
 }

@@ -5,8 +5,6 @@
 
 #include "common/front/front.h"
 #include "common/ivm/extraction.h"
-#include "server/builder/field_hierarchy.h"
-#include "tests/support/fronts_by_cuts.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
 
@@ -73,28 +71,6 @@ TEST_P(FrontParts, CoarsenedIsTheSameMesh) {
 
 INSTANTIATE_TEST_SUITE_P(Random, FrontParts, ::testing::Range(1u, 13u));
 
-TEST(FrontCompare, OneOtherCutIsAnotherFront) {
-  const Volume volume = testing::gyroid({9, 9, 9});
-  const FieldHierarchy delta(volume, {.range = {-0.3, 0.2}});
-  Front one(volume.grid, delta.root_patch()), other(volume.grid, delta.root_patch());
-  ASSERT_TRUE(one.is_part_of(other));
-  bool differs = false;
-  delta.set().for_each_down([&](const Place& place) {
-    const auto handle = one.find(SupercubeSet::centre(place));
-    if (differs || !handle) return;
-    const Side side = Side::inside;
-    const auto count = std::size_t(one.context(*handle).count_cuts(side));
-    std::vector<std::uint8_t> cuts(count, 100);
-    one.split(*handle, side, cuts);
-    if (count > 0) cuts.back() = 101;
-    differs = count > 0;
-    other.split(*handle, side, cuts);
-    EXPECT_EQ(one.is_part_of(other), !differs);
-    EXPECT_EQ(other.is_part_of(one), !differs);
-  });
-  EXPECT_TRUE(differs);
-}
-
 TEST(FrontCompare, OneOtherValueIsAnotherFront) {
   const IntervalVolume sigma = testing::build(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}});
   const Front full = front_of(sigma, {});
@@ -108,18 +84,6 @@ TEST(FrontCompare, OneOtherValueIsAnotherFront) {
     EXPECT_FALSE(other.is_part_of(full));
     EXPECT_FALSE(full.is_part_of(other));
   }
-}
-
-TEST(FrontCompare, OtherGridsAndRootPatchesAreOtherFronts) {
-  const Volume volume = testing::gyroid({9, 9, 9});
-  const FieldHierarchy delta(volume, {.range = {-0.3, 0.2}});
-  const Front front = testing::front_by_cuts(delta, volume.grid, testing::all_of(delta.set()));
-  EXPECT_TRUE(Front(volume.grid, delta.root_patch()).is_part_of(front));
-  Grid moved = volume.grid;
-  moved.origin[0] += 1;
-  EXPECT_FALSE(Front(moved, delta.root_patch()).is_part_of(front));
-  const FieldHierarchy wider(volume, {.range = {-10, 10}});  // all of it is inside
-  EXPECT_FALSE(Front(volume.grid, wider.root_patch()).is_part_of(front));
 }
 
 TEST(FrontCompare, OtherGridsRangesAndCornersAreOtherFronts) {

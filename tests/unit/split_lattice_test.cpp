@@ -9,7 +9,7 @@
 #include "common/ivm/extraction.h"
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
-#include "tests/support/fronts_by_cuts.h"
+#include "tests/support/split_sets.h"
 #include "tests/support/value_fields.h"
 
 namespace intervale {
