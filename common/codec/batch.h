@@ -7,6 +7,7 @@
 // of class 0, then class 1, then class 2; then by supercube and slot. PROTOCOL.md has the layout.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -41,6 +42,18 @@ void for_each_class(std::size_t groups, const Key& key, Visit&& visit) {
 // far its values are from the range's bounds, in comparison with how much they differ, from 1 to kNearness - 1.
 inline constexpr int kNearness = 8;
 [[nodiscard]] int nearness(const KeySides& sides, Refine refine, const VertexKeys& around, int vertices);
+// The same, from the span of those keys.
+[[nodiscard]] inline int nearness(const KeySides& sides, Refine refine, const KeySpan& span) {
+  constexpr std::int64_t kNone = std::int64_t(1) << 40;
+  const std::array<std::int64_t, 4> bound{-kNone, std::int64_t(sides.first_inside()), std::int64_t(sides.first_above()), kNone};
+  const auto low = std::size_t(sides.side(span.least)), high = std::size_t(sides.side(span.greatest));
+  // How many keys further one of the values would lie on another side.
+  const std::int64_t distance = std::min(std::int64_t(span.least) + 1 - bound[low], bound[low + 1] - std::int64_t(span.greatest));
+  const std::int64_t spread = std::int64_t(span.greatest) - std::int64_t(span.least) + 1;
+  int near = 1;
+  for (int octave = 1; octave < kNearness - 1; ++octave) near += int(8 * distance >= spread << octave);
+  return low != high || (refine == Refine::uniform && low == std::size_t(Side::inside)) ? 0 : near;
+}
 
 // The flag whether a diamond that can be split is split. Its model depends on the diamond's class, on nearness(), and on
 // the flags of the last three such diamonds.

@@ -48,21 +48,6 @@ struct SignedModel {
   }
 };
 
-// What is known of a value before it is coded.
-struct PredictedValue {
-  ValueKey key = 0;          // the prediction
-  std::uint8_t level = 0;    // of activity
-  std::uint8_t quarter = 0;  // of the prediction; 0 where residuals are so large that it tells nothing
-};
-inline constexpr int kSharpLevels = 18;  // of activity: where the quarter counts
-// cls, scale: of the diamond. around: the keys at its vertices, none of which is kNoKey.
-[[nodiscard]] inline PredictedValue predict_value(int cls, int scale, const VertexKeys& around, const ValueWeights& weights, ValueKey last) {
-  const PredictorValues values = predictor_values(cls, around);
-  const Prediction prediction = predict(values, weights.of[std::size_t(scale)][std::size_t(cls)], last);
-  const int level = activity_level(values.activity);
-  return {prediction.key, std::uint8_t(level), level < kSharpLevels ? prediction.quarter : std::uint8_t(0)};
-}
-
 // All models of values.
 struct ValueModels {
   std::array<std::array<std::array<SignedModel, kActivityLevels>, 2>, 3> of;  // by class, whether the scale is 0, activity

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdlib>
 
 namespace intervale {
 namespace {
@@ -21,21 +22,16 @@ struct Pair {
 
 // The same as predictor_values(), for a class that the compiler knows: loops of fixed length take half the time.
 template <int Class>
-PredictorValues values_of(const VertexKeys& keys) {
-  constexpr std::array<std::size_t, 3> kBelt{6, 4, 8};
-  constexpr std::size_t kHalf = kBelt[Class] / 2, kPairs = kHalf + 1;
+inline PredictorValues values_of(const VertexKeys& keys, const KeySpan& span) {
+  constexpr std::size_t kHalf = (kVerticesOfClass[Class] - 2) / 2, kPairs = kHalf + 1;
   std::array<Pair, kPairs> pair;
-  ValueKey least = keys[0], greatest = keys[0];
-  std::int64_t widest = 0;
+  std::int64_t widest = (1 << kWeightBits) - 1;
   for (std::size_t i = 0; i < kPairs; ++i) {
-    const ValueKey a = keys[i == 0 ? 0 : 1 + i], b = keys[i == 0 ? 1 : 1 + i + kHalf];
-    const ValueKey low = std::min(a, b), high = std::max(a, b);
-    pair[i] = {std::int64_t(a) + b, std::int64_t(high - low)};
+    const std::int64_t a = keys[i == 0 ? 0 : 1 + i], b = keys[i == 0 ? 1 : 1 + i + kHalf];
+    pair[i] = {a + b, std::abs(a - b)};
     widest = std::max(widest, pair[i].difference);
-    least = std::min(least, low);
-    greatest = std::max(greatest, high);
   }
-  const int shift = std::max(0, int(std::bit_width(std::uint64_t(widest))) - kWeightBits);
+  const int shift = int(std::bit_width(std::uint64_t(widest))) - kWeightBits;
   std::uint64_t weights = 0, sum = 0;
   for (const Pair& p : pair) {
     const std::uint64_t weight = kPairWeights[std::size_t(p.difference >> shift)];
@@ -56,28 +52,50 @@ PredictorValues values_of(const VertexKeys& keys) {
   }
   values.difference[2] = mean - values.spine;
   std::int64_t disagreement = 0;
-  for (const Pair& p : pair) disagreement += std::max(8 * p.sum - mean, mean - 8 * p.sum);
-  values.activity = std::uint64_t(disagreement) + 4 * std::uint64_t(kPairs) * (greatest - least);
+  for (const Pair& p : pair) disagreement += std::abs(8 * p.sum - mean);
+  values.activity = std::uint64_t(disagreement) + 4 * std::uint64_t(kPairs) * (span.greatest - span.least);
   return values;
+}
+
+inline Prediction prediction_of(const PredictorValues& values, const PredictorWeights& weights, ValueKey last) {
+  std::int64_t more = 128;
+  for (std::size_t i = 0; i < kPredictors; ++i) more += weights[i] * values.difference[i];
+  const std::int64_t sixteenths = values.spine + (more >> 8) + 8;
+  return {ValueKey(std::clamp<std::int64_t>(sixteenths >> 4, 0, last)), std::uint8_t(sixteenths >> 2 & 3)};
+}
+
+inline int level_of(std::uint64_t activity) {
+  const int octave = int(std::bit_width(activity + 1)) - 1;
+  const bool upper = (activity + 1) << (63 - octave) >= 0xb504f333f9de6485u;  // 2^63.5
+  return std::min(2 * octave + int(upper), kActivityLevels - 1);
 }
 
 }  // namespace
 
 PredictorValues predictor_values(int cls, const VertexKeys& keys) {
-  return cls == 0 ? values_of<0>(keys) : cls == 1 ? values_of<1>(keys) : values_of<2>(keys);
+  return cls == 0 ? values_of<0>(keys, span_of<0>(keys)) : cls == 1 ? values_of<1>(keys, span_of<1>(keys)) : values_of<2>(keys, span_of<2>(keys));
 }
 
-Prediction predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last) {
-  std::int64_t more = 128;
-  for (int i = 0; i < kPredictors; ++i) more += weights[std::size_t(i)] * values.difference[std::size_t(i)];
-  const std::int64_t sixteenths = values.spine + (more >> 8) + 8;
-  return {ValueKey(std::clamp<std::int64_t>(sixteenths >> 4, 0, last)), std::uint8_t(sixteenths >> 2 & 3)};
-}
+Prediction predict(const PredictorValues& values, const PredictorWeights& weights, ValueKey last) { return prediction_of(values, weights, last); }
 
-int activity_level(std::uint64_t activity) {
-  const int octave = int(std::bit_width(activity + 1)) - 1;
-  const bool upper = (activity + 1) << (63 - octave) >= 0xb504f333f9de6485u;  // 2^63.5
-  return std::min(2 * octave + int(upper), kActivityLevels - 1);
+int activity_level(std::uint64_t activity) { return level_of(activity); }
+
+template <int Class>
+PredictedValue predict_value(const VertexKeys& around, const KeySpan& span, const PredictorWeights& weights, ValueKey last) {
+  const PredictorValues values = values_of<Class>(around, span);
+  const Prediction prediction = prediction_of(values, weights, last);
+  const int level = level_of(values.activity);
+  return {prediction.key, std::uint8_t(level), level < kSharpLevels ? prediction.quarter : std::uint8_t(0)};
+}
+template PredictedValue predict_value<0>(const VertexKeys&, const KeySpan&, const PredictorWeights&, ValueKey);
+template PredictedValue predict_value<1>(const VertexKeys&, const KeySpan&, const PredictorWeights&, ValueKey);
+template PredictedValue predict_value<2>(const VertexKeys&, const KeySpan&, const PredictorWeights&, ValueKey);
+
+PredictedValue predict_value(int cls, int scale, const VertexKeys& around, const ValueWeights& weights, ValueKey last) {
+  const PredictorWeights& w = weights.of[std::size_t(scale)][std::size_t(cls)];
+  return cls == 0   ? predict_value<0>(around, span_of<0>(around), w, last)
+         : cls == 1 ? predict_value<1>(around, span_of<1>(around), w, last)
+                    : predict_value<2>(around, span_of<2>(around), w, last);
 }
 
 }  // namespace intervale

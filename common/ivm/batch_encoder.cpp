@@ -11,7 +11,6 @@
 namespace intervale {
 namespace {
 
-constexpr std::array<int, 3> kVertices{8, 6, 10};  // by class
 constexpr std::uint64_t kAllSlots = (std::uint64_t(1) << kSlots) - 1;
 
 // A diamond that can be split when its turn comes.
@@ -24,34 +23,21 @@ struct Candidate {
 class BatchEncoder {
  public:
   BatchEncoder(const IntervalVolume& volume, const ShownRange& shown, const SplitSet& split, std::span<const SlotGroup> groups)
-      : volume_(volume), groups_(groups) {
+      : volume_(volume), shown_(shown), sides_(volume.description().format, shown.range), groups_(groups) {
     const SupercubeSet& set = volume.set();
-    const Description& d = volume.description();
-    const KeySides sides(d.format, shown.range);
     SplitLattice lattice(volume, split);
-    VertexKeys around{};
     ready_.reserve(groups.size());
     first_.reserve(groups.size());
     candidates_.reserve(16 * groups.size());  // about as many as there are
     for (const SlotGroup& g : groups) {
       lattice.move_to(g.key);
-      const std::uint64_t occupancy = set.occupancy()[g.supercube];
-      const UpdateIndex first = set.first(g.brick, g.supercube);
-      ready_.push_back(lattice.splittable(kAllSlots & (~split.slots(first, occupancy) | g.slots)));
+      ready_.push_back(lattice.splittable(kAllSlots & (~split.slots(set.first(g.brick, g.supercube), set.occupancy()[g.supercube]) | g.slots)));
       first_.push_back(candidates_.size());
       candidates_.resize(candidates_.size() + std::size_t(std::popcount(ready_.back())));
       Candidate* c = candidates_.data() + first_.back();
-      for (const Slot slot : set_bits<Slot>(ready_.back())) {
-        lattice.gather(slot, around);
-        const int cls = class_of_slot(slot);
-        c->near = std::uint8_t(nearness(sides, shown.refine, around, kVertices[std::size_t(cls)]));
-        if ((g.slots >> slot & 1) != 0) {
-          ++updates_;
-          c->key = volume.key(first + count_below(occupancy, slot));
-          c->predicted = predict_value(cls, scale_of_key(g.key), around, d.weights, d.format.last);
-        }
-        ++c;
-      }
+      c = add<0>(lattice, g, c);
+      c = add<1>(lattice, g, c);
+      add<2>(lattice, g, c);
     }
   }
 
@@ -63,6 +49,27 @@ class BatchEncoder {
   }
 
  private:
+  // Sets the candidates of a class of the last group, from `c` on. Returns the end of those.
+  template <int Class>
+  Candidate* add(const SplitLattice& lattice, const SlotGroup& g, Candidate* c) {
+    const Description& d = volume_.description();
+    const PredictorWeights& weights = d.weights.of[std::size_t(scale_of_key(g.key))][Class];
+    const std::uint64_t occupancy = volume_.set().occupancy()[g.supercube];
+    const UpdateIndex first = volume_.set().first(g.brick, g.supercube);
+    VertexKeys around;
+    for (const Slot slot : set_bits<Slot>(ready_.back() & kSlotsOfClass[Class])) {
+      const KeySpan span = lattice.gather<Class>(slot, around);
+      c->near = std::uint8_t(nearness(sides_, shown_.refine, span));
+      if ((g.slots >> slot & 1) != 0) {
+        ++updates_;
+        c->key = volume_.key(first + count_below(occupancy, slot));
+        c->predicted = predict_value<Class>(around, span, weights, d.format.last);
+      }
+      ++c;
+    }
+    return c;
+  }
+
   [[nodiscard]] std::vector<std::uint8_t> coded(bool is_plain) const {
     RangeEncoder coder;
     const auto models = std::make_unique<BatchModels>();
@@ -88,6 +95,8 @@ class BatchEncoder {
   }
 
   const IntervalVolume& volume_;
+  const ShownRange& shown_;
+  KeySides sides_;
   std::span<const SlotGroup> groups_;
   std::vector<std::uint64_t> ready_;   // by group: the slots of its candidates
   std::vector<std::size_t> first_;     // by group: the number of its first candidate

@@ -29,12 +29,20 @@ class SplitLattice {
   // are split, whether they are split themselves or not.
   [[nodiscard]] std::uint64_t splittable(std::uint64_t slots);
 
-  // The keys at the vertices of a diamond that splittable() has named since the last move; vertices that do not exist
-  // get what fill_missing() gives them. Numbers that are no vertices get the key of the first one.
-  void gather(Slot slot, VertexKeys& keys) const {
+  // The keys at the vertices of a diamond that splittable() has named since the last move, and their span. Vertices that
+  // do not exist get what fill_missing() gives them. Class: of the diamond.
+  template <int Class>
+  KeySpan gather(Slot slot, VertexKeys& keys) const {
     const auto& vertex = tables_.vertex[slot];
-    for (std::size_t v = 0; v < kMaxVertices; ++v) keys[v] = keys_[vertex[v]];
-    if (!is_interior_) replace_missing(slot, keys);
+    keys[0] = keys_[vertex[0]];
+    KeySpan span{keys[0], keys[0]};
+    for (std::size_t v = 1; v < kVerticesOfClass[Class]; ++v) {
+      keys[v] = keys_[vertex[v]];
+      span.add(keys[v]);
+    }
+    if (is_interior_) return span;
+    replace_missing(slot, keys);
+    return span_of<Class>(keys);
   }
 
  private:

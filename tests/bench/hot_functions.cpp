@@ -57,6 +57,19 @@ void find_update(benchmark::State& state) {
 }
 BENCHMARK(find_update);
 
+void gather(const SplitLattice& lattice, Slot slot, VertexKeys& around) {
+  switch (class_of_slot(slot)) {
+    case 0:
+      lattice.gather<0>(slot, around);
+      break;
+    case 1:
+      lattice.gather<1>(slot, around);
+      break;
+    default:
+      lattice.gather<2>(slot, around);
+  }
+}
+
 // The keys at the vertices of each update's diamond, and at its centre.
 void look_up_update(benchmark::State& state) {
   const auto& f = fixture();
@@ -66,7 +79,7 @@ void look_up_update(benchmark::State& state) {
     for (const Place& p : f.places) {
       lattice.move_to(p.key);
       benchmark::DoNotOptimize(lattice.splittable(std::uint64_t(1) << p.slot));
-      lattice.gather(p.slot, around);
+      gather(lattice, p.slot, around);
       benchmark::DoNotOptimize(around);
       benchmark::DoNotOptimize(f.sigma->key(p.index));
     }
@@ -82,7 +95,7 @@ void predict_values(benchmark::State& state) {
   std::vector<VertexKeys> around(f.places.size());
   for (std::size_t i = 0; i < f.places.size(); ++i) {
     lattice.move_to(f.places[i].key);
-    if (lattice.splittable(std::uint64_t(1) << f.places[i].slot) != 0) lattice.gather(f.places[i].slot, around[i]);
+    if (lattice.splittable(std::uint64_t(1) << f.places[i].slot) != 0) gather(lattice, f.places[i].slot, around[i]);
   }
   for (auto _ : state) {
     for (std::size_t i = 0; i < f.places.size(); ++i) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <vector>
 
@@ -33,6 +34,17 @@ class SplitLattices : public ::testing::TestWithParam<unsigned> {
     }
   }
 
+  // The keys of a diamond's vertices, whose span must be right.
+  static VertexKeys gathered(const SplitLattice& lattice, Slot slot) {
+    const int cls = class_of_slot(slot);
+    VertexKeys keys{};
+    const KeySpan span = cls == 0 ? lattice.gather<0>(slot, keys) : cls == 1 ? lattice.gather<1>(slot, keys) : lattice.gather<2>(slot, keys);
+    const auto [least, greatest] = std::minmax_element(keys.begin(), keys.begin() + diamond_type(kTypeOfSlot[slot]).vertices);
+    EXPECT_EQ(span.least, *least);
+    EXPECT_EQ(span.greatest, *greatest);
+    return keys;
+  }
+
   // The keys of a diamond's vertices are those of the naive model: the sample at each vertex that exists; elsewhere the
   // mean of the spine's ends.
   void expect_samples(const SplitLattice& lattice, SupercubeKey key, Slot slot) {
@@ -40,8 +52,7 @@ class SplitLattices : public ::testing::TestWithParam<unsigned> {
     const unsigned exist = Domain::vertices(*d.row, field_.domain.tets(d));
     ASSERT_EQ(exist & 3u, 3u) << "the ends of the spine";
     const auto mean = ValueKey((std::uint64_t(field_.key(d.vertex(0))) + field_.key(d.vertex(1))) / 2);
-    VertexKeys keys{};
-    lattice.gather(slot, keys);
+    const VertexKeys keys = gathered(lattice, slot);
     for (int v = 0; v < d.row->vertices; ++v) {
       ASSERT_EQ(keys[std::size_t(v)], (exist >> v & 1) != 0 ? field_.key(d.vertex(v)) : mean)
           << "vertex " << v << " of (" << d.centre.x << ", " << d.centre.y << ", " << d.centre.z << ")";
@@ -108,8 +119,7 @@ TEST_P(SplitLattices, KeysAreThoseThatAFrontGathers) {
   ASSERT_TRUE(extraction) << extraction.error().message;
   FrontCursor cursor(extraction->front.state());
   for_each_ready(true, [&](SupercubeKey key, Slot slot) {
-    VertexKeys keys{};
-    lattice_.gather(slot, keys);
+    const VertexKeys keys = gathered(lattice_, slot);
     cursor.move_to(key);
     for (const bool at_once : {false, true}) {
       ASSERT_TRUE(at_once ? cursor.gather_keys(slot) : cursor.gather_sides(slot));
@@ -128,10 +138,9 @@ TEST_P(SplitLattices, KeysAreThoseOfADiamondBeforeItsSplit) {
   Front front = root_front(volume_->description());
   FrontCursor cursor(front.state());
   volume_->set().for_each_down([&](const Place& p) {
-    VertexKeys keys{};
     lattice_.move_to(p.key);
     ASSERT_EQ(lattice_.splittable(std::uint64_t(1) << p.slot), std::uint64_t(1) << p.slot);
-    lattice_.gather(p.slot, keys);
+    const VertexKeys keys = gathered(lattice_, p.slot);
     cursor.move_to(p.key);
     ASSERT_TRUE(cursor.find_unsplit(p.slot));
     expect_equal(cursor, keys);
