@@ -10,7 +10,7 @@ namespace intervale {
 
 namespace {
 
-// Moves the lowest bits of `bits`, in their order, to the positions of the ones of `mask`.
+// See SplitSet::deposit().
 std::uint64_t deposit_portably(std::uint64_t bits, std::uint64_t mask) {
   std::uint64_t result = 0;
   for (std::uint64_t left = mask; left != 0; left &= left - 1, bits >>= 1) result |= left & (~left + 1) & (~(bits & 1) + 1);
@@ -26,10 +26,8 @@ std::uint64_t extract_portably(std::uint64_t bits, std::uint64_t mask) {
 __attribute__((target("bmi2"))) std::uint64_t deposit_bmi2(std::uint64_t bits, std::uint64_t mask) { return _pdep_u64(bits, mask); }
 __attribute__((target("bmi2"))) std::uint64_t extract_bmi2(std::uint64_t bits, std::uint64_t mask) { return _pext_u64(bits, mask); }
 const bool kHasBmi2 = __builtin_cpu_supports("bmi2") != 0;
-std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return kHasBmi2 ? deposit_bmi2(bits, mask) : deposit_portably(bits, mask); }
 std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return kHasBmi2 ? extract_bmi2(bits, mask) : extract_portably(bits, mask); }
 #else
-std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask) { return deposit_portably(bits, mask); }
 std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return extract_portably(bits, mask); }
 #endif
 
@@ -41,8 +39,11 @@ std::uint64_t SplitSet::count() const {
   return n;
 }
 
-std::uint64_t SplitSet::slots(UpdateIndex first, std::uint64_t occupancy) const {
-  return deposit(some(first, unsigned(std::popcount(occupancy))), occupancy);
+std::uint64_t SplitSet::deposit(std::uint64_t bits, std::uint64_t mask) {
+#if defined(__x86_64__)
+  if (kHasBmi2) return deposit_bmi2(bits, mask);
+#endif
+  return deposit_portably(bits, mask);
 }
 
 void SplitSet::insert(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {

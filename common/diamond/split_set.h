@@ -1,6 +1,7 @@
 // The split diamonds as a set of updates.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -25,7 +26,11 @@ class SplitSet {
   [[nodiscard]] std::uint64_t count() const;
   // The slots of a supercube's diamonds that are in it; inserts and erases some. occupancy: of that supercube, not 0,
   // and the slots are among it; first: the number of its first diamond.
-  [[nodiscard]] std::uint64_t slots(UpdateIndex first, std::uint64_t occupancy) const;
+  [[nodiscard]] std::uint64_t slots(UpdateIndex first, std::uint64_t occupancy) const {
+    const auto count = unsigned(std::popcount(occupancy));
+    const std::uint64_t bits = some(first, count);
+    return bits == ~std::uint64_t(0) >> (64 - count) ? occupancy : bits == 0 ? 0 : deposit(bits, occupancy);
+  }
   void insert(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots);
   void erase(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots);
   [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;  // all of it, in order
@@ -33,6 +38,8 @@ class SplitSet {
   friend bool operator==(const SplitSet&, const SplitSet&) = default;
 
  private:
+  // Moves the lowest bits of `bits`, in their order, to the positions of the ones of `mask`.
+  [[nodiscard]] static std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask);
   std::vector<std::uint64_t> words_;
 };
 

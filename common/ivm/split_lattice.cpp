@@ -33,7 +33,29 @@ SplitLattice::Tables SplitLattice::make_tables() {
       t.ahead[n] |= std::uint64_t(ahead) << slot;
     }
   }
+  fill_lacking(t);
   return t;
+}
+
+void SplitLattice::fill_lacking(Tables& t) {
+  std::array<std::array<std::uint64_t, 32>, kParentPlaces> children{};  // by place and slot of the parent
+  for (Slot slot{8}; slot < kSlots; ++slot) {
+    const unsigned type = kTypeOfSlot[slot];
+    for (std::size_t k = 0; k < diamond_type(type).parents; ++k) {
+      const Offset to = diamond_type(type).parent[k];
+      const std::array<int, 3> at{int(type & 3) + to.x, int(type >> 2 & 3) + to.y, int(type >> 4 & 3) + to.z};
+      const std::size_t place = at[0] < 0 ? 1 : at[1] < 0 ? 2 : at[2] < 0 ? 3 : 0;
+      const Slot parent = kSlotOfType[unsigned(at[0] & 3) | unsigned(at[1] & 3) << 2 | unsigned(at[2] & 3) << 4];
+      children[place][parent] |= std::uint64_t(1) << slot;
+    }
+  }
+  for (std::size_t place = 0; place < kParentPlaces; ++place) {
+    for (unsigned parent = 0; parent < 32; ++parent) {
+      for (unsigned unsplit = 0; unsplit < 256; ++unsplit) {
+        if ((unsplit >> parent % 8 & 1) != 0) t.lacking[place][parent / 8][unsplit] |= children[place][parent];
+      }
+    }
+  }
 }
 
 const SplitLattice::Tables& SplitLattice::tables() {
@@ -59,32 +81,52 @@ SplitLattice::SplitLattice(const IntervalVolume& volume, const SplitSet& split)
 // Loads the points of coarser scales.
 void SplitLattice::load_coarser(int scale, Vertex position, Keys& keys) {
   const Keys& even = coarser(scale + 1, {position.x >> 1, position.y >> 1, position.z >> 1}, parity_of(position));
-  const std::int32_t first = point_of(2 * (position.x & 1), 2 * (position.y & 1), 2 * (position.z & 1));
+  const Vertex first{2 * (position.x & 1), 2 * (position.y & 1), 2 * (position.z & 1)};
   keys.fill(kNoKey);
   for (int z = 0; z < 3; ++z) {
     for (int y = 0; y < 3; ++y) {
-      for (int x = 0; x < 3; ++x) {
-        keys[std::size_t(point_of(2 * x, 2 * y, 2 * z))] = even[std::size_t(first + point_of(x, y, z) - point_of(0, 0, 0))];
-      }
+      const ValueKey* const from = &even[std::size_t(point_of(first.x, first.y + y, first.z + z))];
+      ValueKey* const to = &keys[std::size_t(point_of(0, 2 * y, 2 * z))];
+      to[0] = from[0];
+      to[2] = from[1];
+      to[4] = from[2];
     }
   }
 }
 
-// Loads the points of one supercube of the same scale. neighbour: a bit for each axis; towards: -1 if it lies behind, 1
-// if it lies ahead. finder: at `from`.
-void SplitLattice::load_neighbour(SetFinder& finder, const SupercubePlace& from, unsigned neighbour, int towards, Keys& keys) {
+// Loads the points of one supercube of the same scale, and returns the slots of those. neighbour: a bit for each axis;
+// towards: -1 if it lies behind, 1 if it lies ahead. finder: at `from`.
+std::uint64_t SplitLattice::load_neighbour(SetFinder& finder, const SupercubePlace& from, unsigned neighbour, int towards, Keys& keys) {
   const int x = towards * int(neighbour & 1), y = towards * int(neighbour >> 1 & 1), z = towards * int(neighbour >> 2);
   const SupercubePlace place{from.scale, {from.position.x + x, from.position.y + y, from.position.z + z}};
-  if (!place.exists()) return;
+  if (!place.exists()) return 0;
   const SetFinder::Found found = finder.find(kHere + x + 3 * y + 9 * z, place);
-  if (found.occupancy == 0) return;
+  if (found.occupancy == 0) return 0;
   const std::uint64_t used = (towards < 0 ? tables_.behind : tables_.ahead)[neighbour];
+  const std::uint64_t slots = split_.slots(found.first, found.occupancy) & used;
   ValueKey* const first = keys.data() + 4 * (point_of(x, y, z) - point_of(0, 0, 0));
-  const ValueKeys& all = volume_.keys();
-  const std::uint8_t* const bytes = all.width() == 1 ? all.bytes().data() : nullptr;
-  for (const Slot slot : set_bits<Slot>(split_.slots(found.first, found.occupancy) & used)) {
-    const UpdateIndex i = found.index(slot);
-    first[tables_.centre[slot]] = bytes != nullptr ? bytes[i] : all[i];
+  switch (volume_.keys().width()) {
+    case 1:
+      load_keys<1>(found, slots, first);
+      break;
+    case 2:
+      load_keys<2>(found, slots, first);
+      break;
+    case 3:
+      load_keys<3>(found, slots, first);
+      break;
+    default:
+      load_keys<4>(found, slots, first);
+  }
+  return slots;
+}
+
+// first: the point of the neighbour's own corner.
+template <unsigned Width>
+void SplitLattice::load_keys(const SetFinder::Found& found, std::uint64_t slots, ValueKey* first) const {
+  const std::uint8_t* const bytes = volume_.keys().bytes().data() + std::size_t(found.first) * Width;
+  for (const Slot slot : set_bits<Slot>(slots)) {
+    first[tables_.centre[slot]] = ValueKeys::read<Width>(bytes + std::size_t(count_below(found.occupancy, slot)) * Width);
   }
 }
 
@@ -111,7 +153,7 @@ void SplitLattice::move_to(SupercubeKey key) {
   is_interior_ = is_interior(volume_.domain(), place_.scale, place_.position);
   load_coarser(place_.scale, place_.position, keys_);
   finder_.move_to(place_.scale, place_.position);
-  for (const unsigned n : {0u, 1u, 2u, 4u}) load_neighbour(finder_, place_, n, -1, keys_);  // the parents are in these
+  for (std::size_t k = 0; k < kParentPlaces; ++k) parents_[k] = load_neighbour(finder_, place_, kParentNeighbour[k], -1, keys_);
 }
 
 std::uint64_t SplitLattice::splittable(std::uint64_t slots) {
@@ -123,13 +165,16 @@ std::uint64_t SplitLattice::splittable(std::uint64_t slots) {
 }
 
 std::uint64_t SplitLattice::splittable_inside(std::uint64_t slots) const {
-  const auto split = [this](Point p) { return unsigned(keys_[p] != kNoKey); };
-  std::uint64_t ready = 0;
-  for (const Slot slot : set_bits<Slot>(slots)) {
-    const auto& parent = tables_.parent[slot];
-    ready |= std::uint64_t(split(parent[0]) & split(parent[1]) & split(parent[2]) & split(parent[3])) << slot;
+  std::uint64_t lacking = 0;
+  for (std::size_t place = 0; place < kParentPlaces; ++place) {
+    for (unsigned byte = 0; byte < 4; ++byte) lacking |= tables_.lacking[place][byte][~parents_[place] >> (8 * byte) & 255];
   }
-  return ready;
+  const auto unsplit = [this](Point p) { return unsigned(keys_[p] == kNoKey); };
+  for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[0])) {
+    const auto& parent = tables_.parent[slot];
+    lacking |= std::uint64_t(unsplit(parent[0]) | unsplit(parent[1]) | unsplit(parent[2]) | unsplit(parent[3])) << slot;
+  }
+  return slots & ~lacking;
 }
 
 std::uint64_t SplitLattice::splittable_at_border(std::uint64_t slots) {

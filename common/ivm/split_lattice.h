@@ -29,8 +29,8 @@ class SplitLattice {
   // are split, whether they are split themselves or not.
   [[nodiscard]] std::uint64_t splittable(std::uint64_t slots);
 
-  // The keys at the vertices of a diamond that splittable() has named since the last move, and their span. Vertices that
-  // do not exist get what fill_missing() gives them. Class: of the diamond.
+  // The keys at the vertices of a diamond that splittable() has named since the last move, and their span. Vertices
+  // that do not exist get what fill_missing() gives them. Class: of the diamond.
   template <int Class>
   KeySpan gather(Slot slot, VertexKeys& keys) const {
     const auto& vertex = tables_.vertex[slot];
@@ -49,6 +49,9 @@ class SplitLattice {
   static constexpr int kSide = 6;  // points on an axis, from -1 to 4
   static constexpr std::int32_t point_of(int x, int y, int z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
   using Point = std::uint8_t;
+  // Where parents of classes 0 and 1 are: in the supercube itself, or in the one behind it along an axis.
+  static constexpr std::size_t kParentPlaces = 4;
+  static constexpr std::array<unsigned, kParentPlaces> kParentNeighbour{0, 1, 2, 4};
   using Keys = std::array<ValueKey, kSide * kSide * kSide>;  // kNoKey where no split diamond has its centre
   // By slot: the point of the centre, those of the vertices and those of the parents; unused ones repeat the first. By
   // neighbour, a bit for each axis: its slots that lie in a lattice, if it lies behind the supercube and if ahead.
@@ -59,8 +62,12 @@ class SplitLattice {
     std::array<std::array<std::uint8_t, kMaxParents>, kSlots> parent_vertex{};  // its local number
     std::array<std::uint64_t, 8> behind{}, ahead{};
     std::array<std::uint64_t, 8> users{};  // by neighbour behind: slots of diamonds with a vertex in it
+    // Slots of diamonds of classes 1 and 2 that lack a parent, by where the parent is, and by eight slots at a time
+    // that are not split.
+    std::array<std::array<std::array<std::uint64_t, 256>, 4>, kParentPlaces> lacking{};
   };
   [[nodiscard]] static Tables make_tables();
+  static void fill_lacking(Tables& tables);
   [[nodiscard]] static const Tables& tables();
 
   // The lattice of a coarser supercube: points from 0 on. Its neighbours ahead are loaded as they are needed.
@@ -72,7 +79,9 @@ class SplitLattice {
   };
   const Keys& coarser(int scale, Vertex position, unsigned half);
   void load_coarser(int scale, Vertex position, Keys& keys);
-  void load_neighbour(SetFinder& finder, const SupercubePlace& from, unsigned neighbour, int towards, Keys& keys);
+  std::uint64_t load_neighbour(SetFinder& finder, const SupercubePlace& from, unsigned neighbour, int towards, Keys& keys);
+  template <unsigned Width>
+  void load_keys(const SetFinder::Found& found, std::uint64_t slots, ValueKey* first) const;
   std::uint64_t splittable_inside(std::uint64_t slots) const;
   std::uint64_t splittable_at_border(std::uint64_t slots);
   void replace_missing(Slot slot, VertexKeys& keys) const;
@@ -84,7 +93,8 @@ class SplitLattice {
   SetFinder finder_;
   SupercubePlace place_;  // of the supercube
   bool is_interior_ = false;
-  std::array<std::uint32_t, kSlots> exist_{};  // at the border, by slot: the vertices that exist, a bit each
+  std::array<std::uint64_t, kParentPlaces> parents_{};  // split slots of classes 0 and 1
+  std::array<std::uint32_t, kSlots> exist_{};           // at the border, by slot: the vertices that exist, a bit each
   Keys keys_{};
 };
 

@@ -19,10 +19,15 @@ class ValueKeys {
   [[nodiscard]] std::size_t size() const { return bytes_.size() / width_; }
   [[nodiscard]] ValueKey operator[](std::size_t i) const {
     const std::uint8_t* const at = bytes_.data() + i * width_;
-    if (width_ == 1) return *at;
-    ValueKey key = at[0] | ValueKey(at[1]) << 8;
-    if (width_ > 2) key |= ValueKey(at[2]) << 16;
-    if (width_ > 3) key |= ValueKey(at[3]) << 24;
+    return width_ == 1 ? read<1>(at) : width_ == 2 ? read<2>(at) : width_ == 3 ? read<3>(at) : read<4>(at);
+  }
+  // The key at some of its bytes, for a width that the compiler knows.
+  template <unsigned Width>
+  [[nodiscard]] static ValueKey read(const std::uint8_t* at) {
+    ValueKey key = at[0];
+    if constexpr (Width > 1) key |= ValueKey(at[1]) << 8;
+    if constexpr (Width > 2) key |= ValueKey(at[2]) << 16;
+    if constexpr (Width > 3) key |= ValueKey(at[3]) << 24;
     return key;
   }
   void set(std::size_t i, ValueKey key) {
