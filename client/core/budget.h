@@ -22,7 +22,7 @@ using Importance = std::function<double(SupercubeKey)>;
 // check_lod accepts.
 [[nodiscard]] Importance size_on_screen(const Camera& camera, const Grid& grid);
 
-// Hides and shows splits of a front split by values until its mesh has at most max_tets tetrahedra and, as far as that allows, the most
+// Hides and shows splits of a front until its mesh has at most max_tets tetrahedra and, as far as that allows, the most
 // important splits with their ancestors. Each mesh on the way has at most max_tets tetrahedra, or fewer than the mesh
 // before it. O(n log n) in the front's supercubes.
 void balance(Front& front, std::uint64_t max_tets, const Importance& importance);

@@ -80,7 +80,7 @@ Links links_of(Slot slot, unsigned parity) {
     int local = 0;
     while (local < owner_row.vertices && owner_row.vertex[local] != to) ++local;
     assert(local < owner_row.vertices && "every edge is a subdivision edge of its younger end");
-    links.edge[e] = {std::uint8_t(owner), std::uint8_t(local), std::uint8_t(edge_ends(e, row.belt)[0] == owner ? 0 : 255)};
+    links.edge[e] = {std::uint8_t(owner), std::uint8_t(local)};
   }
   for (int k = 0; k < row.parents; ++k) {
     while (row.vertex[links.parent[k]] != row.parent[k]) ++links.parent[k];

@@ -44,8 +44,6 @@ struct Links {
   struct Edge {
     std::uint8_t owner = 0;  // local number of the younger end
     std::uint8_t other = 0;  // the older end's local number in the owner's diamond
-    // 255 if the edge's first end is the older one, so that q of each cut must be inverted; else 0
-    std::uint8_t flip = 0;
   };
   std::array<Edge, kMaxEdges> edge{};      // by local edge
   std::array<Link, kMaxChildren> child{};  // by number of the child

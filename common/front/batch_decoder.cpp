@@ -31,7 +31,7 @@ class BatchDecoder {
   bool take(SupercubeKey key, int cls) {
     cursor_.move_to(key);
     for (const Slot slot : set_bits<Slot>(kSlotsOfClass[std::size_t(cls)] & ~cursor_.here().split)) {
-      if (cursor_.find_unsplit(slot) && !take_found(cls)) return false;
+      if (cursor_.find(slot) && !take_found(cls)) return false;
     }
     return true;
   }

@@ -10,9 +10,9 @@
 
 namespace intervale {
 
-// Applies a batch from outside to a front that is split by values, and returns how many updates it had. description: of the
-// data set; shown: what the view was that the batch answers. The mesh gets at most max_tets tetrahedra (Front::split). Fails if the bytes are not a
-// batch; the front must then not be used any more.
+// Applies a batch from outside to a front, and returns how many updates it had. description: of the data set; shown:
+// what the view was that the batch answers. The mesh gets at most max_tets tetrahedra (Front::split). Fails if the
+// bytes are not a batch; the front must then not be used any more.
 [[nodiscard]] Result<std::uint64_t> apply_batch(Front& front, const Description& description, const ShownRange& shown,
                                                 std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0));
 

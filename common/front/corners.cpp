@@ -8,7 +8,6 @@
 namespace intervale {
 namespace {
 
-using Block = FrontState::Block;
 using Split = FrontState::Split;
 
 // Where a corner is kept. state: FrontState, const or not.
@@ -25,76 +24,63 @@ auto corner_at(State& state, const Diamond& root, int corner) {
   return Place{&state.blocks.front(), link.slot};
 }
 
-// The cuts of the root's edges that a corner owns: its split's bits, and q of each cut in order of the bits.
-void place_corner(FrontState& state, const RootPatch& root_patch, const DiamondParts& parts, const Diamond& root, int corner) {
+using CornerSides = std::array<Side, kRootVertices>;
+CornerSides corner_sides(const FrontState& state, const Diamond& root) {
+  CornerSides sides{};
+  for (int v = 0; v < kRootVertices; ++v) {
+    const auto [block, slot] = corner_at(state, root, v);
+    sides[std::size_t(v)] = state.values.sides.side(block->key[std::size_t(slot)]);
+  }
+  return sides;
+}
+
+// The cuts of the root's edges that a corner owns.
+void place_corner(FrontState& state, const CornerSides& sides, const DiamondParts& parts, const Diamond& root, int corner) {
   const Links& links = link_table()[0][kSlotOfType[root.type]];
   const auto [block, slot] = corner_at(state, root, corner);
-  const Side side = root_patch.side[std::size_t(corner)];
+  const Side side = sides[std::size_t(corner)];
   block->split |= std::uint64_t(1) << slot;
   block->shown = block->counts = block->split;
   block->set_side(slot, side);
-  Split s;
-  s.bits = std::uint32_t(side) << Split::kSideBit;
-  s.first = PointId(state.q.size());
-  std::array<Cuts, kMaxVertices> cuts_to{};  // by the other end's local number: not the order of the root's edges
+  Split split{std::uint32_t(side) << Split::kSideBit, state.points};
   for (const int e : set_bits(parts.edges)) {
     const Links::Edge edge = links.edge[std::size_t(e)];
     if (edge.owner != corner) continue;
     const auto [a, b] = edge_ends(e, root.row->belt);
-    const Side side_a = root_patch.side[std::size_t(a)], side_b = root_patch.side[std::size_t(b)];
-    const Cuts& cuts = root_patch.cuts[std::size_t(e)];
-    cuts_to[edge.other] = a == corner ? cuts : reversed(cuts);
-    const unsigned surfaces = unsigned(alpha_cuts(side_a, side_b)) | unsigned(beta_cuts(side_a, side_b)) << 1;
-    s.bits |= surfaces << (2 * edge.other);
+    const Side other = sides[std::size_t(a == corner ? b : a)];
+    const unsigned surfaces = unsigned(alpha_cuts(side, other)) | unsigned(beta_cuts(side, other)) << 1;
+    split.bits |= surfaces << (2 * edge.other);
   }
-  block->placed.set(slot, s);
-  for (const Cuts& c : cuts_to) state.q.insert(state.q.end(), c.q, c.q + c.count);
-  state.q.push_back(0);
-  state.points = PointId(state.q.size());
+  block->place(slot, split);
+  state.points += split.points();
 }
 
 }  // namespace
-
-void place_corners(FrontState& state, const RootPatch& root_patch) {
-  const Diamond root(state.domain.root());
-  const DiamondParts parts = parts_of(state.domain, root);
-  state.obtain_block(state.domain.levels(), {});
-  for (int v = 0; v < kRootVertices; ++v) place_corner(state, root_patch, parts, root, v);
-  state.tet_count = count_root_tets(state, root_patch);
-}
-
-std::uint64_t count_root_tets(const FrontState& state, const RootPatch& root_patch) {
-  const Diamond root(state.domain.root());
-  std::uint32_t sides = 0;
-  for (int v = 0; v < kRootVertices; ++v) sides |= std::uint32_t(root_patch.side[std::size_t(v)]) << (2 * v);
-  return count_tets(state.domain, root, parts_of(state.domain, root), sides);
-}
 
 void set_corner_keys(FrontState& state, const std::array<ValueKey, kRootVertices>& keys) {
   const Diamond root(state.domain.root());
   state.obtain_block(state.domain.levels(), {});
   for (int v = 0; v < kRootVertices; ++v) {
     const auto [block, slot] = corner_at(state, root, v);
-    block->key.set(slot, keys[std::size_t(v)], state.values->format.last);
+    block->key.set(slot, keys[std::size_t(v)], state.values.format.last);
   }
 }
 
-RootPatch root_patch_of(const FrontState& state) {
-  const FrontValues& values = *state.values;
+void place_corners(FrontState& state) {
   const Diamond root(state.domain.root());
-  std::array<ValueKey, kRootVertices> keys{};
-  RootPatch root_patch;
-  for (int v = 0; v < kRootVertices; ++v) {
-    const auto [block, slot] = corner_at(state, root, v);
-    keys[std::size_t(v)] = block->key[std::size_t(slot)];
-    root_patch.side[std::size_t(v)] = values.sides.side(keys[std::size_t(v)]);
-  }
-  for (int e = 0; e < kRootEdges; ++e) {
-    const auto [a, b] = edge_ends(e, root.row->belt);
-    root_patch.cuts[std::size_t(e)] =
-        cuts_between(values.format.value(keys[std::size_t(a)]), values.format.value(keys[std::size_t(b)]), values.range);
-  }
-  return root_patch;
+  const DiamondParts parts = parts_of(state.domain, root);
+  const CornerSides sides = corner_sides(state, root);
+  state.points = 0;
+  for (int v = 0; v < kRootVertices; ++v) place_corner(state, sides, parts, root, v);
+  state.tet_count = count_root_tets(state);
+}
+
+std::uint64_t count_root_tets(const FrontState& state) {
+  const Diamond root(state.domain.root());
+  std::uint32_t sides = 0;
+  int v = 0;
+  for (const Side side : corner_sides(state, root)) sides |= std::uint32_t(side) << (2 * v++);
+  return count_tets(state.domain, root, parts_of(state.domain, root), sides);
 }
 
 }  // namespace intervale

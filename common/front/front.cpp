@@ -1,8 +1,10 @@
 #include "common/front/front.h"
 
 #include <algorithm>
+#include <cassert>
 
 #include "common/diamond/supercube_neighbours.h"
+#include "common/front/corners.h"
 #include "common/front/shown_splits.h"
 #include "common/util/bits.h"
 
@@ -13,27 +15,21 @@ using Block = FrontState::Block;
 
 constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
 
-// Hides the split of the diamond that the cursor found last; it is shown, and no child's is.
-void hide_split(FrontState& state, FrontCursor& at) {
-  if (state.values) {
-    ShownSplits(state).hide(at);
-    return;
-  }
-  Block& block = state.obtain_block(at.scale(), at.position());
-  state.tet_count -= std::uint64_t(at.added_tets(block.split_at(at.slot())));
-  block.shown &= ~bit(at.slot());
-  --state.shown_count;
-}
-
 // Removes a split that is not shown.
 void remove_split(FrontState& state, Block& block, Slot slot) {
-  if (state.values) state.values->withheld -= block.is_counting(slot);
+  state.values.withheld -= block.is_counting(slot);
   block.counts &= ~bit(slot);
   block.split &= ~bit(slot);
   --state.split_count;
 }
 
 }  // namespace
+
+Front::Front(const Grid& grid, const ValueFormat& format, const std::array<ValueKey, kRootVertices>& corners, const Range& range, Refine refine)
+    : state_(grid, FrontValues(format, range, refine)) {
+  set_corner_keys(state_, corners);
+  place_corners(state_);
+}
 
 std::optional<Front::Handle> Front::find(Vertex centre) const {
   if ((centre.x | centre.y | centre.z) <= 0 || scale_of(centre) >= state_.domain.levels()) return {};
@@ -47,13 +43,43 @@ std::optional<Front::Handle> Front::find(Vertex centre) const {
   return Handle{supercube_key(d.scale, cursor.position()), slot};
 }
 
+void Front::split(Handle handle, ValueKey key) {
+  FrontCursor cursor(state_);
+  cursor.move_to(handle.supercube);
+  cursor.gather_keys(handle.slot);
+  split(cursor, key);
+}
+
+void Front::split(FrontCursor& at, ValueKey key, std::uint64_t max_tets) {
+  FrontValues& values = state_.values;
+  assert(key <= values.format.last && "the caller checked it");
+  Block& block = at.obtain_here(state_);
+  const Side side = values.sides.side(key);
+  const bool is_counting = counts(at.context_with_sides(), side, values.refine), was_complete = values.is_complete();
+  block.key.set(at.slot(), key, values.format.last);
+  widen_bounds(at, block);
+  block.set_side(at.slot(), side);
+  block.split |= bit(at.slot());
+  ++state_.split_count;
+  if (is_counting) {
+    block.counts |= bit(at.slot());
+    ++values.withheld;
+  }
+  // Only at the border of the box may a child's split come before its parent's, which then belongs into the mesh
+  // anyway.
+  const bool has_shown_child = !at.is_interior() && at.has_shown_child();
+  if (!is_counting && !has_shown_child) return;
+  const bool is_shown = (was_complete || !is_counting) && ShownSplits(state_).show(at, max_tets);
+  if (!is_shown && !is_counting) values.is_limited = true;
+}
+
 bool Front::merge(Vertex centre) {
   if ((centre.x | centre.y | centre.z) <= 0 || scale_of(centre) >= state_.domain.levels()) return false;
   const Diamond d(centre);
   FrontCursor cursor(state_);
   cursor.move_to(d);
-  if (!cursor.gather_sides(kSlotOfType[d.type]) || !cursor.is_split() || cursor.has_child_in(&Block::split)) return false;
-  if (cursor.is_shown()) hide_split(state_, cursor);
+  if (!cursor.gather_sides(kSlotOfType[d.type]) || !cursor.is_split() || cursor.has_split_child()) return false;
+  if (cursor.is_shown()) ShownSplits(state_).hide(cursor);
   remove_split(state_, state_.obtain_block(cursor.scale(), cursor.position()), cursor.slot());
   return true;
 }
@@ -61,9 +87,8 @@ bool Front::merge(Vertex centre) {
 bool Front::hide(Handle handle) {
   FrontCursor cursor(state_);
   cursor.move_to(handle.supercube);
-  if (!cursor.gather_sides(handle.slot) || !cursor.is_shown()) return false;
-  if (state_.values ? cursor.has_shown_child() : cursor.has_child_in(&Block::shown)) return false;
-  hide_split(state_, cursor);
+  if (!cursor.gather_sides(handle.slot) || !cursor.is_shown() || cursor.has_shown_child()) return false;
+  ShownSplits(state_).hide(cursor);
   return true;
 }
 
@@ -71,15 +96,7 @@ bool Front::show(Handle handle, std::uint64_t max_tets) {
   FrontCursor cursor(state_);
   cursor.move_to(handle.supercube);
   if (!cursor.gather_sides(handle.slot) || !cursor.is_split() || cursor.is_shown()) return false;
-  if (state_.values) return cursor.here().is_counting(handle.slot) && ShownSplits(state_).show(cursor, max_tets);
-  if (!cursor.parents_are_shown()) return false;
-  Block& block = state_.obtain_block(cursor.scale(), cursor.position());
-  const std::uint64_t tets = state_.tet_count + std::uint64_t(cursor.added_tets(block.split_at(handle.slot)));
-  if (tets > max_tets) return false;
-  state_.tet_count = tets;
-  block.shown |= bit(handle.slot);
-  ++state_.shown_count;
-  return true;
+  return cursor.here().is_counting(handle.slot) && ShownSplits(state_).show(cursor, max_tets);
 }
 
 void Front::forget(std::span<const SlotGroup> groups) {

@@ -1,21 +1,18 @@
 // The current mesh, as a front of diamonds: the unsplit ones with at least one split parent, at first the root. Splits
 // refine it and merges coarsen it (Weiss and De Floriani 2008, section 7). It needs no field.
 //
-// A front is split either by cuts, for one range, or by values, for any range: a split then brings the value at the
-// diamond's centre, and the front derives sides and cuts from the values. By cuts, a split is shown in the mesh unless
-// it is hidden. By values, what is shown follows one rule: a split is shown if its diamond counts for the range, or a
-// child's split is shown. A diamond counts, with Refine::boundary, if its vertices and its centre do not all lie on one
-// side; with Refine::uniform, if they are not all below the range and not all above it. Vertices that do not exist
-// do not take part.
+// A split brings the value at the diamond's centre, and the front derives sides and cuts from the values, for any
+// range. What is shown in the mesh follows one rule: a split is shown if its diamond counts for the range, or a child's
+// split is shown. A diamond counts, with Refine::boundary, if its vertices and its centre do not all lie on one side;
+// with Refine::uniform, if they are not all below the range and not all above it. Vertices that do not exist do not
+// take part.
 //
 // FrontState holds the data, FrontCursor looks at single diamonds, FrontMesher makes the mesh; Front changes the state
 // and keeps its invariants.
 //
-// A split can also be hidden, with all splits that depend on it: it is kept, and further splits may build on it, but
-// the mesh is made without it, and showing it again costs no more than counting its tetrahedra. So a client with a
-// budget keeps more than it draws.
-//
-// By values, only splits that count are hidden so, and the others follow.
+// A split that counts can also be hidden if no child's split is shown, and those that do not count follow: it is kept,
+// and further splits may build on it, but the mesh is made without it, and showing it again costs no more than counting
+// its tetrahedra. So a client with a budget keeps more than it draws.
 //
 // After any sequence of splits, merges, hides and shows the mesh is conforming and positively oriented, and depends
 // only on which splits are shown.
@@ -35,8 +32,7 @@
 #include "common/front/front_cursor.h"
 #include "common/front/front_state.h"
 #include "common/mesh/mesh.h"
-#include "common/patch/diamond_context.h"
-#include "common/patch/root_patch.h"
+#include "common/patch/description.h"
 #include "common/patch/value_format.h"
 #include "common/util/parallel.h"
 
@@ -44,20 +40,17 @@ namespace intervale {
 
 class Front {
  public:
-  // The mesh of the root's patch. grid.dims in [kMinSide, kMaxSide].
-  Front(const Grid& grid, const RootPatch& root_patch);
-  // The same, split by values. corners: the keys of the root diamond's vertices, in local order. format: as
-  // check_value_format accepts it. range: alpha <= beta; either may be infinite. Here and below, keys are at most
-  // format.last.
+  // The mesh of the root's patch. grid.dims in [kMinSide, kMaxSide]. format: as check_value_format accepts it. corners:
+  // the keys of the root diamond's vertices, in local order. range: alpha <= beta; either may be infinite. Here and
+  // below, keys are at most format.last.
   Front(const Grid& grid, const ValueFormat& format, const std::array<ValueKey, kRootVertices>& corners, const Range& range,
         Refine refine = Refine::boundary);
 
-  // Only of a front split by values.
-  [[nodiscard]] const ValueFormat& format() const { return state_.values->format; }
-  [[nodiscard]] const Range& range() const { return state_.values->range; }
-  [[nodiscard]] Refine refine() const { return state_.values->refine; }
+  [[nodiscard]] const ValueFormat& format() const { return state_.values.format; }
+  [[nodiscard]] const Range& range() const { return state_.values.range; }
+  [[nodiscard]] Refine refine() const { return state_.values.refine; }
   // Splits that count for the range, but are hidden: for want of room, or by hide().
-  [[nodiscard]] std::uint64_t withheld_count() const { return state_.values->withheld; }
+  [[nodiscard]] std::uint64_t withheld_count() const { return state_.values.withheld; }
 
   // A diamond of the front that can be split now; valid until the next split or merge.
   struct Handle {
@@ -70,40 +63,29 @@ class Front {
   // something. Any vertex is allowed, also one that is no centre.
   [[nodiscard]] std::optional<Handle> find(Vertex centre) const;
 
-  // What the diamond knows before its split. Its count_cuts tells how many cuts splitting takes. Only of a front split
-  // by cuts.
-  [[nodiscard]] DiamondContext context(Handle handle) const;
-
-  // Splits a diamond, and shows the split if all splits so far are shown. cuts: q (see Cuts) of each cut on the
-  // subdivision edges, centre to vertex, in order of local vertices, alpha before beta:
-  // context(handle).count_cuts(side) of them.
-  void split(Handle handle, Side side, std::span<const std::uint8_t> cuts);
-  // The same for the diamond that a cursor over state() found last, after gather_cuts(); the cursor sees the split. The
-  // split stays hidden if the mesh would have more than max_tets tetrahedra.
-  void split(FrontCursor& at, Side side, std::span<const std::uint8_t> cuts, std::uint64_t max_tets = ~std::uint64_t(0));
-
   // Splits a diamond by the value at its centre. If the mesh is all that the rule says, it is so again: the split is
   // shown if it counts, and the hidden splits of its ancestors with it. They all stay hidden if the mesh would have
-  // more than max_tets tetrahedra, and from then on, as long as splits that count are hidden, new ones stay hidden, too.
+  // more than max_tets tetrahedra, and from then on, as long as splits that count are hidden, new ones stay hidden,
+  // too.
   void split(Handle handle, ValueKey key);
-  // The same for the diamond that a cursor over state() found last, by find(), find_unsplit() or
-  // gather_sides(); the cursor sees the split.
+  // The same for the diamond that a cursor over state() found last, by find(), gather_keys() or gather_sides(); the
+  // cursor sees the split.
   void split(FrontCursor& at, ValueKey key, std::uint64_t max_tets = ~std::uint64_t(0));
 
   // Undoes the split of a diamond none of whose children is split. False, and nothing done, if there is no such split.
-  // By values, ancestors that do not count and are left without a shown child are hidden.
+  // Ancestors that do not count and are left without a shown child are hidden.
   bool merge(Vertex centre);
 
-  // Takes a split that is shown out of the mesh, or puts one that is hidden back. False, and nothing done, if a child's
-  // split is shown, or a parent's hidden; or if the mesh would have more than max_tets tetrahedra.
-  // By values, both take ancestors along: hide() hides those that do not count and are left without a shown child, and
-  // show() shows all that are hidden. show() is false for a split that does not count: it is shown with its descendants
-  // only. What was hidden returns with set_range().
+  // Takes a split that is shown out of the mesh, or puts one that is hidden back. Both take ancestors along: hide()
+  // hides those that do not count and are left without a shown child, and show() shows all that are hidden. False, and
+  // nothing done, if a child's split is shown; if the split to be shown does not count, for it is shown with its
+  // descendants only; or if the mesh would have more than max_tets tetrahedra. What was hidden returns with
+  // set_range().
   bool hide(Handle handle);
   bool show(Handle handle, std::uint64_t max_tets);
 
   // Undoes splits and frees their memory: of those named, finest first, each that is split and by then has no split
-  // child. Others are ignored. groups: keys strictly ascending. By values, hides ancestors as merge() does. O(front).
+  // child. Others are ignored. groups: keys strictly ascending. Hides ancestors as merge() does. O(front).
   void forget(std::span<const SlotGroup> groups);
 
   [[nodiscard]] const FrontState& state() const { return state_; }
@@ -118,17 +100,16 @@ class Front {
   [[nodiscard]] std::uint64_t shown_slots(SupercubeKey supercube) const;  // of that one's splits
   [[nodiscard]] bool is_hidden(Handle handle) const;                      // split, but not shown
 
-  // The mesh, in world coordinates. By values, with the value of each point.
+  // The mesh, in world coordinates, with the value of each point.
   [[nodiscard]] Mesh mesh(const ParallelFor& parallel = serial) const;
 
-  // Whether both have one grid and root patch, and every diamond split here is split in `other` with the same side and
-  // cuts. The mesh depends on nothing else. By values: whether both have one grid, format and range, equal keys at the
-  // corners, and every diamond split here is split in `other` with the same key. O(front).
+  // Whether both have one grid, format and range, equal keys at the corners, and every diamond split here is split in
+  // `other` with the same key. O(front).
   [[nodiscard]] bool is_part_of(const Front& other) const;
 
   // Merges every diamond whose split is not shown in `coarse`, children first: of two fronts of one stream, the finer
-  // one's mesh becomes equal to the coarser one's. By values, that is so if nothing that counts is hidden here. False
-  // if some could not be merged, because what `coarse` shows needs them. O(front).
+  // one's mesh becomes equal to the coarser one's, if nothing that counts is hidden here. False if some could not be
+  // merged, because what `coarse` shows needs them. O(front).
   [[nodiscard]] bool coarsen_to(const Front& coarse);
 
   // Checks every invariant; returns the first violation. For tests; O(front).
@@ -138,7 +119,7 @@ class Front {
   // uses them.
   using GroupKeys = std::function<void(const SlotGroup& group, std::span<ValueKey, kSlots> keys)>;
 
-  // Splits many diamonds of a front without splits, by values. groups: keys strictly ascending. Returns the centre of a
+  // Splits many diamonds of a front without splits. groups: keys strictly ascending. Returns the centre of a
   // diamond that cannot be split, because it does not exist, a parent is not split, or its split would change nothing.
   // Shows what the rule says.
   std::optional<Vertex> split_all(std::span<const SlotGroup> groups, const GroupKeys& keys_of, const ParallelFor& parallel = serial);

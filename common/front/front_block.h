@@ -1,4 +1,4 @@
-// One supercube of a front: its splits, and their values or cuts. Inside the front.
+// One supercube of a front: its splits, and their values. Inside the front.
 #pragma once
 
 #include <bit>
@@ -78,13 +78,13 @@ struct FrontBlock {
   Vertex position;  // centre >> (scale + 2)
   std::int32_t scale = 0;
   std::uint64_t split = 0;  // slots
-  SlotKeys key;             // of those split, or were, if by values
+  SlotKeys key;             // of those that are split, or were
   std::uint64_t shown = 0;  // those of `split` that the mesh is made with; the others are hidden
-  // The sides of the centres of those of `split`; and, by values, which of them count for the range
+  // The sides of the centres of those of `split`, and which of them count for the range
   std::uint64_t inside = 0, above = 0, counts = 0;
-  // By values, bounds of the keys at the centres and the vertices of the diamonds that are split, or were
+  // Bounds of the keys at the centres and the vertices of the diamonds that are split, or were
   ValueKey least = ~ValueKey(0), greatest = 0;
-  SlotSplits placed;  // the splits that have points, or had; by values, of those that were shown
+  SlotSplits placed;  // the splits that are shown and have points, or were and had
 
   [[nodiscard]] bool is_split(Slot slot) const { return (split >> slot & 1) != 0; }
   [[nodiscard]] bool is_shown(Slot slot) const { return (shown >> slot & 1) != 0; }
@@ -94,7 +94,7 @@ struct FrontBlock {
     inside = (inside & ~(std::uint64_t(1) << slot)) | std::uint64_t(side == Side::inside) << slot;
     above = (above & ~(std::uint64_t(1) << slot)) | std::uint64_t(side == Side::above) << slot;
   }
-  // Of a diamond that is split, or by values shown. A split without points is nothing but its side.
+  // Of a split that is shown. A split without points is nothing but its side.
   [[nodiscard]] Split split_at(Slot slot) const {
     if (placed.has(slot)) return placed[slot];
     return {std::uint32_t(side(slot)) << Split::kSideBit, 0};

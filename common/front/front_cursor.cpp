@@ -1,8 +1,7 @@
 #include "common/front/front_cursor.h"
 
 #include <algorithm>
-
-#include "common/util/bits.h"
+#include <bit>
 
 namespace intervale {
 
@@ -66,7 +65,7 @@ bool FrontCursor::gather_sides(Slot slot) {
     if (!(parts_.vertices >> v & 1)) continue;
     const Neighbour vertex = at(links.vertex[std::size_t(v)]);
     if (!vertex.is_split()) return false;
-    sides |= std::uint32_t(state_.values ? vertex.block.side(vertex.slot) : vertex.split().side()) << (2 * v);
+    sides |= std::uint32_t(vertex.block.side(vertex.slot)) << (2 * v);
   }
   context_.sides = sides;
   has_sides_ = true;
@@ -95,7 +94,7 @@ bool FrontCursor::load_keys() {
 
 const DiamondContext& FrontCursor::context_with_sides() {
   if (has_sides_) return context_;
-  const KeySides sides = state_.values->sides;
+  const KeySides sides = state_.values.sides;
   const int vertices = context_.row->vertices;
   std::uint32_t found = 0;
   for (int v = 0; v < vertices; ++v) found |= std::uint32_t(sides.side(keys_[std::size_t(v)])) << (2 * v);
@@ -104,14 +103,8 @@ const DiamondContext& FrontCursor::context_with_sides() {
   return context_;
 }
 
-bool FrontCursor::gather_splits() {
-  const Links& links = this->links();
-  for (const int v : set_bits(parts_.vertices)) split_[std::size_t(v)] = at(links.vertex[std::size_t(v)]).split();
-  return true;
-}
-
-// Rejects most of the diamonds that cannot be split, at a fraction of gather()'s cost. At the border some parents may
-// not exist, of all but the root not all: gather() decides.
+// Rejects most of the diamonds that cannot be split, at a fraction of the cost of looking at all vertices. At the
+// border some parents may not exist, of all but the root not all: the vertices decide.
 bool FrontCursor::parents_are_split(Slot slot) {
   const Links& links = neighbours_.links(slot);
   const int parents = diamond_type(kTypeOfSlot[std::size_t(slot)]).parents;
@@ -130,11 +123,11 @@ bool FrontCursor::parents_are_shown() {
   return true;
 }
 
-bool FrontCursor::has_child_in(std::uint64_t Block::*slots) {
+bool FrontCursor::has_split_child() {
   const std::span<const Link> children = neighbours_.children(slot_);
   for (std::size_t k = 0; k < children.size(); ++k) {
     const Neighbour child = at(children[k]);
-    if (!(child.block.*slots >> child.slot & 1)) continue;
+    if (!child.is_split()) continue;
     for (const Duet::Half& half : context_.row->child[k].half) {
       if ((parts_.tets >> half.tet & 1) && half_exists(state_.domain, diamond(), half.tet, half.end)) return true;
     }
@@ -145,29 +138,6 @@ bool FrontCursor::has_child_in(std::uint64_t Block::*slots) {
 bool FrontCursor::has_shown_child() {
   const std::span<const Link> children = neighbours_.children(slot_);
   return std::any_of(children.begin(), children.end(), [this](Link child) { return at(child).is_shown(); });
-}
-
-const DiamondContext& FrontCursor::gather_cuts() {
-  if (!context_.is_mixed()) {  // no edge is cut
-    context_.cut = {};
-    return context_;
-  }
-  const DiamondType& row = *context_.row;
-  const Links& links = this->links();
-  for (int e = 0; e < row.edges; ++e) {
-    auto& cut = context_.cut[std::size_t(e)];
-    cut = {0, 0};
-    if (!(parts_.edges >> e & 1)) continue;
-    const Links::Edge edge = links.edge[std::size_t(e)];
-    const Split& owner = split_[edge.owner];
-    const unsigned surfaces = owner.cuts_to(edge.other);
-    if (surfaces == 0) continue;
-    const std::uint8_t* q = state_.q.data() + owner.cut(2 * edge.other);
-    // The owner keeps them from its own centre on; the context wants them from the edge's first end on.
-    if (surfaces & 1) cut[0] = std::uint16_t(2 * (*q++ ^ edge.flip) + 1);
-    if (surfaces & 2) cut[1] = std::uint16_t(2 * (*q ^ edge.flip) + 1);
-  }
-  return context_;
 }
 
 std::int64_t FrontCursor::added_tets(const Split& split) const {

@@ -1,8 +1,7 @@
-// Looks at the diamonds of a front, one supercube at a time: what of a diamond exists, its vertices' splits, and the
-// cuts on its edges.
+// Looks at the diamonds of a front, one supercube at a time: what of a diamond exists, and the sides and the keys of
+// its vertices.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <type_traits>
@@ -48,19 +47,15 @@ class FrontCursor {
 
   // Finds the diamond in a slot if it exists and all its vertices' diamonds are split: if it is split, or in the front
   // with all its tetrahedra. The functions below are of the diamond found last.
-  bool gather(Slot slot) { return gather_sides(slot) && gather_splits(); }
-  // The same without what gather_cuts() needs.
   bool gather_sides(Slot slot);
-  // Finds the diamond in a slot whose own split is there, with its cuts. Its vertices' sides follow from those.
+  // Finds the diamond in a slot whose own split is shown. Its vertices' sides follow from its cuts.
   void gather_own(Slot slot);
-  // Finds the diamond in a slot whose split is there, by values, and does not count: its vertices have its centre's side.
+  // Finds the diamond in a slot whose split is there and does not count: its vertices have its centre's side.
   void gather_one_sided(Slot slot);
-  // Like gather_sides(), of a front split by values, with the keys of the vertices in place of their sides.
+  // Like gather_sides(), with the keys of the vertices in place of their sides.
   bool gather_keys(Slot slot);
   // The same, if it can be split now.
-  bool find_unsplit(Slot slot) { return parents_are_split(slot) && gather_keys(slot) && !is_split() && !is_noop(); }
-  // Like gather(), if it can be split now.
-  bool find(Slot slot) { return parents_are_split(slot) && gather(slot) && !is_split() && !is_noop(); }
+  bool find(Slot slot) { return parents_are_split(slot) && gather_keys(slot) && !is_split() && !is_noop(); }
 
   [[nodiscard]] Diamond diamond() const {
     const unsigned type = kTypeOfSlot[std::size_t(slot_)];
@@ -69,20 +64,16 @@ class FrontCursor {
   [[nodiscard]] Slot slot() const { return slot_; }
   [[nodiscard]] const DiamondParts& parts() const { return parts_; }
   [[nodiscard]] const Links& links() const { return neighbours_.links(slot_); }
-  // Of a front split by values: the keys at its vertices, kNoKey at one that does not exist; at one of them; and at the
-  // centre of a diamond that is split.
+  // The keys at its vertices, kNoKey at one that does not exist; and at the centre of a diamond that is split
   [[nodiscard]] const VertexKeys& vertex_keys() {
     if (!has_keys_) load_keys();
     return keys_;
   }
-  [[nodiscard]] ValueKey key_of(int vertex) { return vertex_keys()[std::size_t(vertex)]; }
   [[nodiscard]] ValueKey centre_key() { return here().key[std::size_t(slot_)]; }
-  // Its cuts may be those of another diamond, and after gather_keys() and find_unsplit() its sides, too
+  // After gather_keys() and find() its sides may be those of another diamond
   [[nodiscard]] const DiamondContext& context() const { return context_; }
   // The same, with its own sides
   const DiamondContext& context_with_sides();
-  // The same, with its own cuts
-  const DiamondContext& gather_cuts();
   [[nodiscard]] bool is_split() { return here().is_split(slot_); }
   [[nodiscard]] bool is_shown() { return here().is_shown(slot_); }
   [[nodiscard]] bool is_noop() const { return parts_.straddles && state_.domain.is_noop(diamond()); }
@@ -90,8 +81,8 @@ class FrontCursor {
   // diamond is found if not all its supercube is inside the box.
   [[nodiscard]] bool is_splittable(Slot slot) { return parents_are_split(slot) && (is_interior_ || (gather_sides(slot) && !is_noop())); }
   [[nodiscard]] bool parents_are_shown();
-  // Whether the diamond handed tetrahedra to a child whose split is in `slots`: &Block::split or &Block::shown.
-  [[nodiscard]] bool has_child_in(std::uint64_t Block::*slots);
+  // Whether the diamond handed tetrahedra to a child that is split.
+  [[nodiscard]] bool has_split_child();
   // Whether a child's split is shown: one by its place, whether it was handed tetrahedra or not.
   [[nodiscard]] bool has_shown_child();
   // Whether all diamonds of the supercube lie inside the box.
@@ -127,7 +118,6 @@ class FrontCursor {
 
  private:
   [[nodiscard]] bool parents_are_split(Slot slot);
-  bool gather_splits();
   bool gather_parts(Slot slot);
   bool load_keys();
 
@@ -137,7 +127,6 @@ class FrontCursor {
   bool is_interior_ = false;                // all diamonds of the supercube are inside the box
   Slot slot_;
   DiamondParts parts_;
-  std::array<Split, kMaxVertices> split_;  // of each vertex that exists
   DiamondContext context_;
   bool has_keys_ = false, has_sides_ = false;
   VertexKeys keys_{};

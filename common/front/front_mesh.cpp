@@ -42,7 +42,7 @@ class FrontMesh {
     Mesh mesh;
     mesh.points.resize(points);
     mesh.surface.resize(points);
-    if (state_.values) mesh.value.resize(points);
+    mesh.value.resize(points);
     mesh.tets.resize(state_.tet_count);
     parallel_(pieces_, [&](std::size_t piece) { place_points(piece, mesh); });
     place_tets(mesh);
@@ -140,11 +140,9 @@ class FrontMesh {
         const std::uint32_t n = number_[p.id];
         for (int i = 0; i < 3; ++i) mesh.points[n][i] = grid.origin[i] + grid.spacing[i] * p.position[i] * (1.0 / FrontMesher::kSteps);
         mesh.surface[n] = p.surface;
-        if (state_.values && p.surface != Surface::inside) {
-          mesh.value[n] = p.surface == Surface::alpha ? state_.values->range.alpha : state_.values->range.beta;
-        }
+        if (p.surface != Surface::inside) mesh.value[n] = p.surface == Surface::alpha ? state_.values.range.alpha : state_.values.range.beta;
       }
-      if (state_.values) place_values(number, mesh);
+      place_values(number, mesh);
     });
   }
 
@@ -152,7 +150,7 @@ class FrontMesh {
   void place_values(std::size_t number, Mesh& mesh) const {
     const auto place_centre = [&](const FrontState::Block& block, Slot slot) {
       const PointId id = block.split_at(slot).centre();
-      if (used_[id]) mesh.value[number_[id]] = state_.values->format.value(block.key[slot]);
+      if (used_[id]) mesh.value[number_[id]] = state_.values.format.value(block.key[slot]);
     };
     const FrontState::Block& block = mesher_.block(number);
     for (const Slot slot : set_bits<Slot>(block.shown & block.inside)) place_centre(block, slot);

@@ -70,17 +70,12 @@ void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) 
   const bool at_border = is_at_border(number);
   FrontCursor cursor(state_);
   cursor.move_to(block.scale, block.position);
-  CutPlaces derived{};
+  CutPlaces cuts{};
   for (const Slot slot : set_bits<Slot>(block.shown & block.placed.slots())) {
     const Diamond d(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]);
     const FrontState::Split split = block.placed[slot];
-    const std::uint8_t* q = derived.data();
-    if (split.first < state_.q.size()) {
-      q = state_.q.data() + split.first;
-    } else if (split.cut_bits() != 0) {
-      cursor.gather_own(slot);
-      derive_cuts(*state_.values, cursor, split.cut_bits(), derived);
-    }
+    derive_cuts(state_.values, cursor, slot, split.cut_bits(), cuts);
+    const std::uint8_t* q = cuts.data();
     const Vertex c = at_border ? state_.domain.clamp(d.centre) : d.centre;
     const bool on_border = at_border && is_on_border(d.centre);
     PointId id = split.first;
@@ -161,7 +156,7 @@ void FrontMesher::append_root(const Output<Numbers>& out) const {
   const Diamond root(state_.domain.root());
   FrontCursor cursor(state_);
   cursor.move_to(root);
-  if (!cursor.gather(kSlotOfType[root.type]) || cursor.is_shown()) return;
+  if (!cursor.gather_sides(kSlotOfType[root.type]) || cursor.is_shown()) return;
   PointsAround points;
   gather_points(cursor, out.numbers, points);
   for (const int t : set_bits(cursor.parts().tets)) {
@@ -238,7 +233,7 @@ bool FrontMesher::can_change(Vertex centre) const {
   const Diamond d(centre);
   FrontCursor cursor(state_);
   cursor.move_to(d);
-  return cursor.gather(kSlotOfType[d.type]) && !cursor.is_noop() && cursor.context().is_mixed();
+  return cursor.gather_sides(kSlotOfType[d.type]) && !cursor.is_noop() && cursor.context().is_mixed();
 }
 
 void FrontMesher::append_tets(std::size_t number, std::vector<Tet>& tets, std::span<const std::uint32_t> numbers) const {

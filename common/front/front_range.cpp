@@ -1,4 +1,4 @@
-// All that a front split by values shows for a range, made at once from the keys of its splits.
+// All that a front shows for a range, made at once from the keys of its splits.
 //
 // Passes over the supercubes, each of which many threads can share: the sides of the centres; which diamonds count;
 // ancestors of those, from the finest scale on and class by class, so that a parent is complete before its own parents
@@ -28,11 +28,10 @@ constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
 // Makes what is shown of a front from its splits and their keys, whatever was shown before.
 class Reclassification {
  public:
-  Reclassification(FrontState& state, const ParallelFor& parallel) : state_(state), values_(*state.values), parallel_(parallel) {}
+  Reclassification(FrontState& state, const ParallelFor& parallel) : state_(state), values_(state.values), parallel_(parallel) {}
 
   void run() {
-    std::vector<std::uint8_t>().swap(state_.q);
-    place_corners(state_, root_patch_of(state_));
+    place_corners(state_);
     find_sides();
     find_counting();
     show_ancestors();
@@ -204,17 +203,16 @@ class Reclassification {
 
 // Hides all splits, and shows those that count from the coarsest scale on until one does not fit.
 void show_within(FrontState& state, std::uint64_t max_tets) {
-  const RootPatch root_patch = root_patch_of(state);
   std::vector<const Block*> blocks;  // coarsest first
   for (Block& block : state.blocks) {
     if (state.is_root_block(block)) continue;
     block.shown = 0;
-    state.values->withheld += std::uint64_t(std::popcount(block.counts));
+    state.values.withheld += std::uint64_t(std::popcount(block.counts));
     blocks.push_back(&block);
   }
   std::stable_sort(blocks.begin(), blocks.end(), [](const Block* a, const Block* b) { return a->scale > b->scale; });
   state.shown_count = 0;
-  state.tet_count = count_root_tets(state, root_patch);
+  state.tet_count = count_root_tets(state);
   ShownSplits splits(state);
   FrontCursor cursor(state);
   for (const Block* const block : blocks) {

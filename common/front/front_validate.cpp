@@ -27,7 +27,7 @@ Wrong validate_cuts(const FrontState& state, const FrontCursor& cursor, const Sp
 
 // What follows from the values of the split that the cursor found last.
 Wrong validate_values(const FrontState& state, FrontCursor& cursor, const Block& block) {
-  const FrontValues& values = *state.values;
+  const FrontValues& values = state.values;
   const Slot slot = cursor.slot();
   const Side side = side_of(values.format.value(block.key[slot]), values.range);
   const bool is_counting = counts(cursor.context(), side, values.refine), is_shown = block.is_shown(slot), has_child = cursor.has_shown_child();
@@ -54,12 +54,10 @@ Wrong validate_block(const FrontState& state, const Block& block, FrontCursor& c
     const auto where = " at (" + std::to_string(c.x) + ", " + std::to_string(c.y) + ", " + std::to_string(c.z) + ")";
     const Split split = block.split_at(slot);
     if (!cursor.gather_sides(slot)) return "a diamond is split before its parents" + where;
-    if (!state.values || block.is_shown(slot)) {
+    if (block.is_shown(slot)) {
       if (const Wrong wrong = validate_cuts(state, cursor, split)) return *wrong + where;
     }
-    if (state.values) {
-      if (const Wrong wrong = validate_values(state, cursor, block)) return *wrong + where;
-    }
+    if (const Wrong wrong = validate_values(state, cursor, block)) return *wrong + where;
     ++counts.splits;
     if (!block.is_shown(slot)) {
       counts.withheld += block.is_counting(slot);
@@ -92,7 +90,7 @@ std::optional<std::string> Front::validate() const {
   }
   if (auto wrong = compare("split diamonds", counts.splits, state_.split_count)) return wrong;
   if (auto wrong = compare("shown splits", counts.shown, state_.shown_count)) return wrong;
-  if (auto wrong = compare("hidden splits that count", counts.withheld, state_.values ? state_.values->withheld : 0)) return wrong;
+  if (auto wrong = compare("hidden splits that count", counts.withheld, state_.values.withheld)) return wrong;
   return compare("tetrahedra", counts.tets, state_.tet_count);
 }
 

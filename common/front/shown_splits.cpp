@@ -22,13 +22,15 @@ bool counts(const DiamondContext& context, Side centre, Refine refine) {
   return centre != all || (refine == Refine::uniform && all == Side::inside);
 }
 
-void derive_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, CutPlaces& q) {
-  const double centre = values.format.value(at.centre_key());
+void derive_cuts(const FrontValues& values, FrontCursor& at, Slot slot, std::uint32_t cut_bits, CutPlaces& q) {
+  const Links& links = at.links(slot);
+  const double centre = values.format.value(at.here().key[std::size_t(slot)]);
   std::size_t n = 0;
   for (std::uint32_t bits = cut_bits; bits != 0;) {
     const int v = std::countr_zero(bits) / 2;
     bits &= ~(3u << (2 * v));
-    const Cuts cuts = cuts_between(centre, values.format.value(at.key_of(v)), values.range);
+    const FrontCursor::Neighbour vertex = at.at(links.vertex[std::size_t(v)]);
+    const Cuts cuts = cuts_between(centre, values.format.value(vertex.block.key[std::size_t(vertex.slot)]), values.range);
     for (int i = 0; i < cuts.count; ++i) q[n++] = cuts.q[i];
   }
 }
@@ -106,8 +108,8 @@ bool ShownSplits::show(FrontCursor& at, std::uint64_t max_tets) {
   own.block->shown |= bit(own.slot);
   state_.tet_count = tets;
   state_.shown_count += ancestors.size() + 1;
-  state_.values->withheld -= own.block->is_counting(own.slot);
-  for (const Place& place : ancestors) state_.values->withheld -= place.block->is_counting(place.slot);
+  state_.values.withheld -= own.block->is_counting(own.slot);
+  for (const Place& place : ancestors) state_.values.withheld -= place.block->is_counting(place.slot);
   return true;
 }
 
@@ -116,7 +118,7 @@ void ShownSplits::hide_one(FrontCursor& at) {
   state_.tet_count -= std::uint64_t(at.added_tets(block.split_at(at.slot())));
   block.shown &= ~bit(at.slot());
   --state_.shown_count;
-  state_.values->withheld += block.is_counting(at.slot());
+  state_.values.withheld += block.is_counting(at.slot());
 }
 
 void ShownSplits::hide(FrontCursor& at) {

@@ -1,5 +1,5 @@
-// Shows and hides the splits of a front split by values, one at a time and with the ancestors that follow by the rule
-// (front.h). Inside the front.
+// Shows and hides the splits of a front, one at a time and with the ancestors that follow by the rule (front.h). Inside
+// the front.
 #pragma once
 
 #include <array>
@@ -16,10 +16,10 @@ namespace intervale {
 // Whether a diamond counts for a range. context: of the diamond, with its sides; centre: the side of its centre.
 [[nodiscard]] bool counts(const DiamondContext& context, Side centre, Refine refine);
 
-// Sets q of each cut on the subdivision edges of the split diamond that the cursor found last, in order of the bits of
-// its split, as many as there are.
+// Sets q of each cut on the subdivision edges of a split diamond, or of a corner of the domain, in order of the bits of
+// its split, as many as there are. It is in the cursor's supercube.
 using CutPlaces = std::array<std::uint8_t, kMaxCuts>;
-void derive_cuts(const FrontValues& values, FrontCursor& at, std::uint32_t cut_bits, CutPlaces& q);
+void derive_cuts(const FrontValues& values, FrontCursor& at, Slot slot, std::uint32_t cut_bits, CutPlaces& q);
 
 // Widens the bounds of a supercube's keys by those of the diamond that the cursor found last, which has its key.
 void widen_bounds(FrontCursor& at, FrontState::Block& block);

@@ -38,7 +38,7 @@ Result<Extraction> extract(const IntervalVolume& volume, const RelevantUpdates& 
     const Place p = set.place(i);
     FrontCursor cursor(front.state());
     cursor.move_to(p.key);
-    if (!cursor.find_unsplit(p.slot)) return misfit(SupercubeSet::centre(p));
+    if (!cursor.find(p.slot)) return misfit(SupercubeSet::centre(p));
     front.split(cursor, volume.key(i), lod.max_tets.value_or(~std::uint64_t(0)));
     if (front.withheld_count() > 0) break;
   }

@@ -1,8 +1,6 @@
-// What a front or a field knows of a diamond before its split: sides, and cuts on its edges.
+// What a front knows of a diamond before its split: the sides of its vertices.
 #pragma once
 
-#include <array>
-#include <bit>
 #include <cstdint>
 
 #include "common/diamond/diamond.h"
@@ -12,17 +10,12 @@ namespace intervale {
 
 inline constexpr int kMaxCuts = 2 * kMaxVertices;  // on the subdivision edges of one diamond
 
-// An unsplit diamond, as its front or its field know it.
 struct DiamondContext {
   const DiamondType* row = nullptr;
   std::uint32_t sides = 0;     // two bits each, by local vertex; 0 for one that does not exist
   std::uint32_t vertices = 0;  // a bit for each local vertex that exists
-  // Of each edge, by surface (0 alpha, 1 beta): 2 q + 1, the cut's place from the first of edge_ends in 1/512; 0 where
-  // there is none.
-  std::array<std::array<std::uint16_t, 2>, kMaxEdges> cut{};
 
   [[nodiscard]] Side side(int v) const { return Side(sides >> (2 * v) & 3); }
-  [[nodiscard]] bool has(int v) const { return (vertices >> v & 1) != 0; }
   // The vertices that exist, with a pair of bits each as in sides: 01.
   [[nodiscard]] std::uint32_t pairs() const {
     std::uint32_t exists = vertices;
@@ -42,9 +35,6 @@ struct DiamondContext {
 
   // Whether vertices lie on different sides: such a diamond is relevant.
   [[nodiscard]] bool is_mixed() const { return sides != 0 && sides != pairs() && sides != pairs() << 1; }
-
-  // How many cuts there are on the subdivision edges if the centre lies there.
-  [[nodiscard]] int count_cuts(Side centre) const { return std::popcount(cut_bits(centre)); }
 };
 
 }  // namespace intervale

@@ -5,7 +5,6 @@
 #include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <tuple>
@@ -50,59 +49,6 @@ Around around(const Field<T>& field, const Domain& domain, const Diamond& d, con
   }
   f[kCentre] = field.at(domain.clamp(d.centre));
   return f;
-}
-
-// Of each class: the ends of each edge, and the edges at each vertex, a bit each.
-struct EdgeTable {
-  std::array<std::array<std::uint8_t, 2>, kMaxEdges> ends{};
-  std::array<std::uint32_t, kMaxVertices> at{};
-};
-constexpr std::array<EdgeTable, 3> kEdgeTables = [] {
-  std::array<EdgeTable, 3> tables{};
-  constexpr int belts[3] = {6, 4, 8};
-  for (int cls = 0; cls < 3; ++cls) {
-    for (int e = 0; e < 1 + 3 * belts[cls]; ++e) {
-      const auto [a, b] = edge_ends(e, belts[cls]);
-      tables[cls].ends[e] = {std::uint8_t(a), std::uint8_t(b)};
-      tables[cls].at[a] |= 1u << e;
-      tables[cls].at[b] |= 1u << e;
-    }
-  }
-  return tables;
-}();
-
-DiamondContext context_of(const Around& f, const BorderShape& shape, const Range& range) {
-  DiamondContext c;
-  c.row = shape.row;
-  c.vertices = shape.vertices;
-  const EdgeTable& edges = kEdgeTables[c.row->cls];
-  std::uint32_t alpha = 0, beta = 0;  // the edges that each surface cuts: exactly one end is below, or above
-  for (int v = 0; v < c.row->vertices; ++v) {
-    if (!c.has(v)) continue;
-    const Side side = side_of(f[v], range);
-    c.sides |= std::uint32_t(side) << (2 * v);
-    alpha ^= side == Side::below ? edges.at[v] : 0;
-    beta ^= side == Side::above ? edges.at[v] : 0;
-  }
-  for (const int e : set_bits((alpha | beta) & shape.edges)) {
-    const Cuts cuts = cuts_between(f[edges.ends[e][0]], f[edges.ends[e][1]], range);
-    int n = 0;
-    if (alpha >> e & 1) c.cut[e][0] = std::uint16_t(2 * cuts.q[n++] + 1);
-    if (beta >> e & 1) c.cut[e][1] = std::uint16_t(2 * cuts.q[n] + 1);
-  }
-  return c;
-}
-
-// Writes the cuts on the subdivision edges; returns their number.
-std::size_t cuts_of(const Around& f, const DiamondContext& c, const Range& range, std::uint8_t* cuts) {
-  const Side centre = side_of(f[kCentre], range);
-  std::size_t n = 0;
-  for (int v = 0; v < c.row->vertices; ++v) {
-    if (!c.has(v) || c.side(v) == centre) continue;
-    const Cuts q = cuts_between(f[kCentre], f[v], range);
-    for (int i = 0; i < q.count; ++i) cuts[n++] = q.q[i];
-  }
-  return n;
 }
 
 // Tetrahedra of the patch in one tetrahedron of a diamond, or one of its halves. local: its vertices.
@@ -209,35 +155,6 @@ double FieldHierarchy::value(Vertex v) const {
 }
 
 Side FieldHierarchy::side(Vertex v) const { return side_of(value(v), range_); }
-
-RootPatch FieldHierarchy::root_patch() const {
-  const Diamond root(domain_.root());
-  const unsigned edges = Domain::edges(*root.row, domain_.tets(root));
-  RootPatch root_patch;
-  for (int v = 0; v < kRootVertices; ++v) root_patch.side[v] = side(root.vertex(v));
-  for (int e = 0; e < kRootEdges; ++e) {
-    const auto [a, b] = edge_ends(e, root.row->belt);
-    if (edges >> e & 1) root_patch.cuts[e] = cuts_between(value(root.vertex(a)), value(root.vertex(b)), range_);
-  }
-  return root_patch;
-}
-
-DiamondContext FieldHierarchy::context(const Diamond& d) const {
-  const BorderShape shape = BorderShapes::shape_of(domain_, d);
-  return visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    return context_of(around(Field<T>{samples, domain_.last()}, domain_, d, shape), shape, range_);
-  });
-}
-
-std::vector<std::uint8_t> FieldHierarchy::cuts(const Diamond& d) const {
-  const BorderShape shape = BorderShapes::shape_of(domain_, d);
-  std::vector<std::uint8_t> cuts(kMaxCuts);
-  cuts.resize(visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
-    const Around f = around(Field<T>{samples, domain_.last()}, domain_, d, shape);
-    return cuts_of(f, context_of(f, shape, range_), range_, cuts.data());
-  }));
-  return cuts;
-}
 
 // What one brick's updates add to the interval volume, besides their values and errors.
 struct FieldHierarchy::BrickPart {

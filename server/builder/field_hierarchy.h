@@ -1,9 +1,8 @@
 // Delta: the hierarchy of diamonds over the whole field, with the diamonds that are relevant to a range, and their
 // errors.
 //
-// Weiss and De Floriani 2008, sections 4 and 6. Sigma (interval_volume.h) is made from it. It is also the baseline for
-// comparisons with Sigma, for it can be refined too, computing every side and cut from samples. Where the paper stores
-// a minimum and maximum for each diamond and tests them in each query, this stores the result for one range, one bit a
+// Weiss and De Floriani 2008, sections 4 and 6. Sigma (interval_volume.h) is made from it. Where the paper stores a
+// minimum and maximum for each diamond and tests them in each query, this stores the result for one range, one bit a
 // diamond.
 #pragma once
 
@@ -16,8 +15,7 @@
 #include "common/diamond/supercube.h"
 #include "common/ivm/interval_volume.h"
 #include "common/patch/description.h"
-#include "common/patch/diamond_context.h"
-#include "common/patch/root_patch.h"
+#include "common/patch/range.h"
 #include "server/builder/border_shape.h"
 #include "server/volume/volume.h"
 
@@ -42,12 +40,6 @@ class FieldHierarchy {
   [[nodiscard]] const SupercubeSet& set() const { return set_; }         // the relevant diamonds
   [[nodiscard]] float error(UpdateIndex i) const { return errors_[i]; }  // saturated over relevant children, rounded up to a float
   [[nodiscard]] Side side(Vertex v) const;                               // of any vertex
-  [[nodiscard]] RootPatch root_patch() const;
-
-  // The context of a diamond of a front before its split, and the cuts on its subdivision edges in the order of
-  // Front::split.
-  [[nodiscard]] DiamondContext context(const Diamond& d) const;
-  [[nodiscard]] std::vector<std::uint8_t> cuts(const Diamond& d) const;
 
   // Builds Sigma. The description's name is the volume's. format: one whose values all samples are (round_samples());
   // without it, an exact one, which may fail (choose_value_format() with step 0). is_exact: whether the samples are

@@ -248,7 +248,7 @@ Bytes batch_of_root(const IntervalVolume& v, bool is_plain, Code code) {
   const Diamond root(v.domain().root());
   FrontCursor cursor(front.state());
   cursor.move_to(root);
-  EXPECT_TRUE(cursor.find_unsplit(kSlotOfType[std::size_t(root.type)]));
+  EXPECT_TRUE(cursor.find(kSlotOfType[std::size_t(root.type)]));
   VertexKeys around = cursor.vertex_keys();
   fill_missing(around, root.row->vertices);
   const auto models = std::make_unique<BatchModels>();
