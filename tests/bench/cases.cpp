@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/builder/value_steps.h"
 #include "server/volume/read_volume.h"
 #include "server/volume/samples.h"
 #include "tests/support/split.h"
@@ -43,6 +44,19 @@ bool read_three(const std::string& text, std::array<T, 3>& out) {
   return true;
 }
 
+// Rounds the samples as `intervale build` does, if that has to be.
+Result<Case> case_of(Volume volume) {
+  if (auto finite = check_finite(volume, {}); !finite) return tl::unexpected(finite.error());
+  const auto format = choose_value_format(volume, {});
+  if (!format) return tl::unexpected(format.error());
+  round_samples(volume, *format);
+  Case c;
+  c.name = volume.name;
+  c.volume = std::make_shared<const Volume>(std::move(volume));
+  c.format = *format;
+  return c;
+}
+
 }  // namespace
 
 Result<Case> read_case(std::string_view text) {
@@ -50,8 +64,8 @@ Result<Case> read_case(std::string_view text) {
   const auto parts = testing::split(text, ',');
   const auto low = parts.size() < 3 ? std::nullopt : number(parts[1]), high = parts.size() < 3 ? std::nullopt : number(parts[2]);
   if (!low || !high || *low > *high) return wrong("no range");
-  Case c;
-  c.range = {*low, *high};
+  std::string name;
+  Refine refine = Refine::boundary;
   RawLayout layout;
   std::string source = parts[0];  // what the volume depends on
   bool raw = false;
@@ -59,11 +73,11 @@ Result<Case> read_case(std::string_view text) {
     const std::string& part = parts[i];
     const auto value = part.substr(std::min(part.size(), part.find('=') + 1));
     if (part.starts_with("name=")) {
-      c.name = value;
+      name = value;
       continue;
     }
     if (part == "refine=uniform" || part == "refine=boundary") {
-      c.refine = value == "uniform" ? Refine::uniform : Refine::boundary;
+      refine = value == "uniform" ? Refine::uniform : Refine::boundary;
       continue;
     }
     raw = true;
@@ -80,25 +94,30 @@ Result<Case> read_case(std::string_view text) {
     }
   }
   static std::string last_source;
-  static std::shared_ptr<const Volume> last;
-  if (source != last_source || !last) {
-    auto read = read_volume(parts[0], raw ? std::optional(layout) : std::nullopt);
-    if (!read) return tl::unexpected(read.error());
-    if (auto finite = check_finite(*read, {}); !finite) return tl::unexpected(finite.error());
-    last = std::make_shared<const Volume>(std::move(*read));
+  static Case last;
+  if (source != last_source) {
+    auto volume = read_volume(parts[0], raw ? std::optional(layout) : std::nullopt);
+    if (!volume) return tl::unexpected(volume.error());
+    auto read = case_of(std::move(*volume));
+    if (!read) return read;
+    last = std::move(*read);
     last_source = source;
   }
-  c.volume = last;
-  if (c.name.empty()) c.name = last->name;
+  Case c = last;
+  c.range = {*low, *high};
+  c.refine = refine;
+  if (!name.empty()) c.name = name;
   return c;
 }
 
 Result<Case> sample_case(std::string_view name, int size) {
   auto made = make_sample(name, size);
   if (!made) return tl::unexpected(made.error());
+  auto c = case_of(std::move(*made));
+  if (!c) return c;
   const auto range = kSampleRanges.find(name);
-  return Case{std::string(name), std::make_shared<const Volume>(std::move(*made)), range == kSampleRanges.end() ? Range{0, 1} : range->second,
-              Refine::boundary};
+  c->range = range == kSampleRanges.end() ? Range{0, 1} : range->second;
+  return c;
 }
 
 int run_or_report(const char* program, int (*run)(int argc, char** argv), int argc, char** argv) {
@@ -110,8 +129,8 @@ int run_or_report(const char* program, int (*run)(int argc, char** argv), int ar
   }
 }
 
-std::string range_text(const Case& c) {
-  return fmt::format("[{}, {}]{}", c.range.alpha, c.range.beta, c.refine == Refine::uniform ? ", uniform" : "");
+std::string range_text(const Range& range, Refine refine) {
+  return fmt::format("[{}, {}]{}", range.alpha, range.beta, refine == Refine::uniform ? ", uniform" : "");
 }
 
 }  // namespace intervale::bench

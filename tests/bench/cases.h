@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/patch/description.h"
+#include "common/patch/value_format.h"
 #include "common/util/result.h"
 #include "server/volume/volume.h"
 
@@ -15,7 +16,8 @@ namespace intervale::bench {
 
 struct Case {
   std::string name;
-  std::shared_ptr<const Volume> volume;  // shared by the cases that differ in nothing but range and refine
+  std::shared_ptr<const Volume> volume;  // as a data set represents it; shared by the cases that differ in nothing but range and refine
+  ValueFormat format;                    // of its values: that of `intervale build` without --step
   Range range;
   Refine refine = Refine::boundary;
 };
@@ -41,6 +43,6 @@ T or_throw(Result<T> result) {
 int run_or_report(const char* program, int (*run)(int argc, char** argv), int argc, char** argv);
 
 // "[59.1, 124.1]", with ", uniform" after it where that is so.
-[[nodiscard]] std::string range_text(const Case& c);
+[[nodiscard]] std::string range_text(const Range& range, Refine refine);
 
 }  // namespace intervale::bench

@@ -18,7 +18,6 @@
 #include "server/builder/border_shape.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/interpolation_error.h"
-#include "server/builder/value_steps.h"
 #include "tests/bench/cases.h"
 
 namespace intervale::bench {
@@ -40,12 +39,8 @@ using Steps = std::array<std::ptrdiff_t, kMaxChildren>;
 template <class T>
 class TypedDelta final : public Delta {
  public:
-  TypedDelta(const Volume& volume, std::span<const T> samples)
-      : grid_(volume.grid),
-        domain_(grid_.dims),
-        field_{samples, domain_.last()},
-        format_(or_throw(choose_value_format(volume, 0.0))),
-        corners_(corner_keys(volume, format_)) {
+  TypedDelta(const Volume& volume, std::span<const T> samples, const ValueFormat& format)
+      : grid_(volume.grid), domain_(grid_.dims), field_{samples, domain_.last()}, format_(format), corners_(corner_keys(volume, format_)) {
     const std::ptrdiff_t row = domain_.last().x + 1, slice = row * (domain_.last().y + 1);
     for (unsigned type = 0; type < steps_.size(); ++type) {
       const DiamondType& t = diamond_type(type);
@@ -294,9 +289,10 @@ class TypedDelta final : public Delta {
 
 }  // namespace
 
-std::unique_ptr<Delta> make_delta(const Volume& volume) {
-  return visit_samples(
-      volume, [&]<class T>(std::span<const T> samples) -> std::unique_ptr<Delta> { return std::make_unique<TypedDelta<T>>(volume, samples); });
+std::unique_ptr<Delta> make_delta(const Volume& volume, const ValueFormat& format) {
+  return visit_samples(volume, [&]<class T>(std::span<const T> samples) -> std::unique_ptr<Delta> {
+    return std::make_unique<TypedDelta<T>>(volume, samples, format);
+  });
 }
 
 }  // namespace intervale::bench

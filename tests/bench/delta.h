@@ -39,7 +39,7 @@ class Delta {
 };
 
 // Measures every diamond; on all cores that oneTBB may use. Samples finite; the volume must outlive what comes back.
-// Throws if no keys stand for the samples exactly (choose_value_format()).
-[[nodiscard]] std::unique_ptr<Delta> make_delta(const Volume& volume);
+// format: one whose values all samples are.
+[[nodiscard]] std::unique_ptr<Delta> make_delta(const Volume& volume, const ValueFormat& format);
 
 }  // namespace intervale::bench

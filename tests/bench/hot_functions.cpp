@@ -25,7 +25,7 @@ constexpr int kSize = 97;  // samples a side: large enough that nothing fits a c
 struct Fixture {
   Case c = *sample_case("gyroid", kSize);
   FieldHierarchy hierarchy{*c.volume, {c.range, c.refine, {}}};
-  std::shared_ptr<const IntervalVolume> sigma = std::make_shared<const IntervalVolume>(*hierarchy.compact());
+  std::shared_ptr<const IntervalVolume> sigma = std::make_shared<const IntervalVolume>(*hierarchy.compact(c.format));
   std::vector<Place> places;                        // of all updates, coarse to fine
   std::vector<std::vector<std::uint8_t>> payloads;  // of the whole stream
   SplitSet all{sigma->size()};
@@ -194,7 +194,7 @@ BENCHMARK(measure_field)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void compact_field(benchmark::State& state) {
   const auto& f = fixture();
-  for (auto _ : state) benchmark::DoNotOptimize(f.hierarchy.compact().has_value());
+  for (auto _ : state) benchmark::DoNotOptimize(f.hierarchy.compact(f.c.format).has_value());
   count_items(state, f.c.volume->grid.sample_count());
 }
 BENCHMARK(compact_field)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -96,7 +96,7 @@ Result<void> prepare(const std::string& text, const std::filesystem::path& folde
   const auto c = read_case(text);
   if (!c) return tl::unexpected(c.error());
   const FieldHierarchy hierarchy(*c->volume, {c->range, c->refine, {}});
-  const auto sigma = hierarchy.compact();
+  const auto sigma = hierarchy.compact(c->format);
   if (!sigma) return tl::unexpected(sigma.error());
   if (auto saved = save_ivm(folder / "volume.ivm", *sigma); !saved) return saved;
   const LebTets leaves = leaves_of(hierarchy);
@@ -109,7 +109,7 @@ Result<void> prepare(const std::string& text, const std::filesystem::path& folde
   const Grid& g = c->volume->grid;
   const auto bound = [](double v) { return std::isfinite(v) ? nlohmann::ordered_json(v) : nlohmann::ordered_json(v < 0 ? "-inf" : "inf"); };
   return print_json({{"name", c->name},
-                     {"title", c->name + " " + range_text(*c)},
+                     {"title", c->name + " " + range_text(c->range, c->refine)},
                      {"dims", g.dims},
                      {"spacing", g.spacing},
                      {"range", {bound(c->range.alpha), bound(c->range.beta)}},

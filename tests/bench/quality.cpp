@@ -216,7 +216,7 @@ struct Row {
 
 std::vector<Row> measure(const Case& c) {
   const FieldHierarchy hierarchy(*c.volume, {c.range, c.refine, {}});
-  const auto sigma = std::make_shared<const IntervalVolume>(or_throw(hierarchy.compact()));
+  const auto sigma = std::make_shared<const IntervalVolume>(or_throw(hierarchy.compact(c.format)));
   std::vector<UpdateIndex> all(sigma->size()), by_level;
   std::iota(all.begin(), all.end(), UpdateIndex(0));
   sigma->set().for_each_down([&](const Place& p) { by_level.push_back(p.index); });
@@ -234,7 +234,7 @@ std::vector<Row> measure(const Case& c) {
   for (const Look& look : kLooks) {
     const Lod lod = lod_of(look, sigma->description().grid);
     const Picture picture(surface, *lod.camera);
-    Row row{fmt::format("{} {}", c.name, range_text(c)), look.name, {}, 0, 0};
+    Row row{fmt::format("{} {}", c.name, range_text(c.range, c.refine)), look.name, {}, 0, 0};
     row.curves[0] = follow_plan(sigma, picture, lod);
     const SplitSet wanted = select(*sigma, lod);
     Lod to_the_end = lod;

@@ -15,7 +15,6 @@
 #include "common/util/bits.h"
 #include "server/builder/border_shape.h"
 #include "server/builder/relevance.h"
-#include "server/builder/value_steps.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/timing.h"
 
@@ -28,27 +27,21 @@ struct Field {
   Case c;
   Domain domain;
   std::vector<BorderShapes> shapes;
-  ValueFormat format;
 
   explicit Field(Case of) : c(std::move(of)), domain(c.volume->grid.dims) {
     for (int scale = 0; scale < domain.levels(); ++scale) shapes.emplace_back(domain, scale);
-    // Relevance is found from the samples: they are the values of their keys.
-    auto rounded = std::make_shared<Volume>(*c.volume);
-    format = choose_value_format(*rounded, {}).value();
-    round_samples(*rounded, format);
-    c.volume = std::move(rounded);
   }
   [[nodiscard]] ValueKey key(Vertex v) const {
     const Vertex at = domain.clamp(v);
     const auto& dims = c.volume->grid.dims;
     const std::size_t i = (std::size_t(at.z) * std::size_t(dims[1]) + std::size_t(at.y)) * std::size_t(dims[0]) + std::size_t(at.x);
-    return visit_samples(*c.volume, [&](auto samples) { return format.key(double(samples[i])); });
+    return visit_samples(*c.volume, [&](auto samples) { return c.format.key(double(samples[i])); });
   }
   [[nodiscard]] Front front(const Range& range) const {
     const Diamond root(domain.root());
     std::array<ValueKey, kRootVertices> corners{};
     for (int v = 0; v < kRootVertices; ++v) corners[std::size_t(v)] = key(root.vertex(v));
-    return {c.volume->grid, format, corners, range, c.refine};
+    return {c.volume->grid, c.format, corners, range, c.refine};
   }
   [[nodiscard]] std::vector<SlotGroup> relevant(const std::vector<Range>& ranges) const {
     std::map<SupercubeKey, std::uint64_t> slots;
@@ -124,13 +117,13 @@ void measure(const Field& field, const std::string& held, const std::vector<Slot
   }
   set = median(sets), mesh = median(meshes), again = median(agains), mesh_again = median(meshes_again);
   const double shown = double(front.shown_count()) / 1e5, ms = 1000 / shown;
-  fmt::print("| {} {} | {} | {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} |\n", field.c.name, range_text({"", {}, to, field.c.refine}), held,
+  fmt::print("| {} {} | {} | {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} |\n", field.c.name, range_text(to, field.c.refine), held,
              front.split_count(), front.shown_count(), set * ms, mesh * ms, (set + mesh) * ms, again * ms, mesh_again * ms);
 }
 
 void measure_case(const Case& c) {
   const Field field(c);
-  const double shift = (field.format.greatest() - field.format.least()) / 20;
+  const double shift = (c.format.greatest() - c.format.least()) / 20;
   const Range to{c.range.alpha + shift, std::max(c.range.alpha + shift, c.range.beta)};
   measure(field, "both ranges", field.relevant({c.range, to}), c.range, to);
   measure(field, "whole field", field.all(), c.range, to);

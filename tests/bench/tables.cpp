@@ -60,7 +60,7 @@ struct Row {
 
 Sigma build(const Case& c) {
   const FieldHierarchy hierarchy(*c.volume, {c.range, c.refine, {}});
-  return std::make_shared<const IntervalVolume>(or_throw(hierarchy.compact()));
+  return std::make_shared<const IntervalVolume>(or_throw(hierarchy.compact(c.format)));
 }
 
 struct Extracted {
@@ -149,10 +149,10 @@ Speeds measure_speeds(const Case& c, const Sigma& sigma, int runs) {
 }
 
 Row measure(const Case& c, std::shared_ptr<const Delta>& delta, std::shared_ptr<const Volume>& delta_of, int runs) {
-  const auto tell = [&](const char* what) { fmt::print(stderr, "{} {}: {}\n", c.name, range_text(c), what); };
+  const auto tell = [&](const char* what) { fmt::print(stderr, "{} {}: {}\n", c.name, range_text(c.range, c.refine), what); };
   tell("sizes");
   Row row;
-  row.title = c.name + " " + range_text(c);
+  row.title = c.name + " " + range_text(c.range, c.refine);
   row.paper = paper_sizes(c);
   row.paper_times = paper_times(c);
   const Sigma sigma = build(c);
@@ -165,7 +165,7 @@ Row measure(const Case& c, std::shared_ptr<const Delta>& delta, std::shared_ptr<
   if (delta_of != c.volume) {
     tell("Delta");
     delta.reset();
-    delta = make_delta(*c.volume);
+    delta = make_delta(*c.volume, c.format);
     delta_of = c.volume;
   }
   row.delta_bytes = delta->memory_bytes() + c.volume->bytes.size();
