@@ -134,11 +134,10 @@ void SplitLattice::load_keys(const SetFinder::Found& found, std::uint64_t slots,
 const SplitLattice::Keys& SplitLattice::coarser(int scale, Vertex position, unsigned half) {
   Coarser& here = coarser_[std::size_t(scale)];
   if (&here == &coarser_.back()) return here.keys;  // the corners of the domain
-  const SupercubeKey key = supercube_key(scale, position);
-  if (here.key != key) {
+  if (here.position != position) {
     load_coarser(scale, position, here.keys);
     here.finder.move_to(scale, position);
-    here.key = key;
+    here.position = position;
     here.loaded = 0;
   }
   for (unsigned n = 0; n < 8; ++n) {

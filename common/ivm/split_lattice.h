@@ -73,7 +73,7 @@ class SplitLattice {
   // The lattice of a coarser supercube: points from 0 on. Its neighbours ahead are loaded as they are needed.
   struct Coarser {
     SetFinder finder;
-    SupercubeKey key = ~SupercubeKey(0);
+    Vertex position{-1, -1, -1};
     unsigned loaded = 0;  // neighbours, a bit each
     Keys keys{};
   };
