@@ -1,22 +1,23 @@
-// What the viewer does in a browser, in figures, as a table: node viewer.mjs FILE.ivm BUCKYBALL.ivm [RUNS]
-// FILE: large, for everything but the first mesh. The environment is that of tests/web/support.mjs. Best on an idle
+// What the viewer does in a browser, in figures, as a table: node viewer.mjs FILE.ivm BUCKYBALL.ivm EVERY.ivm [RUNS]
+// FILE: large, for everything but the first mesh. EVERY: the buckyball's field for every range, for changes of the range. The environment is that of tests/web/support.mjs. Best on an idle
 // machine.
 import { copyFileSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { basename, join } from 'node:path';
 
-import { killServers, launch, open, program, progressOf, serve, settled } from '../web/support.mjs';
+import { killServers, launch, open, program, progressOf, serve, set, settled } from '../web/support.mjs';
 
-const [file, small, runs = '5'] = process.argv.slice(2);
+const [file, small, every, runs = '5'] = process.argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), 'intervale-bench-'));
-for (const path of [file, small]) copyFileSync(path, join(folder, basename(path)));
+for (const path of [file, small, every]) copyFileSync(path, join(folder, basename(path)));
 const name = basename(file, '.ivm');
 const smallName = basename(small, '.ivm');
+const everyName = basename(every, '.ivm');
 const server = await serve(folder);
 const median = (values) => values.sort((a, b) => a - b)[Math.floor(values.length / 2)];
 const everything = '-1e6,-1e6,-1e6,1e6,1e6,1e6';
 
-const figures = { speed: [], native: [], block: [], first: [], size: [], memory: [] };
+const figures = { speed: [], native: [], block: [], first: [], size: [], memory: [], range: [] };
 for (let run = 0; run < Number(runs); ++run) {
   const browser = await launch();
   {
@@ -33,6 +34,19 @@ for (let run = 0; run < Number(runs); ++run) {
     await settled(page);
     figures.first.push(await page.evaluate(() => window.intervale.stats.firstMeshMs));
   }
+  {
+    const { page } = await open(browser, `${server.url}#data=${everyName}&range=128,188&roi=${everything}`, { width: 320, height: 240 });
+    for (const range of [[128, 188], [140, 188]]) await set(page, { range }); // from here on the client has both
+    const { updatesInMesh } = await progressOf(page);
+    const ms = await page.evaluate(async (range) => {
+      const start = performance.now();
+      const surface = window.intervale.next('surface');
+      window.intervale.set({ range });
+      await surface;
+      return performance.now() - start;
+    }, [130, 188]);
+    figures.range.push((ms * 1e5) / updatesInMesh);
+  }
   await browser.close();
   const fetched = JSON.parse(program('intervale-client', 'fetch', `ws://${server.address}/${name}`, '--json'));
   figures.native.push(fetched.updates / fetched.seconds_applying);
@@ -47,6 +61,7 @@ const rows = [
   ['longest time that streaming blocked the page', `${median(figures.block).toFixed(1)} ms`],
   ['downloaded before any data, gzipped', `${(median(figures.size) / 1000).toFixed(0)} kB`],
   [`from navigation to the first mesh of ${smallName}`, `${median(figures.first).toFixed(0)} ms`],
+  ['from a change of the range to its boundary surface in the page, for 100,000 updates shown', `${median(figures.range).toFixed(0)} ms`],
   ['memory of the worker\'s core for a million updates', `${(median(figures.memory) / 1e6).toFixed(0)} MB`],
 ];
 console.log(`${name}, headless Chromium, software drawing; medians of ${runs} runs\n\n| figure | |\n|---|---|`);
