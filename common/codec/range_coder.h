@@ -25,7 +25,7 @@ class BitModel {
     } else {
       zero_ = std::uint16_t(zero_ + ((65536 - zero_) * kRates[seen_] >> 16));
     }
-    if (seen_ + 1u < kRates.size()) ++seen_;
+    seen_ = std::uint8_t(seen_ + unsigned(seen_ + 1u < kRates.size()));
   }
 
  private:

@@ -28,41 +28,43 @@ class BatchDecoder {
   }
 
   // The diamonds of one class in a supercube. False if the batch is damaged.
-  bool take(SupercubeKey key, int cls) {
-    cursor_.move_to(key);
-    for (const Slot slot : set_bits<Slot>(kSlotsOfClass[std::size_t(cls)] & ~cursor_.here().split)) {
-      if (cursor_.find(slot) && !take_found(cls)) return false;
-    }
-    return true;
-  }
+  bool take(SupercubeKey key, int cls) { return cls == 0 ? take<0>(key) : cls == 1 ? take<1>(key) : take<2>(key); }
   [[nodiscard]] const char* wrong() const { return wrong_; }  // or null
   [[nodiscard]] bool is_spent() const { return coder_.is_spent(); }
   [[nodiscard]] std::uint64_t updates() const { return updates_; }
 
  private:
-  // Reads the flag of the diamond that the cursor found, and splits it if the flag is set.
-  bool take_found(int cls) {
-    const int vertices = cursor_.context().row->vertices;
-    const VertexKeys& around = keys_around(vertices);
-    const bool is_split = models_.code_flag(coder_, cls, nearness(sides_, refine_, around, vertices));
-    if (coder_.is_overdrawn()) return stop("it has fewer flags than its supercubes call for");
-    if (!is_split) return true;
-    if (updates_ == kBatchUpdatesMost) return stop("it has too many updates");
+  // Reads the flags of the diamonds, and splits those whose flag is set.
+  template <int Class>
+  bool take(SupercubeKey key) {
+    cursor_.move_to(key);
+    const PredictorWeights& weights = description_.weights.of[std::size_t(cursor_.scale())][Class];
     const ValueKey last = description_.format.last;
-    const ValueKey key =
-        models_.code_key(coder_, cls, cursor_.scale(), predict_value(cls, cursor_.scale(), around, description_.weights, last), last);
-    if (coder_.is_overdrawn()) return stop("it has fewer bytes than its updates call for");
-    if (key > last) return stop("a value is out of range");
-    front_.split(cursor_, key, max_tets_);
-    ++updates_;
+    RangeDecoder coder = coder_;  // nothing has its address, so that it stays in registers
+    for (const Slot slot : set_bits<Slot>(cursor_.candidates(kSlotsOfClass[Class]))) {
+      if (!(cursor_.is_interior() ? cursor_.gather_keys(slot) : cursor_.find(slot))) continue;
+      const KeySpan span = cursor_.key_span();
+      const bool is_split = models_.code_flag(coder, Class, nearness(sides_, refine_, span));
+      if (coder.is_overdrawn()) return stop("it has fewer flags than its supercubes call for");
+      if (!is_split) continue;
+      if (updates_ == kBatchUpdatesMost) return stop("it has too many updates");
+      const ValueKey value = models_.code_key(coder, Class, cursor_.scale(), predict_value<Class>(keys_around<Class>(), span, weights, last), last);
+      if (coder.is_overdrawn()) return stop("it has fewer bytes than its updates call for");
+      if (value > last) return stop("a value is out of range");
+      front_.split(cursor_, value, max_tets_);
+      ++updates_;
+    }
+    coder_ = coder;
     return true;
   }
-  // The keys at the vertices of the diamond that the cursor found, none missing.
-  const VertexKeys& keys_around(int vertices) {
+  // The keys at the vertices of the diamond that the cursor found, none missing. Those that fill_missing() sets lie
+  // within the span of the others.
+  template <int Class>
+  const VertexKeys& keys_around() {
     const VertexKeys& keys = cursor_.vertex_keys();
     if (cursor_.is_interior()) return keys;
     around_ = keys;
-    fill_missing(around_, vertices);
+    fill_missing(around_, int(kVerticesOfClass[Class]));
     return around_;
   }
   bool stop(const char* why) {

@@ -55,9 +55,9 @@ void Front::split(FrontCursor& at, ValueKey key, std::uint64_t max_tets) {
   assert(key <= values.format.last && "the caller checked it");
   Block& block = at.obtain_here(state_);
   const Side side = values.sides.side(key);
-  const bool is_counting = counts(at.context_with_sides(), side, values.refine), was_complete = values.is_complete();
+  const bool is_counting = counts(values.sides, at.key_span(), side, values.refine), was_complete = values.is_complete();
   block.key.set(at.slot(), key, values.format.last);
-  widen_bounds(at, block);
+  widen_bounds(at.key_span(), key, block);
   block.set_side(at.slot(), side);
   block.split |= bit(at.slot());
   ++state_.split_count;
@@ -69,6 +69,7 @@ void Front::split(FrontCursor& at, ValueKey key, std::uint64_t max_tets) {
   // anyway.
   const bool has_shown_child = !at.is_interior() && at.has_shown_child();
   if (!is_counting && !has_shown_child) return;
+  at.context_with_sides();
   const bool is_shown = (was_complete || !is_counting) && ShownSplits(state_).show(at, max_tets);
   if (!is_shown && !is_counting) values.is_limited = true;
 }

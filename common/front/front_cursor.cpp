@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <bit>
 
+#include "common/diamond/parent_table.h"
+#include "common/util/bits.h"
+
 namespace intervale {
 
 template <class State>
@@ -79,6 +82,7 @@ bool FrontCursor::load_keys() {
   const Links& links = this->links();
   const int vertices = context_.row->vertices;
   const std::uint32_t exist = parts_.vertices;
+  KeySpan span{kNoKey, 0};
   for (int v = 0; v < vertices; ++v) {
     if (!(exist >> v & 1)) {
       keys_[std::size_t(v)] = kNoKey;
@@ -86,8 +90,11 @@ bool FrontCursor::load_keys() {
     }
     const Neighbour vertex = at(links.vertex[std::size_t(v)]);
     if (!vertex.is_split()) return false;
-    keys_[std::size_t(v)] = vertex.block.key[std::size_t(vertex.slot)];
+    const ValueKey key = vertex.block.key[std::size_t(vertex.slot)];
+    keys_[std::size_t(v)] = key;
+    span.add(key);
   }
+  key_span_ = span;
   has_keys_ = true;
   return true;
 }
@@ -112,6 +119,18 @@ bool FrontCursor::parents_are_split(Slot slot) {
     if (at(links.vertex[links.parent[std::size_t(k)]]).is_split() != is_interior_) return !is_interior_;
   }
   return is_interior_ || scale() == state_.domain.levels() - 1;
+}
+
+std::uint64_t FrontCursor::candidates(std::uint64_t slots) {
+  slots &= ~here().split;
+  if (!is_interior_ || slots == 0) return slots;
+  for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[0])) {
+    if (!parents_are_split(slot)) slots &= ~(std::uint64_t(1) << slot);
+  }
+  if ((slots & ~kSlotsOfClass[0]) == 0) return slots;
+  ParentTable::Words split;
+  for (std::size_t k = 0; k < split.size(); ++k) split[k] = neighbours_.at(ParentTable::kNeighbours[k])->split;
+  return slots & ~parent_table().lacking(split);
 }
 
 bool FrontCursor::parents_are_shown() {

@@ -56,6 +56,9 @@ class FrontCursor {
   bool gather_keys(Slot slot);
   // The same, if it can be split now.
   bool find(Slot slot) { return parents_are_split(slot) && gather_keys(slot) && !is_split() && !is_noop(); }
+  // Of these slots those whose diamonds can be split now: exactly those if the supercube is interior, otherwise some
+  // more.
+  [[nodiscard]] std::uint64_t candidates(std::uint64_t slots);
 
   [[nodiscard]] Diamond diamond() const {
     const unsigned type = kTypeOfSlot[std::size_t(slot_)];
@@ -68,6 +71,11 @@ class FrontCursor {
   [[nodiscard]] const VertexKeys& vertex_keys() {
     if (!has_keys_) load_keys();
     return keys_;
+  }
+  // The least and the greatest of those at vertices that exist
+  [[nodiscard]] const KeySpan& key_span() {
+    if (!has_keys_) load_keys();
+    return key_span_;
   }
   [[nodiscard]] ValueKey centre_key() { return here().key[std::size_t(slot_)]; }
   // After gather_keys() and find() its sides may be those of another diamond
@@ -130,6 +138,7 @@ class FrontCursor {
   DiamondContext context_;
   bool has_keys_ = false, has_sides_ = false;
   VertexKeys keys_{};
+  KeySpan key_span_;
 };
 
 }  // namespace intervale

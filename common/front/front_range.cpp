@@ -255,7 +255,7 @@ std::optional<Vertex> Front::split_all(std::span<const SlotGroup> groups, const 
     for (std::size_t i = piece * kPiece; i < std::min(groups.size(), (piece + 1) * kPiece); ++i) {
       cursor.move_to(groups[i].key);
       for (const Slot slot : set_bits<Slot>(groups[i].slots)) {
-        if (cursor.gather_sides(slot)) widen_bounds(cursor, *blocks[i]);
+        if (cursor.gather_keys(slot)) widen_bounds(cursor.key_span(), cursor.centre_key(), *blocks[i]);
       }
     }
   });

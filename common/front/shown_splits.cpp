@@ -16,6 +16,11 @@ constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
 
 }  // namespace
 
+bool counts(const KeySides& sides, const KeySpan& around, Side centre, Refine refine) {
+  const Side low = sides.side(around.least);
+  return low != sides.side(around.greatest) || centre != low || (refine == Refine::uniform && low == Side::inside);
+}
+
 bool counts(const DiamondContext& context, Side centre, Refine refine) {
   if (context.is_mixed()) return true;
   const Side all = context.sides == 0 ? Side::below : context.sides == context.pairs() ? Side::inside : Side::above;
@@ -35,18 +40,9 @@ void derive_cuts(const FrontValues& values, FrontCursor& at, Slot slot, std::uin
   }
 }
 
-void widen_bounds(FrontCursor& at, Block& block) {
-  const ValueKey centre = block.key[std::size_t(at.slot())];
-  const VertexKeys& keys = at.vertex_keys();
-  ValueKey least = std::min(block.least, centre), greatest = std::max(block.greatest, centre);
-  const int vertices = at.context().row->vertices;
-  for (int v = 0; v < vertices; ++v) {
-    const ValueKey key = keys[std::size_t(v)];
-    least = std::min(least, key);  // kNoKey is the greatest key
-    greatest = std::max(greatest, key == kNoKey ? 0 : key);
-  }
-  block.least = least;
-  block.greatest = greatest;
+void widen_bounds(const KeySpan& around, ValueKey centre, Block& block) {
+  block.least = std::min({block.least, around.least, centre});
+  block.greatest = std::max({block.greatest, around.greatest, centre});
 }
 
 // Adds the parents by place that are split and shown, or hidden.

@@ -15,14 +15,16 @@ namespace intervale {
 
 // Whether a diamond counts for a range. context: of the diamond, with its sides; centre: the side of its centre.
 [[nodiscard]] bool counts(const DiamondContext& context, Side centre, Refine refine);
+// The same, from the span of the keys at its vertices.
+[[nodiscard]] bool counts(const KeySides& sides, const KeySpan& around, Side centre, Refine refine);
 
 // Sets q of each cut on the subdivision edges of a split diamond, or of a corner of the domain, in order of the bits of
 // its split, as many as there are. It is in the cursor's supercube.
 using CutPlaces = std::array<std::uint8_t, kMaxCuts>;
 void derive_cuts(const FrontValues& values, FrontCursor& at, Slot slot, std::uint32_t cut_bits, CutPlaces& q);
 
-// Widens the bounds of a supercube's keys by those of the diamond that the cursor found last, which has its key.
-void widen_bounds(FrontCursor& at, FrontState::Block& block);
+// Widens the bounds of a supercube's keys by those of one of its diamonds. around: of the keys at its vertices.
+void widen_bounds(const KeySpan& around, ValueKey centre, FrontState::Block& block);
 
 class ShownSplits {
  public:

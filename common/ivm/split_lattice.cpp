@@ -33,29 +33,7 @@ SplitLattice::Tables SplitLattice::make_tables() {
       t.ahead[n] |= std::uint64_t(ahead) << slot;
     }
   }
-  fill_lacking(t);
   return t;
-}
-
-void SplitLattice::fill_lacking(Tables& t) {
-  std::array<std::array<std::uint64_t, 32>, kParentPlaces> children{};  // by place and slot of the parent
-  for (Slot slot{8}; slot < kSlots; ++slot) {
-    const unsigned type = kTypeOfSlot[slot];
-    for (std::size_t k = 0; k < diamond_type(type).parents; ++k) {
-      const Offset to = diamond_type(type).parent[k];
-      const std::array<int, 3> at{int(type & 3) + to.x, int(type >> 2 & 3) + to.y, int(type >> 4 & 3) + to.z};
-      const std::size_t place = at[0] < 0 ? 1 : at[1] < 0 ? 2 : at[2] < 0 ? 3 : 0;
-      const Slot parent = kSlotOfType[unsigned(at[0] & 3) | unsigned(at[1] & 3) << 2 | unsigned(at[2] & 3) << 4];
-      children[place][parent] |= std::uint64_t(1) << slot;
-    }
-  }
-  for (std::size_t place = 0; place < kParentPlaces; ++place) {
-    for (unsigned parent = 0; parent < 32; ++parent) {
-      for (unsigned unsplit = 0; unsplit < 256; ++unsplit) {
-        if ((unsplit >> parent % 8 & 1) != 0) t.lacking[place][parent / 8][unsplit] |= children[place][parent];
-      }
-    }
-  }
 }
 
 const SplitLattice::Tables& SplitLattice::tables() {
@@ -152,7 +130,7 @@ void SplitLattice::move_to(SupercubeKey key) {
   is_interior_ = is_interior(volume_.domain(), place_.scale, place_.position);
   load_coarser(place_.scale, place_.position, keys_);
   finder_.move_to(place_.scale, place_.position);
-  for (std::size_t k = 0; k < kParentPlaces; ++k) parents_[k] = load_neighbour(finder_, place_, kParentNeighbour[k], -1, keys_);
+  for (std::size_t k = 0; k < ParentTable::kPlaces; ++k) parents_[k] = load_neighbour(finder_, place_, kParentNeighbour[k], -1, keys_);
 }
 
 std::uint64_t SplitLattice::splittable(std::uint64_t slots) {
@@ -164,10 +142,7 @@ std::uint64_t SplitLattice::splittable(std::uint64_t slots) {
 }
 
 std::uint64_t SplitLattice::splittable_inside(std::uint64_t slots) const {
-  std::uint64_t lacking = 0;
-  for (std::size_t place = 0; place < kParentPlaces; ++place) {
-    for (unsigned byte = 0; byte < 4; ++byte) lacking |= tables_.lacking[place][byte][~parents_[place] >> (8 * byte) & 255];
-  }
+  std::uint64_t lacking = parent_table().lacking(parents_);
   const auto unsplit = [this](Point p) { return unsigned(keys_[p] == kNoKey); };
   for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[0])) {
     const auto& parent = tables_.parent[slot];

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/codec/value_prediction.h"
+#include "common/diamond/parent_table.h"
 #include "common/diamond/split_set.h"
 #include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/interval_volume.h"
@@ -49,9 +50,8 @@ class SplitLattice {
   static constexpr int kSide = 6;  // points on an axis, from -1 to 4
   static constexpr std::int32_t point_of(int x, int y, int z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
   using Point = std::uint8_t;
-  // Where parents of classes 0 and 1 are: in the supercube itself, or in the one behind it along an axis.
-  static constexpr std::size_t kParentPlaces = 4;
-  static constexpr std::array<unsigned, kParentPlaces> kParentNeighbour{0, 1, 2, 4};
+  // The places of a ParentTable, as neighbours.
+  static constexpr std::array<unsigned, ParentTable::kPlaces> kParentNeighbour{0, 1, 2, 4};
   using Keys = std::array<ValueKey, kSide * kSide * kSide>;  // kNoKey where no split diamond has its centre
   // By slot: the point of the centre, those of the vertices and those of the parents; unused ones repeat the first. By
   // neighbour, a bit for each axis: its slots that lie in a lattice, if it lies behind the supercube and if ahead.
@@ -62,12 +62,8 @@ class SplitLattice {
     std::array<std::array<std::uint8_t, kMaxParents>, kSlots> parent_vertex{};  // its local number
     std::array<std::uint64_t, 8> behind{}, ahead{};
     std::array<std::uint64_t, 8> users{};  // by neighbour behind: slots of diamonds with a vertex in it
-    // Slots of diamonds of classes 1 and 2 that lack a parent, by where the parent is, and by eight slots at a time
-    // that are not split.
-    std::array<std::array<std::array<std::uint64_t, 256>, 4>, kParentPlaces> lacking{};
   };
   [[nodiscard]] static Tables make_tables();
-  static void fill_lacking(Tables& tables);
   [[nodiscard]] static const Tables& tables();
 
   // The lattice of a coarser supercube: points from 0 on. Its neighbours ahead are loaded as they are needed.
@@ -93,8 +89,8 @@ class SplitLattice {
   SetFinder finder_;
   SupercubePlace place_;  // of the supercube
   bool is_interior_ = false;
-  std::array<std::uint64_t, kParentPlaces> parents_{};  // split slots of classes 0 and 1
-  std::array<std::uint32_t, kSlots> exist_{};           // at the border, by slot: the vertices that exist, a bit each
+  ParentTable::Words parents_{};               // split slots of classes 0 and 1
+  std::array<std::uint32_t, kSlots> exist_{};  // at the border, by slot: the vertices that exist, a bit each
   Keys keys_{};
 };
 
