@@ -120,7 +120,7 @@ std::vector<std::uint8_t> BoundarySurface::find_changes() {
     if (changed == 0 && i < before) continue;
     dirty[i] = 1;
     parts_[i].shown = shown;
-    mark_parents(i, changed, dirty);
+    if (before != 0) mark_parents(i, changed, dirty);  // otherwise all are to be made
     points_.clear();
     mesher_.append_points(i, points_);
     for (const FrontMesher::Point& p : points_) {
@@ -150,6 +150,15 @@ int BoundarySurface::kind_of(const std::array<PointId, 3>& points, bool at_borde
     if (at == far[axis]) return kBox + 2 * axis + 1;
   }
   return kNone;
+}
+
+bool BoundarySurface::has_face_on_surface(const Tet& tet) const {
+  int alpha = 0, beta = 0;
+  for (const PointId point : tet) {
+    alpha += int(surface_[point] == Surface::alpha);
+    beta += int(surface_[point] == Surface::beta);
+  }
+  return alpha >= 3 || beta >= 3;
 }
 
 void BoundarySurface::add_normals(const std::vector<Triangle>& triangles, int sign) {
@@ -205,6 +214,7 @@ void BoundarySurface::find_triangles(std::size_t number, std::vector<Triangle>& 
   const auto lod = std::uint8_t(mesher_.block(number).scale);
   triangles.clear();
   for (const Tet& tet : tets_) {
+    if (!at_border && !has_face_on_surface(tet)) continue;
     for (const auto& face : kTetFaces) {
       const std::array<PointId, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
       const int kind = kind_of(points, at_border);

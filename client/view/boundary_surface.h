@@ -88,6 +88,7 @@ class BoundarySurface {
   void cut_tets(std::size_t number, Part& part);
   void find_triangles(std::size_t number, std::vector<Triangle>& triangles) const;
   [[nodiscard]] int kind_of(const std::array<PointId, 3>& points, bool at_border) const;
+  [[nodiscard]] bool has_face_on_surface(const FrontMesher::Tet& tet) const;
   void add_normals(const std::vector<Triangle>& triangles, int sign);
   [[nodiscard]] bool is_empty(std::uint32_t piece) const;
   [[nodiscard]] double volume_of(const FrontMesher::Tet& tet) const;
@@ -106,7 +107,7 @@ class BoundarySurface {
   std::uint64_t triangles_ = 0;
   // Room to work in.
   std::vector<FrontMesher::Point> points_;
-  std::vector<FrontMesher::Tet> tets_;
+  FrontMesher::Tets tets_;
   std::vector<FrontMesher::Half> halves_;
 };
 

@@ -21,7 +21,7 @@ class Cutter {
   }
 
   std::vector<SectionVertex> run() {
-    std::vector<Tet> tets;
+    FrontMesher::Tets tets;
     for (std::size_t number = 0; number < surface_.mesher().state().blocks.size(); ++number) {
       const FrontState::Block& block = surface_.mesher().block(number);
       if (!may_meet(block)) continue;

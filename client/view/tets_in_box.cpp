@@ -11,7 +11,7 @@ TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint6
     high[i] = (box.max[i] - grid.origin[i]) / grid.spacing[i];
   }
   TetsInBox found;
-  std::vector<FrontMesher::Tet> tets;
+  FrontMesher::Tets tets;
   for (std::size_t number = 0; number < front.blocks.size(); ++number) {
     const int scale = front.blocks[number].scale;
     const Vertex p = front.blocks[number].position;

@@ -41,7 +41,7 @@ class BatchDecoder {
     const PredictorWeights& weights = description_.weights.of[std::size_t(cursor_.scale())][Class];
     const ValueKey last = description_.format.last;
     RangeDecoder coder = coder_;  // nothing has its address, so that it stays in registers
-    for (const Slot slot : set_bits<Slot>(cursor_.candidates(kSlotsOfClass[Class]))) {
+    for (const Slot slot : set_bits<Slot>(cursor_.may_be_splittable(kSlotsOfClass[Class] & ~cursor_.here().split))) {
       if (!(cursor_.is_interior() ? cursor_.gather_keys(slot) : cursor_.find(slot))) continue;
       const KeySpan span = cursor_.key_span();
       const bool is_split = models_.code_flag(coder, Class, nearness(sides_, refine_, span));

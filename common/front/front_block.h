@@ -42,6 +42,7 @@ struct FrontSplit {
   }
   // Which of the two surfaces cut the edge to local vertex v: bit 0 alpha, bit 1 beta.
   [[nodiscard]] unsigned cuts_to(int v) const { return bits >> (2 * v) & 3; }
+  [[nodiscard]] int cut_count(int v) const { return std::popcount(cuts_to(v)); }
 };
 
 // Splits by slot, in seven bytes each.

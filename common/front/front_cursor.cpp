@@ -121,8 +121,7 @@ bool FrontCursor::parents_are_split(Slot slot) {
   return is_interior_ || scale() == state_.domain.levels() - 1;
 }
 
-std::uint64_t FrontCursor::candidates(std::uint64_t slots) {
-  slots &= ~here().split;
+std::uint64_t FrontCursor::may_be_splittable(std::uint64_t slots) {
   if (!is_interior_ || slots == 0) return slots;
   for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[0])) {
     if (!parents_are_split(slot)) slots &= ~(std::uint64_t(1) << slot);

@@ -56,9 +56,6 @@ class FrontCursor {
   bool gather_keys(Slot slot);
   // The same, if it can be split now.
   bool find(Slot slot) { return parents_are_split(slot) && gather_keys(slot) && !is_split() && !is_noop(); }
-  // Of these slots those whose diamonds can be split now: exactly those if the supercube is interior, otherwise some
-  // more.
-  [[nodiscard]] std::uint64_t candidates(std::uint64_t slots);
 
   [[nodiscard]] Diamond diamond() const {
     const unsigned type = kTypeOfSlot[std::size_t(slot_)];
@@ -88,6 +85,8 @@ class FrontCursor {
   // Whether a split of it is possible, or was: all parents that exist are split, and it would change something. The
   // diamond is found if not all its supercube is inside the box.
   [[nodiscard]] bool is_splittable(Slot slot) { return parents_are_split(slot) && (is_interior_ || (gather_sides(slot) && !is_noop())); }
+  // Of these slots those that is_splittable() is true of, if the supercube is interior; otherwise all.
+  [[nodiscard]] std::uint64_t may_be_splittable(std::uint64_t slots);
   [[nodiscard]] bool parents_are_shown();
   // Whether the diamond handed tetrahedra to a child that is split.
   [[nodiscard]] bool has_split_child();

@@ -25,7 +25,7 @@ class FrontMesh {
         parallel_(parallel),
         shown_(numbers_of_shown(state)),
         pieces_((shown_.size() + kPiece - 1) / kPiece),
-        used_(state.points),
+        used_(state.points, std::uint8_t(0)),
         number_(state.points) {}
 
   Mesh make() {
@@ -96,7 +96,7 @@ class FrontMesh {
 
   // Marks the points of the border that tetrahedra use; of those at one place, the first stands for all.
   void use_border() {
-    std::vector<Tet> tets;
+    FrontMesher::Tets tets;
     std::vector<FrontMesher::Point> points;
     for (const std::size_t number : shown_) {
       if (!mesher_.is_at_border(number)) continue;
@@ -134,7 +134,7 @@ class FrontMesh {
     std::vector<FrontMesher::Point> points;
     for_each_supercube(piece, [&](std::size_t number) {
       points.clear();
-      mesher_.append_points(number, points);
+      mesher_.append_points(number, points, used_);
       for (const FrontMesher::Point& p : points) {
         if (!used_[p.id]) continue;
         const std::uint32_t n = number_[p.id];
@@ -159,7 +159,7 @@ class FrontMesh {
 
   // A few pieces at a time: their tetrahedra are copied to their place while they are still in a cache.
   void place_tets(Mesh& mesh) const {
-    std::array<std::vector<Tet>, kPiecesAtOnce> tets;
+    std::array<FrontMesher::Tets, kPiecesAtOnce> tets;
     std::array<std::size_t, kPiecesAtOnce + 1> place{};
     for (std::size_t first = 0; first < pieces_; first += kPiecesAtOnce) {
       const std::size_t some = std::min(pieces_ - first, kPiecesAtOnce);
@@ -179,8 +179,8 @@ class FrontMesh {
   const ParallelFor& parallel_;
   std::vector<std::size_t> shown_;
   std::size_t pieces_;
-  std::vector<std::uint8_t> used_;                 // by PointId: 1 for those of the mesh
-  std::vector<std::uint32_t> number_;              // in the mesh, by PointId
+  MeshArray<std::uint8_t> used_;                   // by PointId: 1 for those of the mesh
+  MeshArray<std::uint32_t> number_;                // in the mesh, by PointId
   std::vector<std::pair<PointId, PointId>> same_;  // points that are the same as an earlier one
 };
 

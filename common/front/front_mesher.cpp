@@ -61,35 +61,48 @@ bool FrontMesher::is_at_border(std::size_t number) const {
   return is_on_border({(p.x + 1) * reach, (p.y + 1) * reach, (p.z + 1) * reach});
 }
 
-void FrontMesher::append_points(std::size_t number, std::vector<Point>& points) const {
+void FrontMesher::append_points(std::size_t number, std::vector<Point>& points, std::span<const std::uint8_t> wanted) const {
   // The domain's corner (0, 0, 0), the oldest vertex, owns no edge.
   if (const FrontState::Split origin = state_.origin.split_at(Slot()); number == 0 && origin.side() == Side::inside) {
     points.push_back({origin.centre(), {}, Surface::inside, false});
   }
   const FrontState::Block& block = state_.blocks[number];
-  const bool at_border = is_at_border(number);
   FrontCursor cursor(state_);
   cursor.move_to(block.scale, block.position);
-  CutPlaces cuts{};
   for (const Slot slot : set_bits<Slot>(block.shown & block.placed.slots())) {
-    const Diamond d(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]);
-    const FrontState::Split split = block.placed[slot];
-    derive_cuts(state_.values, cursor, slot, split.cut_bits(), cuts);
-    const std::uint8_t* q = cuts.data();
-    const Vertex c = at_border ? state_.domain.clamp(d.centre) : d.centre;
-    const bool on_border = at_border && is_on_border(d.centre);
-    PointId id = split.first;
-    for (const int bit : set_bits(split.cut_bits())) {
-      const Vertex end = d.vertex(bit / 2), v = at_border ? state_.domain.clamp(end) : end;
-      const std::int32_t t = 2 * *q++ + 1;
-      points.push_back({id,
-                        {c.x * kSteps + (v.x - c.x) * t, c.y * kSteps + (v.y - c.y) * t, c.z * kSteps + (v.z - c.z) * t},
-                        (bit & 1) == 0 ? Surface::alpha : Surface::beta,
-                        on_border || (at_border && is_on_border(end))});
-      ++id;
-    }
-    if (split.side() == Side::inside) points.push_back({id, {c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, on_border});
+    append_cuts(cursor, Diamond(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]), points, wanted);
   }
+}
+
+// The points of one split in the cursor's supercube.
+void FrontMesher::append_cuts(FrontCursor& cursor, const Diamond& d, std::vector<Point>& points, std::span<const std::uint8_t> wanted) const {
+  const FrontValues& values = state_.values;
+  const Slot slot = kSlotOfType[d.type];
+  const FrontState::Split split = cursor.here().placed[slot];
+  const Links& links = cursor.links(slot);
+  const bool may_clamp = !cursor.is_interior();
+  const bool on_border = may_clamp && is_on_border(d.centre);
+  const Vertex c = may_clamp ? state_.domain.clamp(d.centre) : d.centre;
+  const double centre = values.format.value(cursor.here().key[slot]);
+  PointId id = split.first;
+  for (std::uint32_t bits = split.cut_bits(); bits != 0;) {
+    const int v = std::countr_zero(bits) / 2;
+    const PointId first = id;
+    const Surface surface = (bits >> (2 * v) & 1) != 0 ? Surface::alpha : Surface::beta;
+    id += PointId(split.cut_count(v));
+    bits &= ~(3u << (2 * v));
+    if (!wanted.empty() && wanted[first] == 0 && wanted[id - 1] == 0) continue;
+    const FrontCursor::Neighbour vertex = cursor.at(links.vertex[v]);
+    const Cuts cuts = cuts_between(centre, values.format.value(vertex.block.key[vertex.slot]), values.range);
+    const Vertex end = d.vertex(v), e = may_clamp ? state_.domain.clamp(end) : end;
+    const bool ends_on_border = on_border || (may_clamp && is_on_border(end));
+    for (int i = 0; i < cuts.count; ++i) {
+      const std::int32_t t = 2 * cuts.q[i] + 1;
+      const Position at{c.x * kSteps + (e.x - c.x) * t, c.y * kSteps + (e.y - c.y) * t, c.z * kSteps + (e.z - c.z) * t};
+      points.push_back({first + PointId(i), at, i == 0 ? surface : Surface::beta, ends_on_border});
+    }
+  }
+  if (split.side() == Side::inside) points.push_back({id, {c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, on_border});
 }
 
 void FrontMesher::append_runs(std::size_t number, std::vector<Run>& runs) const {
@@ -108,18 +121,26 @@ void FrontMesher::append_removed_runs(std::size_t number, std::vector<Run>& runs
     const Links& links = cursor.links(slot);
     const Links::Edge spine = links.edge[0];
     const FrontState::Split owner = cursor.at(links.vertex[spine.owner]).split();
-    runs.push_back({owner.cut(2 * spine.other), std::uint32_t(std::popcount(owner.cuts_to(spine.other)))});
+    runs.push_back({owner.cut(2 * spine.other), std::uint32_t(owner.cut_count(spine.other))});
   }
 }
 
-// The patch of one tetrahedron. Inline: it is the innermost loop of making a mesh.
-inline void FrontMesher::append_patch(std::vector<Tet>& tets, const TetShape& shape, const Corners& corners, std::uint32_t sides,
-                                      const PointsAround& points) const {
+// Sets the patch of one tetrahedron; returns its end. Inline: it is the innermost loop of making a mesh.
+inline FrontMesher::Tet* FrontMesher::place_patch(Tet* to, const TetShape& shape, const Corners& corners, std::uint32_t sides,
+                                                  const PointsAround& points) const {
   const auto patch = cases_.tets(shape.order, shape_sides(shape, sides));
   const int second = shape.flip ? 3 : 2, third = shape.flip ? 2 : 3;
   for (const auto& tet : patch) {
-    tets.push_back({points[corners[tet[0]]], points[corners[tet[1]]], points[corners[tet[second]]], points[corners[tet[third]]]});
+    *to++ = {points[corners[tet[0]]], points[corners[tet[1]]], points[corners[tet[second]]], points[corners[tet[third]]]};
   }
+  return to;
+}
+
+// Lengthens tets by as many as the patches of one diamond may have; returns the first.
+FrontMesher::Tet* FrontMesher::make_room(Tets& tets) const {
+  const std::size_t before = tets.size();
+  tets.resize(before + std::size_t(2 * kMaxTets) * cases_.most());
+  return tets.data() + before;
 }
 
 // A bit for each child whose split is not shown.
@@ -159,13 +180,15 @@ void FrontMesher::append_root(const Output<Numbers>& out) const {
   if (!cursor.gather_sides(kSlotOfType[root.type]) || cursor.is_shown()) return;
   PointsAround points;
   gather_points(cursor, out.numbers, points);
+  Tet* to = make_room(out.tets);
   for (const int t : set_bits(cursor.parts().tets)) {
     const TetShape shape = tet_shape(state_.domain, root, cursor.parts(), t);
-    append_patch(out.tets, shape, corners_of(shape), cursor.context().sides, points);
+    to = place_patch(to, shape, corners_of(shape), cursor.context().sides, points);
     if (out.halves != nullptr) {
-      out.halves->push_back({state_.domain.positions(root, root.row->tet(t)), cursor.context().is_mixed(), out.tets.size()});
+      out.halves->push_back({cursor.context().is_mixed(), state_.domain.positions(root, root.row->tet(t)), std::size_t(to - out.tets.data())});
     }
   }
+  out.tets.resize(std::size_t(to - out.tets.data()));
 }
 
 template <class Numbers>
@@ -208,44 +231,51 @@ void FrontMesher::append_children(const Output<Numbers>& out, FrontCursor& curso
   if (split.side() == Side::inside) points[kCentre] = out.numbers[id];
   const auto& corners = half_corners_[cursor.slot()];
   const Ring ring(sides, d.row->belt);
+  Tet* to = make_room(out.tets);
   for (const int k : set_bits(children)) {
-    const bool child_can_change = out.halves != nullptr && d.has_children() && can_change(d.child(k));
+    const bool child_can_change = out.halves != nullptr && d.has_children() && can_change(*out.at_child, d.child(k));
     for (const Duet::Half& half : d.row->child[k].half) {
       if (!(parts.tets >> half.tet & 1)) continue;
       const bool has_patch = cases_.count(ring.half(half.tet, half.end)) != 0;
-      if (!has_patch && out.halves == nullptr) continue;
+      if (!has_patch && !child_can_change) continue;
       if (parts.straddles && !half_exists(state_.domain, d, half.tet, half.end)) continue;
       if (has_patch && !parts.straddles) {
-        append_patch(out.tets, d.row->half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points);
+        to = place_patch(to, d.row->half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points);
       } else if (has_patch) {
         const TetShape shape = half_shape(state_.domain, d, parts, half.tet, half.end);
-        append_patch(out.tets, shape, corners_of(shape), sides, points);
+        to = place_patch(to, shape, corners_of(shape), sides, points);
       }
       if (out.halves == nullptr) continue;
+      out.halves->push_back({child_can_change, {}, std::size_t(to - out.tets.data())});
+      if (!child_can_change) continue;
       auto local = d.row->tet(half.tet);
       local[1 - half.end] = kCentre;
-      out.halves->push_back({state_.domain.positions(d, local), child_can_change, out.tets.size()});
+      out.halves->back().corners = state_.domain.positions(d, local);
     }
   }
+  out.tets.resize(std::size_t(to - out.tets.data()));
 }
 
-bool FrontMesher::can_change(Vertex centre) const {
+bool FrontMesher::can_change(FrontCursor& cursor, Vertex centre) {
   const Diamond d(centre);
-  FrontCursor cursor(state_);
-  cursor.move_to(d);
+  const int up = d.scale + 2;
+  const Vertex position{centre.x >> up, centre.y >> up, centre.z >> up};
+  if (cursor.scale() != d.scale || cursor.position() != position) cursor.move_to(d.scale, position);
   return cursor.gather_sides(kSlotOfType[d.type]) && !cursor.is_noop() && cursor.context().is_mixed();
 }
 
-void FrontMesher::append_tets(std::size_t number, std::vector<Tet>& tets, std::span<const std::uint32_t> numbers) const {
+void FrontMesher::append_tets(std::size_t number, Tets& tets, std::span<const std::uint32_t> numbers) const {
   if (numbers.empty()) {
-    append(Output<OwnIds>{tets, nullptr, {}}, number);
+    append(Output<OwnIds>{tets, nullptr, nullptr, {}}, number);
   } else {
-    append(Output<std::span<const std::uint32_t>>{tets, nullptr, numbers}, number);
+    append(Output<std::span<const std::uint32_t>>{tets, nullptr, nullptr, numbers}, number);
   }
 }
 
-void FrontMesher::append_halves(std::size_t number, std::vector<Tet>& tets, std::vector<Half>& halves) const {
-  append(Output<OwnIds>{tets, &halves, {}}, number);
+void FrontMesher::append_halves(std::size_t number, Tets& tets, std::vector<Half>& halves) const {
+  FrontCursor at_child(state_);
+  at_child.move_to(block(number).scale, block(number).position);
+  append(Output<OwnIds>{tets, &halves, &at_child, {}}, number);
 }
 
 }  // namespace intervale

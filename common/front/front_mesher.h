@@ -25,6 +25,7 @@ class FrontMesher {
   explicit FrontMesher(const FrontState& state) : state_(state) {}
 
   using Tet = std::array<PointId, 4>;  // positively oriented
+  using Tets = MeshArray<Tet>;
   // In 1 / kSteps of a sample: every cut of every edge is a whole number there
   using Position = std::array<std::int32_t, 3>;
   static constexpr std::int32_t kSteps = 512;
@@ -40,8 +41,8 @@ class FrontMesher {
   };
   // Half of a tetrahedron that a split left.
   struct Half {
-    std::array<Vertex, 4> corners;  // in samples
     bool can_change = false;        // its diamond can be split, and has vertices on different sides
+    std::array<Vertex, 4> corners;  // in samples; set if it can change
     std::size_t end = 0;            // its patch ends before this tetrahedron, and begins where the half before it ends
   };
 
@@ -51,16 +52,16 @@ class FrontMesher {
   [[nodiscard]] const FrontState& state() const { return state_; }
   [[nodiscard]] const FrontState::Block& block(std::size_t number) const { return state_.blocks[number]; }
 
-  // The points that its shown splits brought.
-  void append_points(std::size_t number, std::vector<Point>& points) const;
+  // The points that its shown splits brought. wanted: by id, 0 for points that may be left out; if empty, none may.
+  void append_points(std::size_t number, std::vector<Point>& points, std::span<const std::uint8_t> wanted = {}) const;
   // The same points, as runs.
   void append_runs(std::size_t number, std::vector<Run>& runs) const;
   // The points that its shown splits removed: the cuts of the edges that they split.
   void append_removed_runs(std::size_t number, std::vector<Run>& runs) const;
   // Its tetrahedra. numbers: of each point the number that stands for it; if empty, the points' ids.
-  void append_tets(std::size_t number, std::vector<Tet>& tets, std::span<const std::uint32_t> numbers = {}) const;
-  // Its tetrahedra, and the halves that they are in, those without any too.
-  void append_halves(std::size_t number, std::vector<Tet>& tets, std::vector<Half>& halves) const;
+  void append_tets(std::size_t number, Tets& tets, std::span<const std::uint32_t> numbers = {}) const;
+  // Its tetrahedra, and the halves that they are in; also those without any that can change.
+  void append_halves(std::size_t number, Tets& tets, std::vector<Half>& halves) const;
 
   // Whether diamonds of this supercube reach the far faces of the box.
   [[nodiscard]] bool is_at_border(std::size_t number) const;
@@ -76,8 +77,9 @@ class FrontMesher {
   // Numbers: a point's number, as numbers[id]
   template <class Numbers>
   struct Output {
-    std::vector<Tet>& tets;
+    Tets& tets;
     std::vector<Half>* halves;  // may be null
+    FrontCursor* at_child;      // null if halves is; somewhere in the front
     Numbers numbers;
   };
   static Corners corners_of(const TetShape& s);
@@ -93,8 +95,10 @@ class FrontMesher {
   void append_root(const Output<Numbers>& out) const;
   template <class Numbers>
   void append_children(const Output<Numbers>& out, FrontCursor& cursor, unsigned children) const;
-  void append_patch(std::vector<Tet>& tets, const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points) const;
-  [[nodiscard]] bool can_change(Vertex centre) const;
+  [[nodiscard]] Tet* make_room(Tets& tets) const;
+  Tet* place_patch(Tet* to, const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points) const;
+  void append_cuts(FrontCursor& cursor, const Diamond& d, std::vector<Point>& points, std::span<const std::uint8_t> wanted) const;
+  [[nodiscard]] static bool can_change(FrontCursor& cursor, Vertex centre);
 
   const FrontState& state_;
   const TetCases& cases_ = tet_cases();

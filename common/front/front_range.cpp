@@ -244,9 +244,12 @@ std::optional<Vertex> Front::split_all(std::span<const SlotGroup> groups, const 
       keys_of(groups[i], keys);
       blocks[i]->key.assign(groups[i].slots, keys, format().last);
       cursor.move_to(groups[i].key);
-      for (const Slot slot : set_bits<Slot>(groups[i].slots)) {
-        if (!cursor.is_splittable(slot) && !failed.exchange(true)) misfit = centre_of(groups[i].key, slot);
+      std::uint64_t splittable = cursor.may_be_splittable(groups[i].slots);
+      if (!cursor.is_interior()) {
+        for (const Slot slot : set_bits<Slot>(groups[i].slots)) splittable &= ~(std::uint64_t(!cursor.is_splittable(slot)) << slot);
       }
+      const std::uint64_t wrong = groups[i].slots & ~splittable;
+      if (wrong != 0 && !failed.exchange(true)) misfit = centre_of(groups[i].key, Slot(std::countr_zero(wrong)));
     }
   });
   if (failed) return misfit;

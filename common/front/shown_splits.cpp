@@ -27,19 +27,6 @@ bool counts(const DiamondContext& context, Side centre, Refine refine) {
   return centre != all || (refine == Refine::uniform && all == Side::inside);
 }
 
-void derive_cuts(const FrontValues& values, FrontCursor& at, Slot slot, std::uint32_t cut_bits, CutPlaces& q) {
-  const Links& links = at.links(slot);
-  const double centre = values.format.value(at.here().key[std::size_t(slot)]);
-  std::size_t n = 0;
-  for (std::uint32_t bits = cut_bits; bits != 0;) {
-    const int v = std::countr_zero(bits) / 2;
-    bits &= ~(3u << (2 * v));
-    const FrontCursor::Neighbour vertex = at.at(links.vertex[std::size_t(v)]);
-    const Cuts cuts = cuts_between(centre, values.format.value(vertex.block.key[std::size_t(vertex.slot)]), values.range);
-    for (int i = 0; i < cuts.count; ++i) q[n++] = cuts.q[i];
-  }
-}
-
 void widen_bounds(const KeySpan& around, ValueKey centre, Block& block) {
   block.least = std::min({block.least, around.least, centre});
   block.greatest = std::max({block.greatest, around.greatest, centre});
@@ -51,13 +38,15 @@ void ShownSplits::add_parents(FrontCursor& at, bool shown, std::vector<Place>& p
   for (int k = 0; k < at.context().row->parents; ++k) {
     const FrontCursor::Neighbour parent = at.at(links.vertex[links.parent[std::size_t(k)]]);
     if (parent.is_shown() != shown || !parent.is_split() || state_.is_root_block(parent.block)) continue;
+    if (places.empty()) places.reserve(16);
     places.push_back({&state_.obtain_block(parent.block.scale, parent.block.position), parent.slot});
   }
 }
 
 void ShownSplits::move_to(const Place& place) {
   if (!cursor_) cursor_.emplace(state_);
-  cursor_->move_to(place.block->scale, place.block->position);
+  if (place.block != at_) cursor_->move_to(place.block->scale, place.block->position);
+  at_ = place.block;
   if (!place.block->is_counting(place.slot)) {
     cursor_->gather_one_sided(place.slot);
   } else {

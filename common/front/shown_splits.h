@@ -18,14 +18,10 @@ namespace intervale {
 // The same, from the span of the keys at its vertices.
 [[nodiscard]] bool counts(const KeySides& sides, const KeySpan& around, Side centre, Refine refine);
 
-// Sets q of each cut on the subdivision edges of a split diamond, or of a corner of the domain, in order of the bits of
-// its split, as many as there are. It is in the cursor's supercube.
-using CutPlaces = std::array<std::uint8_t, kMaxCuts>;
-void derive_cuts(const FrontValues& values, FrontCursor& at, Slot slot, std::uint32_t cut_bits, CutPlaces& q);
-
 // Widens the bounds of a supercube's keys by those of one of its diamonds. around: of the keys at its vertices.
 void widen_bounds(const KeySpan& around, ValueKey centre, FrontState::Block& block);
 
+// Nothing may be split while one is in use.
 class ShownSplits {
  public:
   explicit ShownSplits(FrontState& state) : state_(state) {}
@@ -48,7 +44,8 @@ class ShownSplits {
   void hide_one(FrontCursor& at);
 
   FrontState& state_;
-  std::optional<FrontCursor> cursor_;  // over ancestors, once there are some
+  std::optional<FrontCursor> cursor_;      // over ancestors, once there are some
+  const FrontState::Block* at_ = nullptr;  // where it is
 };
 
 }  // namespace intervale

@@ -116,6 +116,7 @@ TetCases::TetCases() : entries_(kTetOrders * 256) {
       const auto tets = tetrahedra(order, side);
       entries_[order * 256 + sides] = {std::uint16_t(tets_.size()), std::uint16_t(tets.size())};
       tets_.insert(tets_.end(), tets.begin(), tets.end());
+      most_ = std::max(most_, unsigned(tets.size()));
     }
   }
   for (unsigned sides = 0; sides < 256; ++sides) {

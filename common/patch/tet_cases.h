@@ -72,6 +72,8 @@ class TetCases {
     return {tets_.data() + e.first, e.count};
   }
   [[nodiscard]] unsigned count(int order, unsigned sides) const { return entries_[order * 256 + sides].count; }
+  // The most tetrahedra that a patch has.
+  [[nodiscard]] unsigned most() const { return most_; }
 
   // The number of tetrahedra if it is the same for every order, with the vertices in any sequence; otherwise kDepends,
   // which is so for some tetrahedra with vertices below, inside and above.
@@ -85,6 +87,7 @@ class TetCases {
   std::vector<Entry> entries_;
   std::vector<std::array<PatchCorner, 4>> tets_;
   std::array<std::uint8_t, 256> counts_{};
+  unsigned most_ = 0;
 };
 
 // The table, computed at first use.
