@@ -65,12 +65,13 @@ Offset<fbs::Description> encode_description(FlatBufferBuilder& out, const Descri
   for (std::size_t i = 0; i < flat.size(); ++i) flat[i] = weight_at(d.weights, i);
   const auto weights = out.CreateVector(flat);
   const fbs::Dims dims(d.grid.dims[0], d.grid.dims[1], d.grid.dims[2]);
-  const fbs::Vector spacing = to_vector(d.grid.spacing);
-  const fbs::Vector origin = to_vector(d.grid.origin);
+  const auto affine = out.CreateVector(d.grid.affine.rows.data(), d.grid.affine.rows.size());
+  const auto label = [&out](const std::string& text) { return text.empty() ? Offset<flatbuffers::String>() : out.CreateString(text); };
+  const auto unit = label(d.labels.unit), field = label(d.labels.field), field_unit = label(d.labels.field_unit);
   const ValueFormat& format = d.format;
-  return fbs::CreateDescription(out, name, &dims, &spacing, &origin, d.range.alpha, d.range.beta, std::uint8_t(d.refine), d.max_error, d.updates,
-                                d.coefficients, d.full.vertices, d.full.tets, d.content_hash, std::uint8_t(format.type), format.step, format.first,
-                                format.last, d.is_exact, corners, weights, d.has_every_range);
+  return fbs::CreateDescription(out, name, &dims, d.range.alpha, d.range.beta, std::uint8_t(d.refine), d.max_error, d.updates, d.coefficients,
+                                d.full.vertices, d.full.tets, d.content_hash, std::uint8_t(format.type), format.step, format.first, format.last,
+                                d.is_exact, corners, weights, d.has_every_range, affine, unit, field, field_unit);
 }
 
 Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
@@ -144,8 +145,14 @@ Result<ClientMessage> decode_body(const fbs::Have& table) {
   return Have{std::move(*splits)};
 }
 
-// The part of a description that depends on the version of payloads. d: has its grid.
+// The part of a description that depends on the version of payloads. d: has its dims.
 Result<void> decode_values(const fbs::Description& wire, Description& d) {
+  if (VectorLength(wire.affine()) != d.grid.affine.rows.size()) return malformed("a description's affine does not have 12 numbers");
+  std::copy(wire.affine()->begin(), wire.affine()->end(), d.grid.affine.rows.begin());
+  for (const auto* label : {wire.unit(), wire.field(), wire.field_unit()}) {
+    if (VectorLength(label) > kMaxLabel) return malformed("a description's label is too long");
+  }
+  d.labels = {flatbuffers::GetString(wire.unit()), flatbuffers::GetString(wire.field()), flatbuffers::GetString(wire.field_unit())};
   if (wire.type() >= kSampleTypes) return malformed("an unknown type of samples");
   if (VectorLength(wire.corners()) != d.corners.size()) return malformed("a description does not have 8 corners");
   const std::size_t weights = weight_count(d.grid);
@@ -163,7 +170,7 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
   if (wire.refine() > std::uint8_t(Refine::uniform)) return malformed("an unknown refinement (neither boundary nor uniform)");
   Description d;
   d.name = wire.name()->str();
-  d.grid = {{wire.dims()->x(), wire.dims()->y(), wire.dims()->z()}, to_array(*wire.spacing()), to_array(*wire.origin())};
+  d.grid.dims = {wire.dims()->x(), wire.dims()->y(), wire.dims()->z()};
   d.range = {wire.alpha(), wire.beta()};
   d.refine = Refine(wire.refine());
   d.has_every_range = wire.has_every_range();

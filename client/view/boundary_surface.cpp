@@ -51,6 +51,15 @@ std::size_t add_edges(std::span<const std::uint32_t> triangles, std::vector<std:
 
 }  // namespace
 
+BoundarySurface::BoundarySurface(const Front& front) : mesher_(front.state()), is_mirrored_(front.state().grid.affine.is_mirrored()) {
+  const Affine inverse = front.state().grid.affine.inverse();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    Vec3 normal{};
+    normal[axis] = 1;
+    box_normals_[axis] = normalized(inverse.transposed(normal));
+  }
+}
+
 void BoundarySurface::forget_all() {
   position_.clear();
   surface_.clear();
@@ -162,13 +171,13 @@ bool BoundarySurface::has_face_on_surface(const Tet& tet) const {
 }
 
 void BoundarySurface::add_normals(const std::vector<Triangle>& triangles, int sign) {
-  const auto& spacing = mesher_.state().grid.spacing;
+  const Affine& affine = mesher_.state().grid.affine;
   for (const Triangle& t : triangles) {
     if (t.kind >= kBox) continue;
     std::array<Vec3, 3> corners;
     for (std::size_t k = 0; k < 3; ++k) {
       const Position& p = position_[t.points[k]];
-      corners[k] = {p[0] * spacing[0], p[1] * spacing[1], p[2] * spacing[2]};
+      corners[k] = affine.direction({double(p[0]), double(p[1]), double(p[2])});
     }
     const auto added = angle_weighted_normals(corners, arc_cosine);
     for (std::size_t k = 0; k < 3; ++k)
@@ -216,7 +225,8 @@ void BoundarySurface::find_triangles(std::size_t number, std::vector<Triangle>& 
   for (const Tet& tet : tets_) {
     if (!at_border && !has_face_on_surface(tet)) continue;
     for (const auto& face : kTetFaces) {
-      const std::array<PointId, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
+      std::array<PointId, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
+      if (is_mirrored_) std::swap(points[1], points[2]);
       const int kind = kind_of(points, at_border);
       if (kind != kNone) triangles.push_back({points, std::uint8_t(kind), lod});
     }
@@ -233,7 +243,7 @@ SurfaceVertex BoundarySurface::vertex(PointId point, const Triangle& t) const {
   SurfaceVertex v{float(p[0]) / FrontMesher::kSteps, float(p[1]) / FrontMesher::kSteps, float(p[2]) / FrontMesher::kSteps};
   Vec3 normal{};
   if (t.kind >= kBox) {
-    normal[(t.kind - kBox) / 2] = (t.kind - kBox) % 2 == 0 ? -1 : 1;
+    normal = scaled((t.kind - kBox) % 2 == 0 ? -1 : 1, box_normals_[std::size_t(t.kind - kBox) / 2]);
   } else {
     const NormalSum& sum = normal_[point];
     normal = normalized({double(sum[0]), double(sum[1]), double(sum[2])});
@@ -331,8 +341,7 @@ BoundarySurface::Change BoundarySurface::all() {
 double BoundarySurface::in_world(double Part::*volume) const {
   double sum = 0;
   for (const Part& part : parts_) sum += part.*volume;
-  const auto& spacing = mesher_.state().grid.spacing;
-  return sum * spacing[0] * spacing[1] * spacing[2] / kStepsCubed;
+  return sum * std::abs(mesher_.state().grid.affine.determinant()) / kStepsCubed;
 }
 
 }  // namespace intervale

@@ -38,7 +38,7 @@ struct SurfacePiece {
 
 class BoundarySurface {
  public:
-  explicit BoundarySurface(const Front& front) : mesher_(front.state()) {}  // the front must outlive it
+  explicit BoundarySurface(const Front& front);  // which must outlive it
 
   struct Change {
     bool reset = false;                  // nothing of the former surface stays
@@ -96,6 +96,8 @@ class BoundarySurface {
   void add_triangles(const std::vector<const Triangle*>& triangles, std::vector<PointId>& points, SurfacePiece& piece);
 
   FrontMesher mesher_;
+  bool is_mirrored_;                 // what is counterclockwise in samples is not in the world
+  std::array<Vec3, 3> box_normals_;  // by axis, in the world: of the box's far side
   std::uint64_t point_generation_ = 0;
   std::vector<FrontMesher::Position> position_;      // by PointId
   std::vector<Surface> surface_;                     // by PointId

@@ -12,12 +12,11 @@ using Tet = FrontMesher::Tet;
 class Cutter {
  public:
   Cutter(const BoundarySurface& surface, const CutPlane& plane) : surface_(surface) {
-    const Grid& grid = surface.mesher().state().grid;
+    const Affine& affine = surface.mesher().state().grid.affine;
+    normal_ = affine.transposed(plane.normal);
     offset_ = plane.offset;
-    for (int i = 0; i < 3; ++i) {
-      normal_[i] = plane.normal[i] * grid.spacing[i];
-      offset_ -= plane.normal[i] * grid.origin[i];
-    }
+    for (std::size_t i = 0; i < 3; ++i) offset_ -= plane.normal[i] * affine.origin()[i];
+    is_mirrored_ = affine.is_mirrored();
   }
 
   std::vector<SectionVertex> run() {
@@ -62,8 +61,9 @@ class Cutter {
       // The triangle of corners 0, i and i + 1: whether its side opposite to each is a side of the polygon, or else a
       // diagonal.
       const std::array<bool, 3> is_side{true, i + 2 == polygon.count, i == 1};
-      const std::array<std::size_t, 3> corner{0, i, i + 1};
-      for (std::size_t k = 0; k < 3; ++k) {
+      const std::array<std::size_t, 3> corner{0, i, i + 1},
+          order = is_mirrored_ ? std::array<std::size_t, 3>{0, 2, 1} : std::array<std::size_t, 3>{0, 1, 2};
+      for (const std::size_t k : order) {
         const Vec3& p = polygon.corners[corner[k]];
         SectionVertex v{float(p[0]), float(p[1]), float(p[2]), {}, lod_};
         for (std::size_t side = 0; side < 3; ++side) v.side[side] = side == k || !is_side[side] ? 255 : 0;
@@ -75,6 +75,7 @@ class Cutter {
   const BoundarySurface& surface_;
   Vec3 normal_;  // so that its product with a place in samples is the distance in world units
   double offset_ = 0;
+  bool is_mirrored_ = false;  // what is counterclockwise in samples is not in the world
   std::uint8_t lod_ = 0;
   std::vector<SectionVertex> out_;
 };

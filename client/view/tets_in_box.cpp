@@ -1,15 +1,13 @@
 #include "client/view/tets_in_box.h"
 
+#include <utility>
+
 namespace intervale {
 
 TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint64_t most) {
   const FrontState& front = surface.mesher().state();
-  const Grid& grid = front.grid;
-  std::array<double, 3> low, high;  // in samples
-  for (int i = 0; i < 3; ++i) {
-    low[i] = (box.min[i] - grid.origin[i]) / grid.spacing[i];
-    high[i] = (box.max[i] - grid.origin[i]) / grid.spacing[i];
-  }
+  const SeenBox seen(box, front.grid);
+  const bool is_mirrored = front.grid.affine.is_mirrored();
   TetsInBox found;
   FrontMesher::Tets tets;
   for (std::size_t number = 0; number < front.blocks.size(); ++number) {
@@ -17,21 +15,18 @@ TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint6
     const Vertex p = front.blocks[number].position;
     if (scale != front.domain.levels()) {  // its diamonds reach from h before its corner to 4 h behind
       const double h = double(std::int32_t(1) << scale);
-      const std::array<double, 3> corner{4.0 * p.x * h, 4.0 * p.y * h, 4.0 * p.z * h};
-      bool apart = false;
-      for (int i = 0; i < 3; ++i) apart = apart || corner[i] - h > high[i] || corner[i] + 4 * h < low[i];
-      if (apart) continue;
+      const Vec3 middle{(4.0 * p.x + 1.5) * h, (4.0 * p.y + 1.5) * h, (4.0 * p.z + 1.5) * h};
+      if (!seen.meets(middle, {2.5 * h, 2.5 * h, 2.5 * h})) continue;
     }
     tets.clear();
     surface.mesher().append_tets(number, tets);
-    for (const auto& tet : tets) {
-      std::array<double, 3> middle{};
+    for (auto& tet : tets) {
+      if (is_mirrored) std::swap(tet[2], tet[3]);
+      Vec3 middle{};
       for (const PointId id : tet) {
         for (int i = 0; i < 3; ++i) middle[i] += surface.position(id)[i] * (0.25 / FrontMesher::kSteps);
       }
-      bool inside = true;
-      for (int i = 0; i < 3; ++i) inside = inside && middle[i] >= low[i] && middle[i] <= high[i];
-      if (!inside || ++found.out_of > most) continue;
+      if (!seen.contains(middle) || ++found.out_of > most) continue;
       for (const PointId id : tet) {
         const auto& at = surface.position(id);
         found.vertices.push_back({float(at[0]) / FrontMesher::kSteps, float(at[1]) / FrontMesher::kSteps, float(at[2]) / FrontMesher::kSteps,

@@ -21,7 +21,7 @@ struct TetVertex {
 static_assert(sizeof(TetVertex) == 28);
 
 struct TetsInBox {
-  std::vector<TetVertex> vertices;  // four a tetrahedron
+  std::vector<TetVertex> vertices;  // four a tetrahedron, positive in the world
   std::uint64_t count = 0;
   std::uint64_t out_of = 0;  // that lie there
 };

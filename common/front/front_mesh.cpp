@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cassert>
+#include <utility>
 
 #include "common/front/front.h"
 #include "common/front/front_mesher.h"
@@ -22,6 +23,7 @@ class FrontMesh {
   FrontMesh(const FrontState& state, const ParallelFor& parallel)
       : state_(state),
         mesher_(state),
+        is_mirrored_(state.grid.affine.is_mirrored()),
         parallel_(parallel),
         shown_(numbers_of_shown(state)),
         pieces_((shown_.size() + kPiece - 1) / kPiece),
@@ -130,7 +132,8 @@ class FrontMesh {
   }
 
   void place_points(std::size_t piece, Mesh& mesh) const {
-    const Grid& grid = state_.grid;
+    constexpr double kStep = 1.0 / FrontMesher::kSteps;
+    const Affine& affine = state_.grid.affine;
     std::vector<FrontMesher::Point> points;
     for_each_supercube(piece, [&](std::size_t number) {
       points.clear();
@@ -138,7 +141,7 @@ class FrontMesh {
       for (const FrontMesher::Point& p : points) {
         if (!used_[p.id]) continue;
         const std::uint32_t n = number_[p.id];
-        for (int i = 0; i < 3; ++i) mesh.points[n][i] = grid.origin[i] + grid.spacing[i] * p.position[i] * (1.0 / FrontMesher::kSteps);
+        mesh.points[n] = affine.point({p.position[0] * kStep, p.position[1] * kStep, p.position[2] * kStep});
         mesh.surface[n] = p.surface;
         if (p.surface != Surface::inside) mesh.value[n] = p.surface == Surface::alpha ? state_.values.range.alpha : state_.values.range.beta;
       }
@@ -166,6 +169,7 @@ class FrontMesh {
       parallel_(some, [&](std::size_t i) {
         tets[i].clear();
         for_each_supercube(first + i, [&](std::size_t number) { mesher_.append_tets(number, tets[i], number_); });
+        for (std::size_t t = 0; is_mirrored_ && t < tets[i].size(); ++t) std::swap(tets[i][t][2], tets[i][t][3]);
       });
       for (std::size_t i = 0; i < some; ++i) place[i + 1] = place[i] + tets[i].size();
       assert(place[some] <= mesh.tets.size() && "splits and merges kept count");
@@ -176,6 +180,7 @@ class FrontMesh {
 
   const FrontState& state_;
   const FrontMesher mesher_;
+  const bool is_mirrored_;  // what is positive in samples is not in the world
   const ParallelFor& parallel_;
   std::vector<std::size_t> shown_;
   std::size_t pieces_;

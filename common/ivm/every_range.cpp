@@ -112,6 +112,7 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   Description& to = parts.description;
   to.name = d.name;
   to.grid = d.grid;
+  to.labels = d.labels;
   to.range = {-kInfinity, kInfinity};
   to.refine = Refine::uniform;
   to.has_every_range = true;

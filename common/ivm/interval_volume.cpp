@@ -18,8 +18,7 @@ std::uint64_t hash(std::span<const T> values, std::uint64_t seed) {
 std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& parts) {
   std::uint64_t h = 0;
   h = hash(std::span<const std::int32_t>(d.grid.dims), h);
-  h = hash(std::span<const double>(d.grid.spacing), h);
-  h = hash(std::span<const double>(d.grid.origin), h);
+  h = hash(std::span<const double>(d.grid.affine.rows), h);
   const double range[2] = {d.range.alpha, d.range.beta};
   h = hash(range, sizeof range, h);
   const double step = d.format.step;

@@ -39,8 +39,9 @@ constexpr std::uint32_t bit_of(StreamType type) { return std::uint32_t(1) << std
 
 // The types of a scope's streams, as bits.
 constexpr std::uint32_t kCommon =
-    bit_of(StreamType::field) | bit_of(StreamType::weights) | bit_of(StreamType::page_index) | bit_of(StreamType::pages);
+    bit_of(StreamType::field) | bit_of(StreamType::weights) | bit_of(StreamType::page_index) | bit_of(StreamType::pages) | bit_of(StreamType::labels);
 constexpr std::uint32_t kStatistics = bit_of(StreamType::histogram) | bit_of(StreamType::volumes);
+constexpr std::uint32_t kForPeople = kStatistics | bit_of(StreamType::labels);  // what a mesh can do without
 constexpr std::uint32_t types_of(Scope scope) {
   if (scope == Scope::every_range) return kCommon | kStatistics;
   return ((std::uint32_t(1) << kStreamTypes) - 2) & ~kStatistics;
@@ -80,7 +81,8 @@ Result<void> check_entries(const Head& head) {
     found |= bit;
   }
   if (next != head.header.file_bytes) return fail("bytes after the last stream");
-  for (const int type : set_bits(types_of(head.scope()) & ~found)) return fail(name_of(std::uint32_t(type)) + " is missing");
+  for (const int type : set_bits(types_of(head.scope()) & ~found))
+    return fail(name_of(std::uint32_t(type)) + " is missing: an older program wrote the file, or it is damaged; build it again");
   return {};
 }
 
@@ -158,7 +160,7 @@ std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, c
   for (const int type : set_bits(types)) {
     const auto& bytes = streams[StreamType(type)];
     const bool is_pages = StreamType(type) == StreamType::pages;
-    const Entry e{std::uint32_t(type), (kStatistics >> type & 1) != 0 ? kOptional : 0, header.file_bytes, bytes.size(),
+    const Entry e{std::uint32_t(type), (kForPeople >> type & 1) != 0 ? kOptional : 0, header.file_bytes, bytes.size(),
                   is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size())};
     append(file, std::span(&e, 1));
     header.file_bytes += bytes.size();

@@ -31,8 +31,10 @@ enum class StreamType : std::uint32_t {
   errors = 11,
   error_to_distance = 12,
   error_steps = 13,
+  // both
+  labels = 14,
 };
-inline constexpr std::uint32_t kStreamTypes = 14;  // and one more, as 0 is none
+inline constexpr std::uint32_t kStreamTypes = 15;  // and one more, as 0 is none
 
 enum class Scope { every_range, one_range };
 

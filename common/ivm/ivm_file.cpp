@@ -176,6 +176,7 @@ Result<void> read_errors(const Container& file, const RangeRecord& r, IntervalVo
 std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel) {
   Streams streams;
   append_values(streams, volume, volume.description().is_exact, parallel);
+  append_labels(streams, volume.description().labels);
   const RangeRecord record = record_of(volume);
   append(streams[StreamType::range], std::span(&record, 1));
   parallel(kCompressed.size() + 1, [&](std::size_t i) {
@@ -197,6 +198,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   Description& d = parts.description;
   d.name = std::move(name);
   if (auto ok = read_field(*file, d); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_labels(*file, d.labels); !ok) return tl::unexpected(ok.error());
   const auto record = read_range(*file, d);
   if (!record) return tl::unexpected(record.error());
   const int levels = Domain(d.grid.dims).levels();

@@ -13,7 +13,7 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
   const auto steps = volume.error_steps();
   while (threshold > 0 && least_step_ < steps.size() && steps[least_step_] <= threshold) ++least_step_;
   const Grid& g = volume.description().grid;
-  if (lod.roi) roi_ = in_samples(*lod.roi, g);
+  if (lod.roi) roi_.emplace(*lod.roi, g);
   if (lod.camera) {
     screen_.emplace(*lod.camera, g);
     pixel_error_ = float(lod.camera->pixel_error);
@@ -31,9 +31,7 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
     return b;
   }
   const ScreenError::Region region = region_of(volume_.domain(), key, 4);
-  for (int i = 0; i < 3 && roi_; ++i) {
-    if (region.middle[i] + region.reach[i] < roi_->min[i] || region.middle[i] - region.reach[i] > roi_->max[i]) return b;
-  }
+  if (roi_ && !roi_->meets(region.middle, region.reach)) return b;
   if (!screen_) {
     b.bound_ = Rank(step + 1);
     return b;

@@ -112,7 +112,7 @@ class Ranking {
   const IntervalVolume& volume_;
   const RelevantUpdates& relevant_;
   unsigned least_step_ = 0;  // the lowest error step that is wanted
-  std::optional<SampleBox> roi_;
+  std::optional<SeenBox> roi_;
   std::optional<ScreenError> screen_;
   float pixel_error_ = 0;
 };

@@ -34,10 +34,16 @@ float ErrorToDistance::ratio(float unit) const {
 }
 
 double error_to_distance_unit(const Grid& grid, double max_error) {
-  return max_error > 0 ? std::min({grid.spacing[0], grid.spacing[1], grid.spacing[2]}) / max_error : 1.0;
+  const Vec3 spacing = grid.affine.spacing();
+  return max_error > 0 ? std::min({spacing[0], spacing[1], spacing[2]}) / max_error : 1.0;
 }
 
-double diamond_width(const Grid& grid) { return 2 * std::hypot(grid.spacing[0], grid.spacing[1], grid.spacing[2]); }
+double diamond_width(const Grid& grid) {
+  double longest = 0;
+  for (const Vec3& diagonal : {Vec3{1, 1, 1}, Vec3{-1, 1, 1}, Vec3{1, -1, 1}, Vec3{1, 1, -1}})
+    longest = std::max(longest, length(grid.affine.direction(diagonal)));
+  return 2 * longest;
+}
 
 RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, const ShownRange& shown,
                                  std::vector<std::uint64_t> slots, std::vector<ErrorToDistance> error_to_distance)

@@ -38,9 +38,9 @@ class ErrorToDistance {
 // The largest distance that is recorded, in widths of a diamond with h = 1.
 inline constexpr float kMaxFarDeviation = 64;
 
-// The unit of the ratios of ErrorToDistance.
+// The unit of the ratios of ErrorToDistance: the least spacing for the largest error.
 [[nodiscard]] double error_to_distance_unit(const Grid& grid, double max_error);
-// The width of a diamond with h = 1, the diagonal of its two cells a side, in world units.
+// The width of a diamond with h = 1, the longest diagonal of its two cells a side, in world units.
 [[nodiscard]] double diamond_width(const Grid& grid);
 
 // The errors of an interval volume, by number of the update.

@@ -100,6 +100,7 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
   const FieldDescription& d = volume.description();
   Streams streams;
   append_values(streams, volume.parts(), d.is_exact, parallel);
+  append_labels(streams, d.labels);
   append_statistics(d, streams[StreamType::histogram], streams[StreamType::volumes]);
   const auto &index = streams[StreamType::page_index], &field = streams[StreamType::field];
   const std::uint64_t pages_hash = XXH3_64bits(index.data(), index.size());
@@ -114,6 +115,7 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
   d.name = std::move(name);
   d.content_hash = file->content_hash();
   if (auto ok = read_field(*file, d); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_labels(*file, d.labels); !ok) return tl::unexpected(ok.error());
   // Sizes before contents.
   if (d.grid.sample_count() > std::uint64_t(~std::uint32_t(0)) / 2) return fail("more samples than this program can read");
   if (d.grid.sample_count() / kValuesPerByte > bytes.size()) return fail("the file claims more values than it can hold");

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -17,22 +18,19 @@ namespace {
 struct FieldRecord {
   std::int32_t dims[3];
   std::uint32_t type;
-  double spacing[3], origin[3], step, max_error;
+  double affine[12], step, max_error;
   std::int64_t first;
   std::uint32_t last, corners[kRootVertices], is_exact;
 };
 struct PageRecord {
   std::uint64_t bytes, checksum;
 };
-static_assert(sizeof(FieldRecord) == 128 && sizeof(PageRecord) == 16, "no padding");
+static_assert(sizeof(FieldRecord) == 176 && sizeof(PageRecord) == 16, "no padding");
 
 FieldRecord record_of(const PagedValues& v, bool is_exact) {
   FieldRecord r{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    r.dims[i] = v.grid.dims[i];
-    r.spacing[i] = v.grid.spacing[i];
-    r.origin[i] = v.grid.origin[i];
-  }
+  std::copy(v.grid.dims.begin(), v.grid.dims.end(), r.dims);
+  std::copy(v.grid.affine.rows.begin(), v.grid.affine.rows.end(), r.affine);
   r.type = std::uint32_t(v.format.type);
   r.step = v.format.step;
   r.max_error = v.max_error;
@@ -49,11 +47,8 @@ Result<void> read_record(const Container& file, D& d) {
   const auto bytes = file.stream(StreamType::field, sizeof r);
   if (!bytes) return tl::unexpected(bytes.error());
   std::memcpy(&r, bytes->data(), sizeof r);
-  for (std::size_t i = 0; i < 3; ++i) {
-    d.grid.dims[i] = r.dims[i];
-    d.grid.spacing[i] = r.spacing[i];
-    d.grid.origin[i] = r.origin[i];
-  }
+  std::copy(std::begin(r.dims), std::end(r.dims), d.grid.dims.begin());
+  std::copy(std::begin(r.affine), std::end(r.affine), d.grid.affine.rows.begin());
   if (auto ok = check_grid(d.grid); !ok) return ok;
   if (r.type >= std::uint32_t(kSampleTypes)) return fail("the type of the samples is unknown");
   d.format = {SampleType(r.type), r.step, r.first, r.last};
@@ -107,6 +102,25 @@ void append_values(Streams& streams, const PagedValues& values, bool is_exact, c
     append<std::uint8_t>(streams[StreamType::pages], page);
     page = {};
   }
+}
+
+void append_labels(Streams& streams, const Labels& labels) {
+  for (const std::string* text : {&labels.unit, &labels.field, &labels.field_unit}) {
+    const auto bytes = std::uint8_t(text->size());
+    append(streams[StreamType::labels], std::span(&bytes, 1));
+    append<char>(streams[StreamType::labels], *text);
+  }
+}
+
+Result<void> read_labels(const Container& file, Labels& to) {
+  auto bytes = octets(file[StreamType::labels]);
+  for (std::string* text : {&to.unit, &to.field, &to.field_unit}) {
+    if (bytes.empty() || bytes[0] > kMaxLabel || bytes[0] >= bytes.size()) return fail("the labels are damaged");
+    text->assign(bytes.begin() + 1, bytes.begin() + 1 + bytes[0]);
+    bytes = bytes.subspan(1 + std::size_t(bytes[0]));
+  }
+  if (!bytes.empty()) return fail("the labels are damaged");
+  return check_labels(to);
 }
 
 Result<void> read_field(const Container& file, FieldDescription& to) { return read_record(file, to); }

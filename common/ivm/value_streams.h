@@ -19,6 +19,9 @@ void append_values(Streams& streams, const PagedValues& values, bool is_exact, c
 // The inverse, of bytes from outside. read_field() sets and checks grid, format, corners, max_error and is_exact.
 [[nodiscard]] Result<void> read_field(const Container& file, FieldDescription& to);
 [[nodiscard]] Result<void> read_field(const Container& file, Description& to);
+// The stream of labels.
+void append_labels(Streams& streams, const Labels& labels);
+[[nodiscard]] Result<void> read_labels(const Container& file, Labels& to);
 // levels: of the field's domain
 [[nodiscard]] Result<void> read_weights(const Container& file, int levels, ValueWeights& to);
 // Sets keys and error levels. All the rest is known.

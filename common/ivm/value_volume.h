@@ -19,6 +19,7 @@
 #include "common/diamond/supercube.h"
 #include "common/ivm/value_keys.h"
 #include "common/ivm/volume_table.h"
+#include "common/patch/labels.h"
 #include "common/patch/value_format.h"
 #include "common/util/result.h"
 
@@ -43,13 +44,14 @@ inline constexpr std::size_t kMostBins = 256;
 struct FieldDescription {
   std::string name;
   Grid grid;
+  Labels labels;
   ValueFormat format;
   std::array<ValueKey, kRootVertices> corners{};  // at the root's vertices, in local order
   bool is_exact = true;                           // whether every sample is the value of its key
   double max_error = 0;                           // the largest error, in the field's units
   ValueHistogram histogram;
   VolumeTable volumes;             // what any range encloses
-  std::uint64_t content_hash = 0;  // of the contents; the name does not count
+  std::uint64_t content_hash = 0;  // of the contents; the name and the labels do not count
   friend bool operator==(const FieldDescription&, const FieldDescription&) = default;
 };
 

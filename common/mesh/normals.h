@@ -18,7 +18,7 @@ namespace intervale {
 using NormalSum = std::array<std::int32_t, 3>;
 
 // What a triangle, counterclockwise seen from outside, adds at each of its corners; 0 if it has no area. Directions are
-// those of the space of the corners: scale samples by the grid's spacing first. arc_cosine: of a number that rounding
+// those of the space of the corners: apply the grid's affine to samples first. arc_cosine: of a number that rounding
 // may bring slightly beyond -1 or 1. Its precision is the caller's choice, since it takes much of the time.
 template <class ArcCosine>
 [[nodiscard]] std::array<NormalSum, 3> angle_weighted_normals(const std::array<Vec3, 3>& corners, const ArcCosine& arc_cosine) {

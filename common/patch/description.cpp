@@ -7,11 +7,21 @@
 namespace intervale {
 
 Result<void> check_grid(const Grid& grid) {
-  for (int i = 0; i < 3; ++i) {
-    if (grid.dims[i] < kMinSide || grid.dims[i] > kMaxSide) return fail("a side of " + std::to_string(grid.dims[i]) + " samples is out of bounds");
-    const double far = grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1);
-    if (!(grid.spacing[i] > 0) || !std::isfinite(grid.origin[i]) || !std::isfinite(far)) return fail("spacing or origin is out of bounds");
+  const auto& rows = grid.affine.rows;
+  for (const std::int32_t side : grid.dims) {
+    if (side < kMinSide || side > kMaxSide) return fail("a side of " + std::to_string(side) + " samples is out of bounds");
   }
+  if (!std::all_of(rows.begin(), rows.end(), [](double number) { return std::isfinite(number); }))
+    return fail("spacing, origin or affine has a number that is not finite");
+  const Vec3 far{double(grid.dims[0] - 1), double(grid.dims[1] - 1), double(grid.dims[2] - 1)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    double low = 0, high = 0;  // of the corners, from the first sample
+    for (std::size_t j = 0; j < 3; ++j) (rows[4 * i + j] < 0 ? low : high) += rows[4 * i + j] * far[j];
+    if (!std::isfinite(high - low) || !std::isfinite(rows[4 * i + 3] + low) || !std::isfinite(rows[4 * i + 3] + high))
+      return fail("the volume's far corner is beyond what a double holds; use a smaller spacing");
+  }
+  constexpr double kSingular = 1e-12;
+  if (!(std::abs(grid.affine.relative_determinant()) > kSingular)) return fail("the affine is singular: it puts all samples into one plane");
   return {};
 }
 
@@ -38,6 +48,7 @@ Result<void> check_held(const Description& d, const ShownRange& shown) {
 
 Result<void> check_description(const Description& d) {
   if (auto grid = check_grid(d.grid); !grid) return grid;
+  if (auto labels = check_labels(d.labels); !labels) return labels;
   if (!(d.range.alpha <= d.range.beta)) return fail("invalid range: alpha is greater than beta");
   const bool is_infinite = std::isinf(d.range.alpha) && std::isinf(d.range.beta);
   if (d.has_every_range && !(is_infinite && d.refine == Refine::uniform)) return fail("a data set of every range has another range");

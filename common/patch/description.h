@@ -8,6 +8,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
+#include "common/patch/labels.h"
 #include "common/patch/value_format.h"
 #include "common/patch/value_weights.h"
 #include "common/util/result.h"
@@ -49,6 +50,7 @@ struct FullMesh {
 struct Description {
   std::string name;
   Grid grid;
+  Labels labels;
   // What the data set has the updates for. Of every range: from -inf to inf, refined uniformly.
   Range range;
   Refine refine = Refine::boundary;
@@ -61,7 +63,7 @@ struct Description {
   std::uint64_t updates = 0;                      // relevant diamonds
   std::uint64_t coefficients = 0;                 // cuts on their subdivision edges, at full detail
   FullMesh full;
-  std::uint64_t content_hash = 0;  // of the contents; the name does not count
+  std::uint64_t content_hash = 0;  // of the contents; the name and the labels do not count
   // What is shown if nothing else is asked for.
   [[nodiscard]] ShownRange whole() const { return {range, refine}; }
   friend bool operator==(const Description&, const Description&) = default;
@@ -75,11 +77,12 @@ struct Description {
 // Otherwise misuse, with what the data set has.
 [[nodiscard]] Result<void> check_held(const Description& description, const ShownRange& shown);
 
-// Checks a grid from outside: sides within bounds, a box that is finite and not flat.
+// Checks a grid from outside: sides within bounds; an affine of finite numbers that is not singular, which is one whose
+// determinant is above 1e-12 of the product of its columns' lengths; corners that a double holds.
 [[nodiscard]] Result<void> check_grid(const Grid& grid);
 
 // Checks a description from outside: sides within bounds, a box that is finite and not flat, a valid range, a format
-// as check_value_format accepts it with the corners' keys in it, a finite error.
+// as check_value_format accepts it with the corners' keys in it, a finite error, labels as check_labels accepts them.
 [[nodiscard]] Result<void> check_description(const Description& description);
 
 }  // namespace intervale

@@ -13,21 +13,28 @@ nlohmann::ordered_json number(double value) {
 
 }  // namespace
 
+void add_grid(nlohmann::ordered_json& json, const Grid& grid, const Labels& labels) {
+  json["dims"] = grid.dims;
+  json["spacing"] = grid.affine.spacing();
+  json["origin"] = grid.affine.origin();
+  json["affine"] = grid.affine.rows;
+  json["unit"] = labels.unit;
+  json["field"] = labels.field;
+  json["field_unit"] = labels.field_unit;
+}
+
 nlohmann::ordered_json to_json(const Description& description) {
-  const Grid& grid = description.grid;
   const FullMesh& full = description.full;
   const bool has_one = !description.has_every_range;
   nlohmann::ordered_json json{
       {"name", description.name},
       {"scope", has_one ? "one" : "every"},
-      {"dims", grid.dims},
-      {"spacing", grid.spacing},
-      {"origin", grid.origin},
-      {"values", {{"least", description.format.least()}, {"greatest", description.format.greatest()}}},
-      {"step", description.is_exact ? 0.0 : description.format.step},
-      {"max_error", number(description.max_error)},
-      {"updates", description.updates},
   };
+  add_grid(json, description.grid, description.labels);
+  json["values"] = {{"least", description.format.least()}, {"greatest", description.format.greatest()}};
+  json["step"] = description.is_exact ? 0.0 : description.format.step;
+  json["max_error"] = number(description.max_error);
+  json["updates"] = description.updates;
   if (has_one) {
     json["range"] = nlohmann::ordered_json::array({number(description.range.alpha), number(description.range.beta)});
     json["refine"] = description.refine == Refine::uniform ? "uniform" : "boundary";

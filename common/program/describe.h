@@ -7,10 +7,14 @@
 
 namespace intervale {
 
-// name scope dims spacing origin range refine values{least greatest} step max_error updates coefficients full{vertices
+// name scope dims spacing origin affine unit field field_unit range refine values{least greatest} step max_error updates coefficients full{vertices
 // tets indexed_bytes}. scope is "one": the updates are those of one range. values: of the field. step: how far the kept
 // values are apart; 0 if they are exact. Infinite ends of the range are the strings "-inf" and "inf", since JSON has no
 // such numbers.
 [[nodiscard]] nlohmann::ordered_json to_json(const Description& description);
+
+// Adds dims, spacing (lengths of the affine's columns), origin (its last column), affine (12 numbers, row by row) and
+// the labels unit, field and field_unit.
+void add_grid(nlohmann::ordered_json& json, const Grid& grid, const Labels& labels);
 
 }  // namespace intervale

@@ -25,22 +25,31 @@ Result<void> check_camera(const Camera& c) {
 Box box_of(const Grid& grid) {
   Box box;
   for (std::size_t i = 0; i < 3; ++i) {
-    box.min[i] = grid.origin[i];
-    box.max[i] = grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1);
+    const double* const row = &grid.affine.rows[4 * i];
+    double low = 0, high = 0;  // from the first sample
+    for (std::size_t j = 0; j < 3; ++j) (row[j] < 0 ? low : high) += row[j] * (grid.dims[j] - 1);
+    box.min[i] = row[3] + low;
+    box.max[i] = row[3] + high;
   }
   return box;
 }
 
-SampleBox in_samples(const Box& roi, const Grid& grid) {
+SeenBox::SeenBox(const Box& box, const Grid& grid) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  SampleBox box;
   for (std::size_t i = 0; i < 3; ++i) {
-    box.min[i] = (roi.min[i] - grid.origin[i]) / grid.spacing[i];
-    box.max[i] = (roi.max[i] - grid.origin[i]) / grid.spacing[i];
-    if (box.min[i] > grid.dims[i] - 1) box.min[i] = kInfinity;
-    if (box.max[i] < 0) box.max[i] = -kInfinity;
+    const double* const row = &grid.affine.rows[4 * i];
+    const double unit = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
+    double first = 0, last = 0;  // of the samples
+    for (std::size_t j = 0; j < 3; ++j) {
+      across_[i][j] = row[j] / unit;
+      width_[i][j] = std::abs(across_[i][j]);
+      (row[j] < 0 ? first : last) += across_[i][j] * (grid.dims[j] - 1);
+    }
+    min_[i] = (box.min[i] - row[3]) / unit;
+    max_[i] = (box.max[i] - row[3]) / unit;
+    if (min_[i] > last) min_[i] = kInfinity;
+    if (max_[i] < first) max_[i] = -kInfinity;
   }
-  return box;
 }
 
 Result<void> check_lod(const Lod& lod) {

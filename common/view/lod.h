@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -19,7 +20,7 @@ struct Box {
   friend bool operator==(const Box&, const Box&) = default;
 };
 
-// The box that the samples span.
+// The box around the samples.
 [[nodiscard]] Box box_of(const Grid& grid);
 
 // A perspective camera and the screen it fills. World coordinates.
@@ -47,18 +48,35 @@ struct Lod {
   friend bool operator==(const Lod&, const Lod&) = default;
 };
 
-// A closed box in units of samples, from the first sample on.
-struct SampleBox {
-  Vec3 min{}, max{};
-  // Whether the box around a diamond touches it. centre: of the diamond; h: 2^scale.
-  [[nodiscard]] bool meets(Vertex centre, std::int32_t h) const {
-    return centre.x + h >= min[0] && centre.x - h <= max[0] && centre.y + h >= min[1] && centre.y - h <= max[1] && centre.z + h >= min[2] &&
-           centre.z - h <= max[2];
+// A box of the world, seen from the samples of a grid. Closed. Beyond the samples there is nothing to refine: a box that
+// lies there meets nothing.
+class SeenBox {
+ public:
+  SeenBox(const Box& box, const Grid& grid);
+  [[nodiscard]] bool contains(const Vec3& sample) const { return meets(sample, {}); }
+  // Whether it touches the world box around a box of samples. reach: half the sides of that.
+  [[nodiscard]] bool meets(const Vec3& middle, const Vec3& reach) const {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double at = dot(across_[i], middle), far = dot(width_[i], reach);
+      if (!(at + far >= min_[i] && at - far <= max_[i])) return false;
+    }
+    return true;
   }
-};
+  // The same for the box around a diamond. centre: of the diamond; h: 2^scale.
+  [[nodiscard]] bool meets(Vertex centre, std::int32_t h) const {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double at = across_[i][0] * centre.x + across_[i][1] * centre.y + across_[i][2] * centre.z;
+      if (!(at + h >= min_[i] && at - h <= max_[i])) return false;
+    }
+    return true;
+  }
 
-// A region of interest in samples. Beyond the samples there is nothing to refine: one that lies there meets nothing.
-[[nodiscard]] SampleBox in_samples(const Box& roi, const Grid& grid);
+ private:
+  // By axis of the world: its coordinate of a sample, from the first sample, in units of what it changes by from one
+  // corner of a cell to another. So a cube of samples with half its side h reaches just as far.
+  std::array<Vec3, 3> across_{}, width_{};  // width_: without signs
+  Vec3 min_{}, max_{};                      // of the box
+};
 
 // Misuse if a number is out of range or not finite; the message says what is valid.
 [[nodiscard]] Result<void> check_lod(const Lod& lod);

@@ -14,15 +14,17 @@ double reach_along(const Vec3& reach, const Vec3& n) { return reach[0] * std::ab
 
 }  // namespace
 
-ScreenError::ScreenError(const Camera& camera, const Grid& grid) : origin_(grid.origin), spacing_(grid.spacing), eye_(camera.eye) {
-  ahead_ = normalized(subtract(camera.look_at, eye_));
-  right_ = normalized(cross(ahead_, normalized(camera.up)));
-  up_ = cross(right_, ahead_);
+ScreenError::ScreenError(const Camera& camera, const Grid& grid) : turned_(grid.affine), eye_(turned_.turned(camera.eye)) {
+  const Vec3 ahead = normalized(subtract(camera.look_at, camera.eye)), right = normalized(cross(ahead, normalized(camera.up)));
+  ahead_ = turned_.turned(ahead);
+  right_ = turned_.turned(right);
+  up_ = turned_.turned(cross(right, ahead));
   tan_y_ = std::tan(camera.fov * (std::numbers::pi / 360));
   tan_x_ = tan_y_ * camera.viewport[0] / camera.viewport[1];
   scale_ = camera.viewport[1] / (2 * tan_y_);
   cos_corner_ = 1 / std::hypot(1.0, tan_x_, tan_y_);
-  least_depth_ = 1e-3 * std::min({spacing_[0], spacing_[1], spacing_[2]});
+  const Vec3 spacing = grid.affine.spacing();
+  least_depth_ = 1e-3 * std::min({spacing[0], spacing[1], spacing[2]});
   const auto side = [this](const Vec3& across, double sign, double tangent) {
     Vec3 n, e;
     for (int i = 0; i < 3; ++i) {
@@ -35,11 +37,9 @@ ScreenError::ScreenError(const Camera& camera, const Grid& grid) : origin_(grid.
 }
 
 double ScreenError::pixels_per_unit(const Region& region) const {
-  Vec3 at, reach;
+  const Vec3 at = subtract(turned_.map.point(region.middle), eye_), reach = turned_.map.reach(region.reach);
   double gap2 = 0, far2 = 0;  // to the nearest point of the region, and to its furthest corner
   for (int i = 0; i < 3; ++i) {
-    at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
-    reach[i] = spacing_[i] * region.reach[i];
     const double gap = std::max(0.0, std::abs(at[i]) - reach[i]);
     gap2 += gap * gap;
     far2 += (std::abs(at[i]) + reach[i]) * (std::abs(at[i]) + reach[i]);
@@ -58,19 +58,18 @@ double ScreenError::pixels_per_unit(const Region& region) const {
 }
 
 bool ScreenError::is_near(const Region& region) const {
+  const Vec3 at = subtract(turned_.map.point(region.middle), eye_), reach = turned_.map.reach(region.reach);
   double across2 = 0, gap2 = 0;
   for (int i = 0; i < 3; ++i) {
-    const double at = origin_[i] + spacing_[i] * region.middle[i] - eye_[i], reach = spacing_[i] * region.reach[i];
-    const double gap = std::max(0.0, std::abs(at) - reach);
-    across2 += 4 * reach * reach;
+    const double gap = std::max(0.0, std::abs(at[i]) - reach[i]);
+    across2 += 4 * reach[i] * reach[i];
     gap2 += gap * gap;
   }
   return gap2 < 9 * across2;
 }
 
 bool ScreenError::is_central(const Region& region) const {
-  Vec3 at;
-  for (int i = 0; i < 3; ++i) at[i] = origin_[i] + spacing_[i] * region.middle[i] - eye_[i];
+  const Vec3 at = subtract(turned_.map.point(region.middle), eye_);
   const double depth = dot(at, ahead_);
   return std::abs(dot(at, right_)) <= tan_x_ / 2 * depth && std::abs(dot(at, up_)) <= tan_y_ / 2 * depth;
 }

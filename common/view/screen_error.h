@@ -35,7 +35,9 @@ class ScreenError {
   [[nodiscard]] bool is_central(const Region& region) const;
 
  private:
-  Vec3 origin_, spacing_;          // of the grid
+  // Everything is seen along the axes that turned_ has, so that a rotation of the world changes nothing. Regions are
+  // taken for boxes with sides along them, which they are unless the grid is sheared: then those are larger.
+  TurnedAffine turned_;            // of the grid
   Vec3 eye_, right_, up_, ahead_;  // the camera's axes have length 1
   struct Side {
     Vec3 inward, edge;  // of one side of the view frustum: its normal, and the direction of its middle line from the eye

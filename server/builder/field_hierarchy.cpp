@@ -229,6 +229,7 @@ Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>&
   Description& d = parts.description;
   d.name = volume_.name;
   d.grid = volume_.grid;
+  d.labels = volume_.labels;
   d.range = range_;
   d.refine = refine_;
   d.format = *format;

@@ -99,7 +99,14 @@ class Descent {
  public:
   Descent(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& largest,
           std::vector<Mean>& means)
-      : field_(field), grid_(grid), domain_(domain), set_(set), largest_(largest), means_(means), width_(diamond_width(grid)) {
+      : field_(field),
+        affine_(grid.affine),
+        inverse_(grid.affine.inverse()),
+        domain_(domain),
+        set_(set),
+        largest_(largest),
+        means_(means),
+        width_(diamond_width(grid)) {
     if (std::isfinite(range.alpha)) surface_[surfaces_++] = {range.alpha, false};
     if (std::isfinite(range.beta)) surface_[surfaces_++] = {range.beta, true};
     if (surfaces_ > 0) zero_ = surface_[0].value;
@@ -138,7 +145,7 @@ class Descent {
       }
       far = std::max(far, nearest);
     }
-    return far * std::hypot(grid_.spacing[0] * step.x, grid_.spacing[1] * step.y, grid_.spacing[2] * step.z);
+    return far * length(affine_.direction({double(step.x), double(step.y), double(step.z)}));
   }
 
  private:
@@ -219,11 +226,13 @@ class Descent {
       std::int32_t& c = axis == 0 ? v.x : axis == 1 ? v.y : v.z;
       c += cube.flip[axis] ? -cube.side : cube.side;
       tet.corner[i + 1] = {v, float(value(v))};
-      const double inverse = (cube.flip[axis] ? -1 : 1) / (cube.side * grid_.spacing[axis]);
+      const double inverse = (cube.flip[axis] ? -1.0 : 1.0) / cube.side;
       tet.weight[i][axis] -= inverse;
       tet.weight[i + 1][axis] = inverse;
       tet.gradient[axis] = (double(tet.corner[i + 1].value) - double(tet.corner[i].value)) * inverse;
     }
+    for (Vec3& weight : tet.weight) weight = inverse_.transposed(weight);
+    tet.gradient = inverse_.transposed(tet.gradient);
     return tet;
   }
 
@@ -333,7 +342,7 @@ class Descent {
   }
 
   const Field<T>& field_;
-  const Grid& grid_;
+  Affine affine_, inverse_;  // of the grid
   const Domain& domain_;
   const SupercubeSet& set_;
   std::vector<float>& largest_;  // by update

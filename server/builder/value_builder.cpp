@@ -22,6 +22,7 @@ ValueVolume build_value_volume(Volume& volume, const ValueFormat& format, const 
   FieldDescription& d = parts.description;
   d.name = volume.name;
   d.grid = volume.grid;
+  d.labels = volume.labels;
   d.format = format;
   d.is_exact = is_exact;
   d.histogram = make_value_histogram(volume, format);

@@ -2,6 +2,7 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -31,14 +32,30 @@ struct BuildCommand {
   std::optional<double> nan, step;
   unsigned threads = 0;
   std::vector<std::int64_t> dims;
-  std::vector<double> spacing, origin;
+  std::vector<double> spacing, origin, affine;
+  std::optional<std::string> unit, field, field_unit;
   bool big_endian = false, json = false;
   std::uint64_t skip = 0;
 };
 
+Result<Affine> parse_affine(const BuildCommand& options) {
+  Affine affine;
+  if (!options.affine.empty()) {
+    if (!options.spacing.empty() || !options.origin.empty()) return misuse("--affine says what --spacing and --origin say: give one or the other");
+    std::copy_n(options.affine.begin(), 12, affine.rows.begin());
+    return affine;
+  }
+  Vec3 spacing{1, 1, 1}, origin{};
+  if (!options.spacing.empty()) std::copy_n(options.spacing.begin(), 3, spacing.begin());
+  if (!options.origin.empty()) std::copy_n(options.origin.begin(), 3, origin.begin());
+  if (!std::all_of(spacing.begin(), spacing.end(), [](double s) { return s > 0; }))
+    return misuse("the numbers of --spacing must be greater than 0; --affine can mirror a volume");
+  return Affine::of(spacing, origin);
+}
+
 Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
-  const bool any = !options.dims.empty() || !options.type.empty() || !options.spacing.empty() || !options.origin.empty() || options.big_endian ||
-                   options.skip != 0;
+  const bool any = !options.dims.empty() || !options.type.empty() || !options.spacing.empty() || !options.origin.empty() || !options.affine.empty() ||
+                   options.big_endian || options.skip != 0;
   if (!any) return std::optional<RawLayout>{};
   if (options.dims.empty() || options.type.empty()) return misuse("raw input needs both --dims X Y Z and --type");
   RawLayout layout;
@@ -48,9 +65,23 @@ Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
   layout.big_endian = options.big_endian;
   layout.skip_bytes = options.skip;
   std::copy_n(options.dims.begin(), 3, layout.dims.begin());
-  if (!options.spacing.empty()) std::copy_n(options.spacing.begin(), 3, layout.spacing.begin());
-  if (!options.origin.empty()) std::copy_n(options.origin.begin(), 3, layout.origin.begin());
+  const auto affine = parse_affine(options);
+  if (!affine) return tl::unexpected(affine.error());
+  layout.affine = *affine;
   return std::optional(layout);
+}
+
+// What the options say instead of the input.
+Result<void> set_labels(const BuildCommand& options, Labels& labels) {
+  const auto set = [](const char* name, const std::optional<std::string>& text, std::string& label) -> Result<void> {
+    if (!text) return {};
+    if (!is_label(*text)) return misuse(fmt::format("{} needs UTF-8 of at most {} bytes, without control characters", name, kMaxLabel));
+    label = *text;
+    return {};
+  };
+  if (auto ok = set("--unit", options.unit, labels.unit); !ok) return ok;
+  if (auto ok = set("--field", options.field, labels.field); !ok) return ok;
+  return set("--field-unit", options.field_unit, labels.field_unit);
 }
 
 // Protects the input, and files of other kinds, from being overwritten by mistake.
@@ -113,6 +144,8 @@ Result<void> run(const BuildCommand& options) {
   if (!*range && options.refine != "boundary") return misuse("--refine belongs to a range: give --range too, or --refine to extract");
   const auto layout = parse_layout(options);
   if (!layout) return tl::unexpected(layout.error());
+  Labels labels;
+  if (auto valid = set_labels(options, labels); !valid) return valid;
   // Before the long computation, not after it.
   const std::filesystem::path folder = std::filesystem::absolute(options.output).parent_path();
   if (!std::filesystem::is_directory(folder))
@@ -122,6 +155,7 @@ Result<void> run(const BuildCommand& options) {
   auto volume = read_volume(options.input, *layout);
   if (!volume) return tl::unexpected(volume.error());
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
+  if (auto set = set_labels(options, volume->labels); !set) return set;
   volume->name = std::filesystem::path(options.output).stem().string();
 
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
@@ -164,6 +198,15 @@ void add_build_command(Program& program) {
   command.add_option("--skip", o->skip, "Raw input: bytes to skip before the first sample")->type_name("BYTES");
   command.add_option("--spacing", o->spacing, "Raw input: distance between samples, in world units; default: 1 1 1")->expected(3)->type_name("X Y Z");
   command.add_option("--origin", o->origin, "Raw input: world position of the first sample; default: 0 0 0")->expected(3)->type_name("X Y Z");
+  command
+      .add_option("--affine", o->affine,
+                  "Raw input: from samples to the world, instead of --spacing and --origin: 3 x 4 numbers, row by row; sample (i, j, k) is at "
+                  "A (i, j, k) + T")
+      ->expected(12)
+      ->type_name("A11 A12 A13 T1 A21 ... T3");
+  command.add_option("--unit", o->unit, "Unit of length, such as mm; default: what the input says")->type_name("UNIT");
+  command.add_option("--field", o->field, "What the values are, such as density; default: what the input says")->type_name("NAME");
+  command.add_option("--field-unit", o->field_unit, "Unit of the values, such as HU; default: what the input says")->type_name("UNIT");
   add_json_flag(command, o->json);
 }
 

@@ -37,6 +37,22 @@ std::string bars_of(const ValueHistogram& histogram) {
   return text;
 }
 
+// Where the samples lie, and what their numbers mean.
+std::string place_of(const Grid& grid, const Labels& labels) {
+  const Box box = box_of(grid);
+  std::string text = fmt::format("world box ({:g}) to ({:g})\n", fmt::join(box.min, ", "), fmt::join(box.max, ", "));
+  const Affine& a = grid.affine;
+  if (a.is_axis_parallel()) {
+    text += fmt::format("spacing ({:g})", fmt::join(a.spacing(), ", "));
+  } else {
+    text += fmt::format("axes ({:g}), ({:g}), ({:g})", fmt::join(a.column(0), ", "), fmt::join(a.column(1), ", "), fmt::join(a.column(2), ", "));
+  }
+  text += fmt::format(", origin ({:g}){}{}\n", fmt::join(a.origin(), ", "), labels.unit.empty() ? "" : ", in ", labels.unit);
+  if (!labels.field.empty() || !labels.field_unit.empty())
+    text += fmt::format("field {}{}{}\n", labels.field, labels.field.empty() ? "in " : labels.field_unit.empty() ? "" : ", in ", labels.field_unit);
+  return text;
+}
+
 }  // namespace
 
 nlohmann::ordered_json stats_of(const IntervalVolume& volume, const std::filesystem::path& file) {
@@ -54,8 +70,7 @@ std::string text_of(const IntervalVolume& volume, const std::filesystem::path& f
   const auto times = [&d](std::uint64_t bytes) { return bytes == 0 ? 0.0 : double(d.full.indexed_bytes()) / double(bytes); };
   std::string text = fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined: {}\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
                                  d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
-  const Box box = box_of(d.grid);
-  text += fmt::format("world box ({:g}) to ({:g})\n", fmt::join(box.min, ", "), fmt::join(box.max, ", "));
+  text += place_of(d.grid, d.labels);
   text += fmt::format("{} updates, {} coefficients, {} supercubes, largest error {:g}\n", d.updates, d.coefficients, volume.set().supercubes(),
                       d.max_error);
   text += fmt::format("full mesh: {} vertices, {} tetrahedra, {} as an indexed mesh\n", d.full.vertices, d.full.tets,
@@ -66,12 +81,9 @@ std::string text_of(const IntervalVolume& volume, const std::filesystem::path& f
 
 nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem::path& file) {
   const FieldDescription& d = volume.description();
-  return {
-      {"name", d.name},
-      {"scope", "every"},
-      {"dims", d.grid.dims},
-      {"spacing", d.grid.spacing},
-      {"origin", d.grid.origin},
+  nlohmann::ordered_json stats{{"name", d.name}, {"scope", "every"}};
+  add_grid(stats, d.grid, d.labels);
+  stats.update({
       {"type", name_of(d.format.type)},
       {"values", {{"least", d.format.least()}, {"greatest", d.format.greatest()}}},
       {"step", d.is_exact ? 0.0 : d.format.step},
@@ -82,7 +94,8 @@ nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem
       {"file_bytes", size_of(file)},
       {"histogram", d.histogram.count},
       {"histogram_width", d.histogram.width},
-  };
+  });
+  return stats;
 }
 
 std::string text_of(const ValueVolume& volume, const std::filesystem::path& file) {
@@ -90,8 +103,7 @@ std::string text_of(const ValueVolume& volume, const std::filesystem::path& file
   const std::uint64_t file_bytes = size_of(file), raw = d.grid.sample_count() * size_of(d.format.type);
   std::string text = fmt::format("{}: {} x {} x {} samples of type {}, every range\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
                                  d.grid.dims[2], name_of(d.format.type));
-  const Box box = box_of(d.grid);
-  text += fmt::format("world box ({:g}) to ({:g})\n", fmt::join(box.min, ", "), fmt::join(box.max, ", "));
+  text += place_of(d.grid, d.labels);
   text += fmt::format(
       "values {:g} to {:g}, {}\n", d.format.least(), d.format.greatest(),
       d.is_exact ? std::string("exact") : fmt::format("rounded to multiples of {:g}: off by {:g} at most", d.format.step, d.format.step / 2));

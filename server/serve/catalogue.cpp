@@ -1,22 +1,14 @@
 #include "server/serve/catalogue.h"
 
 #include <algorithm>
-#include <boost/locale/utf.hpp>
 #include <utility>
 
 #include "common/util/printable.h"
+#include "common/util/utf8.h"
 #include "protocol/limits.h"
 
 namespace intervale {
 namespace {
-
-// Well-formed UTF-8 (The Unicode Standard, table 3-7): no overlong forms, no surrogates, nothing above U+10FFFF.
-bool is_utf8(std::string_view text) {
-  for (auto at = text.begin(); at != text.end();) {
-    if (!boost::locale::utf::is_valid_codepoint(boost::locale::utf::utf_traits<char>::decode(at, text.end()))) return false;
-  }
-  return true;
-}
 
 // Names occur in URLs, JSON, metrics, logs and terminals.
 bool is_valid_name(const std::string& name) {

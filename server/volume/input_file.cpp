@@ -6,9 +6,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <system_error>
 #include <utility>
+
+#include "common/patch/description.h"
 
 namespace intervale {
 namespace {
@@ -65,19 +66,16 @@ std::string in_quotes(const std::filesystem::path& path) {
   return text.append(path.string()).append("'");
 }
 
-Result<void> check_grid(const std::array<std::int64_t, 3>& dims, const std::array<double, 3>& spacing, const std::array<double, 3>& origin,
-                        const std::string& where) {
+Result<Grid> make_grid(const std::array<std::int64_t, 3>& dims, const Affine& affine, const std::string& where) {
+  Grid grid{{}, affine};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::string on_axis = std::string(" on axis ") + "xyz"[axis];
     if (dims[axis] < kMinSide || dims[axis] > kMaxSide)
-      return fail(where + ": " + std::to_string(dims[axis]) + (dims[axis] == 1 ? " sample" : " samples") + on_axis + "; a volume has " +
-                  std::to_string(kMinSide) + " to " + std::to_string(kMaxSide));
-    if (!(std::isfinite(spacing[axis]) && spacing[axis] > 0)) return fail(where + ": the spacing" + on_axis + " must be finite and greater than 0");
-    if (!std::isfinite(origin[axis])) return fail(where + ": the origin" + on_axis + " must be finite");
-    if (!std::isfinite(origin[axis] + spacing[axis] * static_cast<double>(dims[axis] - 1)))
-      return fail(where + ": the volume's far corner" + on_axis + " is beyond what a double holds; use a smaller spacing");
+      return fail(where + ": " + std::to_string(dims[axis]) + (dims[axis] == 1 ? " sample" : " samples") + " on axis " + "xyz"[axis] +
+                  "; a volume has " + std::to_string(kMinSide) + " to " + std::to_string(kMaxSide));
+    grid.dims[axis] = std::int32_t(dims[axis]);
   }
-  return {};
+  if (const auto checked = check_grid(grid); !checked) return fail(where + ": " + checked.error().message);
+  return grid;
 }
 
 void swap_bytes(std::span<std::byte> samples, SampleType type) {

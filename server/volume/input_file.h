@@ -39,10 +39,8 @@ class InputFile {
 // A path as error messages show it, between apostrophes.
 [[nodiscard]] std::string in_quotes(const std::filesystem::path& path);
 
-// Checks the shape of a volume: 2 to 2^20 samples a side; spacing, origin and the far corner finite, spacing above 0.
-// The message begins with `where`.
-Result<void> check_grid(const std::array<std::int64_t, 3>& dims, const std::array<double, 3>& spacing, const std::array<double, 3>& origin,
-                        const std::string& where);
+// The grid of a volume, if check_grid (description.h) accepts it. The message begins with `where`.
+Result<Grid> make_grid(const std::array<std::int64_t, 3>& dims, const Affine& affine, const std::string& where);
 
 // Reverses the bytes of every sample, in place.
 void swap_bytes(std::span<std::byte> samples, SampleType type);

@@ -25,6 +25,7 @@ constexpr std::string_view kMagic = "NRRD000";
 struct Screened {
   std::string text;  // the lines that are passed to teem
   std::optional<std::string> data_file;
+  Labels labels;
   std::uint64_t end = 0;  // where the data begins, if attached
 };
 
@@ -50,6 +51,38 @@ bool is_decoration(const std::string& field) {
   return std::find(kDecorations.begin(), kDecorations.end(), field) != kDecorations.end();
 }
 
+// The one text that all of a line's quoted texts are; empty if they differ or there is none.
+std::string common_text(std::string_view line) {
+  std::string first, text;
+  bool is_quoted = false, is_first = true;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (is_quoted && line[i] == '\\' && i + 1 < line.size()) {
+      text += line[++i];
+    } else if (line[i] != '"') {
+      if (is_quoted) text += line[i];
+    } else if (is_quoted = !is_quoted; !is_quoted) {
+      if (is_first) first = text;
+      if (text != first) return {};
+      is_first = false;
+      text.clear();
+    }
+  }
+  return first;
+}
+
+// Keeps what a line says about units or the field, if that is a label.
+void take_label(const std::string& field, std::string_view value, Labels& labels) {
+  if (field == "content" && is_label(value)) labels.field = value;
+  if (field == "sampleunits") {
+    const std::string text = value.starts_with('"') ? common_text(value) : std::string(value);
+    if (is_label(text)) labels.field_unit = text;
+  }
+  if (field == "spaceunits") {
+    const std::string text = common_text(value);
+    if (is_label(text)) labels.unit = text;
+  }
+}
+
 Result<Screened> screen(std::string_view file, const std::string& name) {
   Screened screened;
   bool blank_line = false, has_dimension = false;
@@ -70,7 +103,11 @@ Result<Screened> screen(std::string_view file, const std::string& name) {
     const auto colon = line.find(": ");
     const auto field = canonical(line.substr(0, colon));
     const bool pair = line.find(":=") < colon;
-    if (line.front() == '#' || pair || (colon != line.npos && is_decoration(field))) continue;
+    if (line.front() == '#' || pair) continue;
+    if (colon != line.npos && is_decoration(field)) {
+      take_label(field, trimmed(line.substr(colon + 1)), screened.labels);
+      continue;
+    }
     if (colon != line.npos && field == "datafile") {
       if (screened.data_file) return fail(name + ": two 'data file' lines in the NRRD header");
       screened.data_file = trimmed(line.substr(colon + 1));
@@ -122,15 +159,24 @@ Result<NrrdHeader::Encoding> encoding_of(const NrrdEncoding* encoding, const std
 
 double usable(double value, double otherwise) { return std::isfinite(value) && value != 0 ? std::abs(value) : otherwise; }
 
-// Samples keep their own axes: for an oblique volume, the distances between samples are kept, its rotation is dropped.
-void place(const Nrrd& nrrd, Grid& grid) {
+// `space directions` if there are any, or else `spacings`, along the axes. The axes of the world are the header's own:
+// `space` is not looked at.
+Result<Affine> affine_of(const Nrrd& nrrd, const std::string& name) {
+  Vec3 spacing, origin;
+  std::array<Vec3, 3> directions;
+  int found = 0;
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto& info = nrrd.axis[axis];
-    const double spacing = nrrd.spaceDim > 0 ? nrrdSpaceVecNorm(nrrd.spaceDim, info.spaceDirection) : info.spacing;
-    grid.spacing[axis] = usable(std::isfinite(spacing) ? spacing : info.spacing, 1);
-    const double origin = nrrd.spaceDim == 3 ? nrrd.spaceOrigin[axis] : info.min;
-    grid.origin[axis] = std::isfinite(origin) ? origin : 0;
+    found += nrrd.spaceDim > 0 && !std::isnan(info.spaceDirection[0]) ? 1 : 0;
+    for (unsigned k = 0; k < 3; ++k) directions[axis][k] = info.spaceDirection[k];
+    spacing[axis] = usable(info.spacing, 1);
+    const double first = nrrd.spaceDim == 3 ? nrrd.spaceOrigin[axis] : info.min;
+    origin[axis] = std::isfinite(first) ? first : 0;
   }
+  if (found == 0) return Affine::of(spacing, origin);
+  if (nrrd.spaceDim != 3) return fail(name + ": 'space directions' in " + std::to_string(nrrd.spaceDim) + " dimensions; a volume has 3");
+  if (found < 3) return fail(name + ": 'space directions' has directions for " + std::to_string(found) + " of 3 axes; a volume has all or none");
+  return Affine::of_columns(directions, origin);
 }
 
 Result<NrrdHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std::string& name) {
@@ -154,9 +200,11 @@ Result<NrrdHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std:
   header.big_endian = state.encoding->endianMatters && state.endian == airEndianBig;
   header.line_skip = state.lineSkip;
   header.byte_skip = state.byteSkip;
-  place(nrrd, header.grid);
-  if (const auto checked = check_grid(dims, header.grid.spacing, header.grid.origin, name); !checked) return tl::unexpected<Error>(checked.error());
-  for (std::size_t axis = 0; axis < 3; ++axis) header.grid.dims[axis] = static_cast<std::int32_t>(dims[axis]);
+  const auto affine = affine_of(nrrd, name);
+  if (!affine) return tl::unexpected<Error>(affine.error());
+  const auto grid = make_grid(dims, *affine, name);
+  if (!grid) return tl::unexpected<Error>(grid.error());
+  header.grid = *grid;
   return header;
 }
 
@@ -180,6 +228,7 @@ Result<NrrdHeader> read_nrrd_header(const InputFile& file) {
   auto header = judged(*nrrd, *state, name);
   if (header) {
     header->data_file = screened->data_file;
+    header->labels = screened->labels;
     header->data_offset = screened->end;
   }
   return header;

@@ -15,6 +15,7 @@ struct NrrdHeader {
   enum class Encoding : std::uint8_t { raw, gzip, ascii };
 
   Grid grid;
+  Labels labels;
   SampleType type = SampleType::u8;
   Encoding encoding = Encoding::raw;
   bool big_endian = false;
@@ -26,8 +27,9 @@ struct NrrdHeader {
   [[nodiscard]] std::uint64_t data_bytes() const { return grid.sample_count() * size_of(type); }
 };
 
-// Reads and checks a header. Fails on anything but three spatial axes of 8 to 32-bit integers or floats, on encodings
-// other than raw, gzip and text, on data in several files, and on a header above 1 MiB. Allocates by the header's own
+// Reads and checks a header. Fails on anything but three spatial axes of 8 to 32-bit integers or floats, on directions
+// that are singular or not there for every axis, on encodings other than raw, gzip and text, on data in several files,
+// and on a header above 1 MiB. Texts that are no labels (labels.h) are ignored. Allocates by the header's own
 // length only: its claims have not been compared with the data yet. Any thread; calls are serialised, since teem keeps
 // its errors in global variables.
 Result<NrrdHeader> read_nrrd_header(const InputFile& file);

@@ -127,7 +127,7 @@ Result<Volume> read_nrrd(const std::filesystem::path& path) {
   const auto header = read_nrrd_header(*header_file);
   if (!header) return tl::unexpected<Error>(header.error());
 
-  Volume volume{path.stem().string(), header->grid, header->type, {}};
+  Volume volume{path.stem().string(), header->grid, header->type, {}, header->labels};
   const auto data = !header->data_file ? InputFile::open(path) : detached_path(path, *header->data_file).and_then(InputFile::open);
   if (!data) return tl::unexpected<Error>(data.error());
   const auto start = skip_lines(*data, header->data_file ? 0 : header->data_offset, header->line_skip);

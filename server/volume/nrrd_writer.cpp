@@ -1,6 +1,7 @@
 #include <array>
 #include <charconv>
 #include <string>
+#include <string_view>
 
 #include "common/util/atomic_file.h"
 #include "server/volume/nrrd.h"
@@ -16,16 +17,31 @@ std::string shortest(double value) {
   return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
 }
 
+std::string in_brackets(const Vec3& v) { return "(" + shortest(v[0]) + "," + shortest(v[1]) + "," + shortest(v[2]) + ")"; }
+
+std::string in_marks(std::string_view text) {
+  std::string line = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') line += '\\';
+    line += c;
+  }
+  return line + "\"";
+}
+
 // `space directions` rather than `spacings`: a NRRD has an origin in space only together with them. NRRD0004 is the
 // first with either.
 std::string header(const Volume& volume) {
-  const auto& [dims, spacing, origin] = volume.grid;
+  const auto& [dims, affine] = volume.grid;
   std::string text = "NRRD0004\n# written by Intervale " INTERVALE_VERSION "\ntype: ";
   text.append(kTypeNames[std::size_t(volume.type)]).append("\ndimension: 3\nspace dimension: 3\nsizes:");
   for (const auto side : dims) text.append(" ").append(std::to_string(side));
-  text += "\nspace directions: (" + shortest(spacing[0]) + ",0,0) (0," + shortest(spacing[1]) + ",0) (0,0," + shortest(spacing[2]) + ")";
-  text += "\nspace origin: (" + shortest(origin[0]) + "," + shortest(origin[1]) + "," + shortest(origin[2]) + ")";
-  text += "\nkinds: domain domain domain\n";
+  text += "\nspace directions:";
+  for (std::size_t axis = 0; axis < 3; ++axis) text += " " + in_brackets(affine.column(axis));
+  text += "\nspace origin: " + in_brackets(affine.origin()) + "\nkinds: domain domain domain\n";
+  const auto& [unit, field, field_unit] = volume.labels;
+  if (!unit.empty()) text += "space units: " + in_marks(unit) + " " + in_marks(unit) + " " + in_marks(unit) + "\n";
+  if (!field.empty()) text += "content: " + field + "\n";
+  if (!field_unit.empty()) text += "sample units: " + in_marks(field_unit) + "\n";
   if (size_of(volume.type) > 1) text += "endian: little\n";
   return text + "encoding: raw\n\n";
 }

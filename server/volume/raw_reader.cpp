@@ -25,14 +25,12 @@ Result<SampleType> parse_sample_type(std::string_view name) {
 }
 
 Result<Volume> read_raw(const std::filesystem::path& path, const RawLayout& layout) {
-  if (const auto checked = check_grid(layout.dims, layout.spacing, layout.origin, "the layout of '" + path.string() + "'"); !checked)
-    return misuse(checked.error().message);
+  const auto grid = make_grid(layout.dims, layout.affine, "the layout of '" + path.string() + "'");
+  if (!grid) return misuse(grid.error().message);
   Volume volume;
   volume.name = path.stem().string();
   volume.type = layout.type;
-  for (std::size_t axis = 0; axis < 3; ++axis) volume.grid.dims[axis] = static_cast<std::int32_t>(layout.dims[axis]);
-  volume.grid.spacing = layout.spacing;
-  volume.grid.origin = layout.origin;
+  volume.grid = *grid;
 
   const std::uint64_t bytes = volume.grid.sample_count() * size_of(layout.type);  // at most 2^63
   if (layout.skip_bytes > std::numeric_limits<std::uint64_t>::max() - bytes) return misuse("--skip is larger than any file");

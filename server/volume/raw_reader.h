@@ -16,8 +16,7 @@ struct RawLayout {
   SampleType type = SampleType::u8;
   bool big_endian = false;
   std::uint64_t skip_bytes = 0;  // before the first sample
-  std::array<double, 3> spacing{1, 1, 1};
-  std::array<double, 3> origin{0, 0, 0};
+  Affine affine;
 };
 
 // "u8", "i8", "u16", "i16", "u32", "i32", "f32" or "f64"; misuse with that list otherwise.

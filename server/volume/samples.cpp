@@ -131,7 +131,7 @@ Result<Volume> make_sample(std::string_view name, int size) {
     return misuse("a sample of " + std::to_string(size) + " a side cannot be made: --size goes from " + std::to_string(kMinSampleSize) + " to " +
                   std::to_string(kMaxSampleSize));
   const double spacing = 2.0 / (size - 1);
-  Volume volume{std::string(name), {{size, size, size}, {spacing, spacing, spacing}, {-1, -1, -1}}, SampleType::f32, {}};
+  Volume volume{std::string(name), {{size, size, size}, Affine::of({spacing, spacing, spacing}, {-1, -1, -1})}, SampleType::f32, {}};
   volume.bytes.resize(volume.grid.sample_count() * sizeof(float));
   const auto at = coordinates(size);
   if (kFormulas[which]) {

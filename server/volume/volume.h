@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/diamond/grid.h"
+#include "common/patch/labels.h"
 #include "common/patch/sample_type.h"
 
 namespace intervale {
@@ -20,6 +21,7 @@ struct Volume {
   Grid grid;
   SampleType type = SampleType::u8;
   std::vector<std::byte> bytes;
+  Labels labels{};
 };
 
 // Calls visitor with the samples as a std::span<const T> of the volume's own type T, and returns what it returns.

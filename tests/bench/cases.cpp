@@ -67,6 +67,7 @@ Result<Case> read_case(std::string_view text) {
   std::string name;
   Refine refine = Refine::boundary;
   RawLayout layout;
+  Vec3 spacing{1, 1, 1};
   std::string source = parts[0];  // what the volume depends on
   bool raw = false;
   for (std::size_t i = 3; i < parts.size(); ++i) {
@@ -88,11 +89,11 @@ Result<Case> read_case(std::string_view text) {
       const auto type = parse_sample_type(value);
       if (!type) return tl::unexpected(type.error());
       layout.type = *type;
-    } else if (!(part.starts_with("dims=") && read_three(value, layout.dims)) &&
-               !(part.starts_with("spacing=") && read_three(value, layout.spacing))) {
+    } else if (!(part.starts_with("dims=") && read_three(value, layout.dims)) && !(part.starts_with("spacing=") && read_three(value, spacing))) {
       return wrong("'" + part + "' is none of what may follow");
     }
   }
+  layout.affine = Affine::of(spacing);
   static std::string last_source;
   static Case last;
   if (source != last_source) {

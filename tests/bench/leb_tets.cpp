@@ -111,7 +111,7 @@ Result<void> prepare(const std::string& text, const std::filesystem::path& folde
   return print_json({{"name", c->name},
                      {"title", c->name + " " + range_text(c->range, c->refine)},
                      {"dims", g.dims},
-                     {"spacing", g.spacing},
+                     {"spacing", g.affine.spacing()},
                      {"range", {bound(c->range.alpha), bound(c->range.beta)}},
                      {"samples", samples.filename().string()},
                      {"points", leaves.points.size()},

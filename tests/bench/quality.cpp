@@ -59,8 +59,8 @@ constexpr std::array<Look, 3> kLooks{
 Lod lod_of(const Look& look, const Grid& g) {
   Vector middle, side;
   for (int i = 0; i < 3; ++i) {
-    side[i] = g.spacing[i] * (g.dims[i] - 1);
-    middle[i] = g.origin[i] + side[i] / 2;
+    side[i] = g.affine.spacing()[i] * (g.dims[i] - 1);
+    middle[i] = g.affine.origin()[i] + side[i] / 2;
   }
   Lod lod;
   lod.camera.emplace();

@@ -52,11 +52,11 @@ void add_nrrds(const Corpus& corpus) {
   const std::string sizes = "dimension: 3\nsizes: 2 3 4\n", samples(24, 'x');
   corpus.add("nrrd", "raw", "NRRD0004\n# made\ntype: uchar\n" + sizes + "encoding: raw\n\n", samples);
   corpus.add("nrrd", "big", "NRRD0004\ntype: unsigned short\nendian: big\nspacings: 1 2 0.5\n" + sizes + "encoding: raw\n\n", samples + samples);
-  corpus.add(
-      "nrrd", "directions",
-      "NRRD0005\ntype: int8\nspace: left-posterior-superior\nspace directions: (1,0,0) (0,2,0) (0,0,3)\nspace origin: (1,2,3)\nbyte skip: -1\n" +
-          sizes + "encoding: raw\n\n",
-      "head" + samples);
+  corpus.add("nrrd", "directions",
+             "NRRD0005\ntype: int8\nspace: left-posterior-superior\nspace directions: (1,0.5,0) (0,-2,0) (0,0,3)\nspace origin: (1,2,3)\n"
+             "space units: \"mm\" \"mm\" \"mm\"\nsample units: HU\ncontent: head\nbyte skip: -1\n" +
+                 sizes + "encoding: raw\n\n",
+             "head" + samples);
   corpus.add("nrrd", "text", "NRRD0002\ntype: float\n" + sizes + "line skip: 1\nencoding: ascii\n\nskipped\n",
              "1 2 3 4 5 6 7 8 9 10 11 12 1e3 -2 0.5 4 5 6 7 8 9 10 11 12\n");
   corpus.add("nrrd", "detached", "NRRD0004\ntype: uchar\n" + sizes + "encoding: raw\ndata file: elsewhere.raw\n", "");

@@ -46,8 +46,7 @@ Trial random_trial(unsigned seed) {
     default:
       trial.volume = testing::gyroid(dims), low = -1.6, high = 1.6;
   }
-  trial.volume.grid.spacing = {0.5, 1, 3};
-  trial.volume.grid.origin = {-4, 0, 7};
+  trial.volume.grid.affine = Affine::of({0.5, 1, 3}, {-4, 0, 7});
   const auto value = [&] {
     const double v = low + (high - low) * double(random() % 1000) / 1000;
     return trial.volume.type == SampleType::u8 && random() % 2 == 0 ? std::floor(v) : v;
@@ -104,8 +103,8 @@ TEST_P(Property, EveryLevelOfDetailIsRight) {
     if (level == 3) {
       Box box;
       for (int i = 0; i < 3; ++i) {
-        box.min[i] = g.origin[i] + g.spacing[i] * double(random() % g.dims[i]);
-        box.max[i] = box.min[i] + g.spacing[i] * double(random() % 3);
+        box.min[i] = g.affine.origin()[i] + g.affine.spacing()[i] * double(random() % g.dims[i]);
+        box.max[i] = box.min[i] + g.affine.spacing()[i] * double(random() % 3);
       }
       lod.roi = box;
     }
@@ -130,7 +129,7 @@ TEST_P(Property, EveryLevelOfDetailIsRight) {
       };
     };
     const auto naive = testing::naive_sum(trial.volume, trial.options.range, is_in(split));
-    const double unit = g.spacing[0] * g.spacing[1] * g.spacing[2];
+    const double unit = g.affine.spacing()[0] * g.affine.spacing()[1] * g.affine.spacing()[2];
     EXPECT_NEAR(volume_of(mesh) / unit, naive.volume, 0.01 * naive.cut_volume + 1e-9);
     // The same splits from the field's hierarchy, and the points that follow from the samples.
     if (level < 3) {

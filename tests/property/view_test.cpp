@@ -54,8 +54,7 @@ Trial trial_of_seed(unsigned seed) {
       trial = {testing::specks({33, 33, 33}, seed), {5, kInf}, 3000, "specks"};
   }
   if (seed % 2 == 1) {
-    trial.volume.grid.spacing = {0.5, 1, 2};
-    trial.volume.grid.origin = {-4, 0, 7};
+    trial.volume.grid.affine = Affine::of({0.5, 1, 2}, {-4, 0, 7});
   }
   trial.text += ", seed " + std::to_string(seed);
   return trial;
@@ -67,7 +66,7 @@ Camera camera_of(const Grid& g, int number, std::mt19937& random) {
   const double away = number == 0 ? 1.5 : number == 1 ? 0.7 : 0.3;
   const Vector from = testing::random_direction(random);
   for (int i = 0; i < 3; ++i) {
-    const double side = g.spacing[i] * (g.dims[i] - 1), middle = g.origin[i] + side / 2;
+    const double side = g.affine.spacing()[i] * (g.dims[i] - 1), middle = g.affine.origin()[i] + side / 2;
     camera.eye[i] = middle + away * side * from[i];
     camera.look_at[i] = middle + side * testing::uniform(random, -0.1, 0.1);
   }

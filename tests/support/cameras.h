@@ -34,7 +34,7 @@ inline Camera random_camera(const Grid& g, std::mt19937& random) {
   Camera camera;
   const double away = std::pow(10.0, uniform(random, -0.5, 1));
   for (int i = 0; i < 3; ++i) {
-    const double side = g.spacing[i] * (g.dims[i] - 1), middle = g.origin[i] + side / 2;
+    const double side = g.affine.spacing()[i] * (g.dims[i] - 1), middle = g.affine.origin()[i] + side / 2;
     camera.eye[i] = middle + away * side * uniform(random, -1, 1);
     camera.look_at[i] = middle + (random() % 4 == 0 ? 5 : 0.5) * side * uniform(random, -1, 1);
   }

@@ -23,7 +23,7 @@ inline std::vector<bool> covered_samples(const Grid& g, const Mesh& mesh) {
     std::array<double, 3> lo{kInf, kInf, kInf}, hi{-kInf, -kInf, -kInf};
     for (int i = 0; i < 4; ++i) {
       for (int k = 0; k < 3; ++k) {
-        p[i][k] = (mesh.points[t[i]][k] - g.origin[k]) / g.spacing[k];
+        p[i][k] = (mesh.points[t[i]][k] - g.affine.origin()[k]) / g.affine.spacing()[k];
         lo[k] = std::min(lo[k], p[i][k]);
         hi[k] = std::max(hi[k], p[i][k]);
       }

@@ -45,7 +45,7 @@ inline std::string wrong_value(const Front& front, const ValueField& field, cons
     if (mesh.surface[i] == Surface::beta && mesh.value[i] != front.range().beta) return "a value on beta is not beta";
     if (mesh.surface[i] != Surface::inside) continue;
     std::array<std::int32_t, 3> at{};
-    for (std::size_t k = 0; k < 3; ++k) at[k] = std::int32_t(std::lround((mesh.points[i][k] - grid.origin[k]) / grid.spacing[k]));
+    for (std::size_t k = 0; k < 3; ++k) at[k] = std::int32_t(std::lround((mesh.points[i][k] - grid.affine.origin()[k]) / grid.affine.spacing()[k]));
     if (mesh.value[i] != field.value({at[0], at[1], at[2]})) return "a value is not its sample's";
     if (side_of(mesh.value[i], front.range()) != Side::inside) return "a value is not within the range";
   }

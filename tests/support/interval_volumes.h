@@ -28,8 +28,7 @@ inline std::shared_ptr<const IntervalVolume> build_shared(const Volume& volume, 
 
 // The volume with cells that are no cubes, in a box that does not begin at the world's origin.
 inline Volume stretched(Volume volume) {
-  volume.grid.spacing = {0.5, 1, 3};
-  volume.grid.origin = {-4, 0, 7};
+  volume.grid.affine = Affine::of({0.5, 1, 3}, {-4, 0, 7});
   return volume;
 }
 

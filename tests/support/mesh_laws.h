@@ -52,7 +52,7 @@ inline std::string broken_law(const Mesh& mesh, const Grid& grid, bool flat_may_
     const auto all_on = [&, &f = f](Surface s) { return mesh.surface[f[0]] == s && mesh.surface[f[1]] == s && mesh.surface[f[2]] == s; };
     bool outside = all_on(Surface::alpha) || all_on(Surface::beta);
     for (int k = 0; k < 3; ++k) {
-      for (double side : {grid.origin[k], grid.origin[k] + grid.spacing[k] * (grid.dims[k] - 1)}) {
+      for (double side : {grid.affine.origin()[k], grid.affine.origin()[k] + grid.affine.spacing()[k] * (grid.dims[k] - 1)}) {
         outside = outside || (mesh.points[f[0]][k] == side && mesh.points[f[1]][k] == side && mesh.points[f[2]][k] == side);
       }
     }

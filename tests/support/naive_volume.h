@@ -99,7 +99,7 @@ using PlacedPoints = std::vector<std::array<std::int64_t, 4>>;
 inline PlacedPoints points_of(const Mesh& mesh, const Grid& grid) {
   PlacedPoints points(mesh.points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k) points[i][k] = std::llround((mesh.points[i][k] - grid.origin[k]) / grid.spacing[k] * 512);
+    for (std::size_t k = 0; k < 3; ++k) points[i][k] = std::llround((mesh.points[i][k] - grid.affine.origin()[k]) / grid.affine.spacing()[k] * 512);
     points[i][3] = std::int64_t(mesh.surface[i]);
   }
   std::sort(points.begin(), points.end());

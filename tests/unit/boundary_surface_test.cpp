@@ -51,7 +51,7 @@ bool is_flat(const Triangle& t) {
 
 Point in_samples(const Point& world, const Grid& grid) {
   Point p;
-  for (int i = 0; i < 3; ++i) p[i] = std::round((world[i] - grid.origin[i]) / grid.spacing[i] * 512) / 512;
+  for (int i = 0; i < 3; ++i) p[i] = std::round((world[i] - grid.affine.origin()[i]) / grid.affine.spacing()[i] * 512) / 512;
   return p;
 }
 
@@ -185,7 +185,8 @@ TEST_P(BoundarySurfaceOf, AllTetrahedraLieInTheWholeBox) {
     const Point a = from(1), b = from(2), c = from(3);
     volume_sum += (a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6;
   }
-  EXPECT_NEAR(volume_sum * grid.spacing[0] * grid.spacing[1] * grid.spacing[2], surface.volume(), 1e-4 * (1 + surface.volume()));
+  EXPECT_NEAR(volume_sum * grid.affine.spacing()[0] * grid.affine.spacing()[1] * grid.affine.spacing()[2], surface.volume(),
+              1e-4 * (1 + surface.volume()));
   const TetsInBox some = tets_in_box(surface, all, 5);
   EXPECT_EQ(some.count, std::min<std::uint64_t>(5, tets.count));
   EXPECT_EQ(some.out_of, tets.count);
@@ -204,7 +205,7 @@ TEST_P(BoundarySurfaceOf, CutsAddUpToTheVolume) {
     double low = kInf, high = -kInf;
     for (int corner = 0; corner < 8; ++corner) {
       double at = 0;
-      for (int i = 0; i < 3; ++i) at += direction[i] * (grid.origin[i] + (corner >> i & 1) * grid.spacing[i] * (grid.dims[i] - 1));
+      for (int i = 0; i < 3; ++i) at += direction[i] * (grid.affine.origin()[i] + (corner >> i & 1) * grid.affine.spacing()[i] * (grid.dims[i] - 1));
       low = std::min(low, at);
       high = std::max(high, at);
     }
@@ -216,8 +217,8 @@ TEST_P(BoundarySurfaceOf, CutsAddUpToTheVolume) {
       ASSERT_EQ(cut.size() % 3, 0u);
       for (std::size_t i = 0; i < cut.size(); i += 3) {
         const auto from = [&](std::size_t k) {
-          return Point{(double(cut[i + k].x) - cut[i].x) * grid.spacing[0], (double(cut[i + k].y) - cut[i].y) * grid.spacing[1],
-                       (double(cut[i + k].z) - cut[i].z) * grid.spacing[2]};
+          return Point{(double(cut[i + k].x) - cut[i].x) * grid.affine.spacing()[0], (double(cut[i + k].y) - cut[i].y) * grid.affine.spacing()[1],
+                       (double(cut[i + k].z) - cut[i].z) * grid.affine.spacing()[2]};
         };
         const Point a = from(1), b = from(2);
         const double area =
@@ -242,7 +243,8 @@ TEST_P(BoundarySurfaceOf, CutsDrawTheSidesOfTheirPolygons) {
   BoundarySurface surface(client->front());
   (void)surface.update();
   double offset = 0.0123;  // beside the samples
-  for (int i = 0; i < 3; ++i) offset += (grid.origin[i] + grid.spacing[i] * (grid.dims[i] - 1) / 2) * std::array{0.6, 0.64, 0.48}[i];
+  for (int i = 0; i < 3; ++i)
+    offset += (grid.affine.origin()[i] + grid.affine.spacing()[i] * (grid.dims[i] - 1) / 2) * std::array{0.6, 0.64, 0.48}[i];
   const auto cut = cross_section(surface, {{0.6, 0.64, 0.48}, offset});
   ASSERT_FALSE(cut.empty());
   std::multiset<std::array<std::array<float, 3>, 2>> drawn, diagonals;

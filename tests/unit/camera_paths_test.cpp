@@ -127,7 +127,7 @@ TEST(CameraPaths, AZoomGoesFromAllOfTheBoxToOnePointOfIt) {
 }
 
 TEST(CameraPaths, BoxesSpanTheSamples) {
-  const Box box = box_of({.dims = {3, 11, 2}, .spacing = {0.5, 1, 4}, .origin = {-1, 0, 2}});
+  const Box box = box_of({.dims = {3, 11, 2}, .affine = Affine::of({0.5, 1, 4}, {-1, 0, 2})});
   EXPECT_EQ(box, (Box{{-1, 0, 2}, {0, 10, 6}}));
 }
 

@@ -121,9 +121,9 @@ TEST(ClientSession, TellsBothVersionsOfBatches) {
   const struct {
     std::uint32_t payload;
     const char* error;
-  } cases[] = {{0, "the server sends batches of version 1, and this client reads version 2: update the server"},
-               {1, "the server sends batches of version 1, and this client reads version 2: update the server"},
-               {3, "the server sends batches of version 3, and this client reads version 2: update the client"}};
+  } cases[] = {{0, "the server sends batches of version 1, and this client reads version 3: update the server"},
+               {1, "the server sends batches of version 1, and this client reads version 3: update the server"},
+               {4, "the server sends batches of version 4, and this client reads version 3: update the client"}};
   for (const auto& c : cases) {
     ClientSession session(kOptions);
     session.look({});
@@ -142,9 +142,9 @@ TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
   const struct {
     std::uint32_t payload;
     const char* text;
-  } cases[] = {{0, "the client reads batches of version 1, and this server sends version 2: update the client"},
-               {1, "the client reads batches of version 1, and this server sends version 2: update the client"},
-               {3, "the client reads batches of version 3, and this server sends version 2: update the server"}};
+  } cases[] = {{0, "the client reads batches of version 1, and this server sends version 3: update the client"},
+               {1, "the client reads batches of version 1, and this server sends version 3: update the client"},
+               {4, "the client reads batches of version 4, and this server sends version 3: update the server"}};
   for (const auto& c : cases) {
     SessionState state(catalogue, ranges, Scope::everything());
     const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});

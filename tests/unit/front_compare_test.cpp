@@ -55,8 +55,8 @@ TEST_P(FrontParts, CoarsenedIsTheSameMesh) {
   for (int trial = 0; trial < 5; ++trial) {
     Box box;
     for (std::size_t i = 0; i < 3; ++i) {
-      box.min[i] = grid.origin[i] + grid.spacing[i] * double(random() % std::uint32_t(grid.dims[i]));
-      box.max[i] = box.min[i] + grid.spacing[i] * 2;
+      box.min[i] = grid.affine.origin()[i] + grid.affine.spacing()[i] * double(random() % std::uint32_t(grid.dims[i]));
+      box.max[i] = box.min[i] + grid.affine.spacing()[i] * 2;
     }
     const Front part = front_of(sigma, within(box));
     ASSERT_TRUE(part.is_part_of(full));
@@ -92,7 +92,7 @@ TEST(FrontCompare, OtherGridsRangesAndCornersAreOtherFronts) {
   const Description& same = sigma.description();
   EXPECT_TRUE(root_front(same).is_part_of(front));
   std::vector<Description> others(4, same);
-  others[0].grid.origin[0] += 1;
+  others[0].grid.affine.rows[3] += 1;
   others[1].range.beta = 0.25;
   others[2].corners[7] ^= 1;
   others[3].format.first += 1;

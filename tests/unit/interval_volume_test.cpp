@@ -120,7 +120,7 @@ class ObjectErrors : public ::testing::TestWithParam<unsigned> {
       default:
         volume_ = testing::bump(shapes[seed % 4], seed), range_ = {60, 80};
     }
-    if (seed % 2 == 1) volume_.grid.spacing = {0.5, 1, 3};
+    if (seed % 2 == 1) volume_.grid.affine = Affine::of({0.5, 1, 3});
     auto sigma = FieldHierarchy(volume_, {.range = range_}).compact();
     EXPECT_TRUE(sigma);
     sigma_ = std::move(*sigma);

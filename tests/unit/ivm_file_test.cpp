@@ -76,8 +76,7 @@ TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
                {0, {9, 9, 9}, {50, 60}, Refine::boundary}};
   for (const auto& c : cases) {
     Volume volume = c.kind == 0 ? testing::gyroid(c.dims) : c.kind == 1 ? testing::digits(c.dims, 1) : testing::bump(c.dims, 2);
-    volume.grid.spacing = {0.5, 1, 3};
-    volume.grid.origin = {-4, 0, 7};
+    volume.grid.affine = Affine::of({0.5, 1, 3}, {-4, 0, 7});
     round_samples(volume, choose_value_format(volume, {}).value());
     const IntervalVolume sigma = testing::build(volume, {.range = c.range, .refine = c.refine});
     const auto path = folder / "first.second.ivm";
@@ -320,9 +319,9 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
       {"a side of 1 sample", [](Parts& p) { p.description.grid.dims[1] = 1; }},
       {"a negative side", [](Parts& p) { p.description.grid.dims[2] = -9; }},
       {"a side that is too long", [](Parts& p) { p.description.grid.dims[0] = kMaxSide + 1; }},
-      {"no spacing", [](Parts& p) { p.description.grid.spacing[0] = 0; }},
-      {"infinite spacing", [](Parts& p) { p.description.grid.spacing[0] = kInf; }},
-      {"an origin that is no number", [](Parts& p) { p.description.grid.origin[2] = std::numeric_limits<double>::quiet_NaN(); }},
+      {"no spacing", [](Parts& p) { p.description.grid.affine.rows[0] = 0; }},
+      {"infinite spacing", [](Parts& p) { p.description.grid.affine.rows[0] = kInf; }},
+      {"an origin that is no number", [](Parts& p) { p.description.grid.affine.rows[11] = std::numeric_limits<double>::quiet_NaN(); }},
       {"a range upside down",
        [](Parts& p) {
          p.description.range = {1, 0};

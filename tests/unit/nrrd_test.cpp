@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/volume/nrrd.h"
+#include "tests/support/affines.h"
 #include "tests/support/temp_dir.h"
 
 // teem forgets 88 bytes whenever a header is consistent line by line but not as a whole. Ours are still watched.
@@ -55,7 +56,7 @@ TEST(Nrrd, WhatIsWrittenIsReadBack) {
   std::mt19937 random(1);
   for (const auto type :
        {SampleType::u8, SampleType::i8, SampleType::u16, SampleType::i16, SampleType::u32, SampleType::i32, SampleType::f32, SampleType::f64}) {
-    Volume volume{"v", {{5, 2, 3}, {0.1, 1.0 / 3, 1e-7}, {-1.1, 0, 12345.678901234567}}, type, {}};
+    Volume volume{"v", {{5, 2, 3}, Affine::of({0.1, 1.0 / 3, 1e-7}, {-1.1, 0, 12345.678901234567})}, type, {}};
     volume.bytes.resize(volume.grid.sample_count() * size_of(type));
     for (auto& byte : volume.bytes) byte = static_cast<std::byte>(random());
     ASSERT_TRUE(write_nrrd(folder / "v.nrrd", volume));
@@ -66,6 +67,46 @@ TEST(Nrrd, WhatIsWrittenIsReadBack) {
     EXPECT_EQ(read->grid, volume.grid);
     EXPECT_EQ(read->bytes, volume.bytes);
   }
+}
+
+TEST(Nrrd, DirectionsAndLabelsComeBack) {
+  const TempDir folder;
+  std::mt19937 random(2);
+  for (unsigned kind = 0; kind < 50; ++kind) {
+    Volume volume{"v", {{5, 2, 3}, testing::random_affine(random, kind % 5)}, SampleType::u8, {}};
+    volume.labels = {"mm", "CT \"head\"", "a\\b \u00b5"};
+    volume.bytes.resize(volume.grid.sample_count());
+    ASSERT_TRUE(write_nrrd(folder / "v.nrrd", volume));
+    const auto read = read_nrrd(folder / "v.nrrd");
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->grid, volume.grid);
+    EXPECT_EQ(read->labels, volume.labels);
+  }
+}
+
+TEST(Nrrd, LabelsThatCannotBeAreIgnored) {
+  const TempDir folder;
+  const auto labels = [&](const std::string& fields) {
+    const auto volume = read_nrrd(folder.file("v.nrrd", kSizes + fields + "encoding: raw\n\n" + kSamples));
+    EXPECT_TRUE(volume) << volume.error().message;
+    return volume ? volume->labels : Labels{};
+  };
+  EXPECT_EQ(labels("space dimension: 3\nspace units: \"mm\" \"mm\" \"mm\"\ncontent:  a head \nsample units: HU\n"), (Labels{"mm", "a head", "HU"}));
+  EXPECT_EQ(labels("space dimension: 3\nspace units: \"mm\" \"mm\" \"m\"\n"), Labels{}) << "they differ";
+  EXPECT_EQ(labels("content: " + std::string(65, 'x') + "\nsample units: \xff\n"), Labels{});
+  EXPECT_EQ(labels("content: \x1b[2J\nsample units: \"unfinished\n"), Labels{});
+}
+
+TEST(Nrrd, RefusesDirectionsThatAreNoAffine) {
+  const TempDir folder;
+  const auto read = [&](const std::string& fields) {
+    return read_nrrd(folder.file("v.nrrd", kSizes + "space dimension: 3\n" + fields + "encoding: raw\n\n" + kSamples));
+  };
+  expect_refused(read("space directions: (2,0,0) (0,3,4) none\n"), "2 of 3 axes");
+  expect_refused(read("space directions: (1,0,0) (0,1,0) (1,1,0)\n"), "singular");
+  expect_refused(read("space directions: (1,0,0) (0,0,0) (0,0,1)\n"), "singular");
+  expect_refused(read("space directions: (1,0,0) (0,1e308,0) (0,1e308,1)\nspace origin: (0,1e308,0)\n"), "far corner");
+  EXPECT_FALSE(read("space directions: (1,0,0) (0,inf,0) (0,0,1)\n"));
 }
 
 TEST(Nrrd, ReadsRawGzipAndText) {
@@ -121,10 +162,10 @@ TEST(Nrrd, PlacesTheGrid) {
     EXPECT_TRUE(volume) << volume.error().message;
     return volume ? volume->grid : Grid{};
   };
-  EXPECT_EQ(grid(""), (Grid{{3, 2, 4}, {1, 1, 1}, {0, 0, 0}}));
-  EXPECT_EQ(grid("spacings: 1 2.5 nan\naxis mins: 7 nan -1\n"), (Grid{{3, 2, 4}, {1, 2.5, 1}, {7, 0, -1}}));
-  EXPECT_EQ(grid("space: left-posterior-superior\nspace directions: (2,0,0) (0,3,4) none\nspace origin: (9,8,7)\n"),
-            (Grid{{3, 2, 4}, {2, 5, 1}, {9, 8, 7}}));
+  EXPECT_EQ(grid(""), (Grid{{3, 2, 4}, {}}));
+  EXPECT_EQ(grid("spacings: 1 2.5 nan\naxis mins: 7 nan -1\n"), (Grid{{3, 2, 4}, Affine::of({1, 2.5, 1}, {7, 0, -1})}));
+  EXPECT_EQ(grid("space: left-posterior-superior\nspace directions: (2,0,0) (0,3,4) (0,1e-3,-1)\nspace origin: (9,8,7)\n"),
+            (Grid{{3, 2, 4}, Affine{{2, 0, 0, 9, 0, 3, 1e-3, 8, 0, 4, -1, 7}}}));
 }
 
 TEST(Nrrd, RefusesWhatIsNoVolumeOfNumbers) {

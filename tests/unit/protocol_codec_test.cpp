@@ -21,7 +21,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 Description some_description() {
   Description d;
   d.name = "buckyball";
-  d.grid = {{129, 65, 2}, {1, 0.5, 0.25}, {-1, 0, 1e9}};
+  d.grid = {{129, 65, 2}, Affine{{1, 0.5, -0.25, -1, 0, 2, 0.125, 0, -3, 0, 4, 1e9}}};
+  d.labels = {"mm", "density \u00e9", "g/cm\u00b3"};
   d.range = {-kInfinity, 188};
   d.refine = Refine::uniform;
   d.max_error = 12.25;
@@ -198,7 +199,7 @@ TEST(Codec, ADescriptionHasTheCornersAndWeightsOfItsGrid) {
 
 TEST(Codec, ADescriptionOfAnotherVersionKeepsWhatBothHave) {
   Opened opened{some_description(), {}};
-  for (const std::uint32_t version : {0u, 1u, 3u}) {
+  for (const std::uint32_t version : {0u, 1u, 2u, 4u}) {
     opened.payload = version;
     Bytes bytes = encode(ServerMessage(opened));
     const std::uint32_t none = 0;

@@ -36,8 +36,8 @@ Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
   if (random() % 3 == 0) {
     lod.roi.emplace();
     for (int i = 0; i < 3; ++i) {
-      lod.roi->min[i] = g.origin[i] + g.spacing[i] * testing::uniform(random, -1, g.dims[i]);
-      lod.roi->max[i] = lod.roi->min[i] + g.spacing[i] * testing::uniform(random, 0, 8);
+      lod.roi->min[i] = g.affine.origin()[i] + g.affine.spacing()[i] * testing::uniform(random, -1, g.dims[i]);
+      lod.roi->max[i] = lod.roi->min[i] + g.affine.spacing()[i] * testing::uniform(random, 0, 8);
     }
   }
   if (random() % 3 != 0) {
@@ -59,7 +59,7 @@ double object_error(const IntervalVolume& v, const Place& p) {
   const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) / 2 * h;
   if (code == 0 || v.error(p.index) == 0) return 0;
   if (code == 191) return widest;
-  const double unit = std::min({g.spacing[0], g.spacing[1], g.spacing[2]}) / v.description().max_error;
+  const double unit = std::min({g.affine.spacing()[0], g.affine.spacing()[1], g.affine.spacing()[2]}) / v.description().max_error;
   const double furthest = 64 * diamond_width(g) / 2;
   if (code == 255) return furthest;
   if (code > 191) return std::min(furthest, double(v.error(p.index)) * unit * std::exp2((code - 216) / 2.0));
@@ -95,8 +95,8 @@ bool meets(const IntervalVolume& v, const Diamond& d, const Box& roi) {
   const Grid& g = v.description().grid;
   const std::array<std::int32_t, 3> c{d.centre.x, d.centre.y, d.centre.z};
   for (int i = 0; i < 3; ++i) {
-    const double low = std::max(0.0, (roi.min[i] - g.origin[i]) / g.spacing[i]),
-                 high = std::min(g.dims[i] - 1.0, (roi.max[i] - g.origin[i]) / g.spacing[i]);
+    const double low = std::max(0.0, (roi.min[i] - g.affine.origin()[i]) / g.affine.spacing()[i]),
+                 high = std::min(g.dims[i] - 1.0, (roi.max[i] - g.affine.origin()[i]) / g.affine.spacing()[i]);
     if (low > high || c[i] - d.h > high || c[i] + d.h < low) return false;
   }
   return true;
@@ -166,9 +166,9 @@ TEST_P(Ranks, WhatIsNotWantedDoesNotShow) {
       const std::array<std::int32_t, 3> c{d.centre.x, d.centre.y, d.centre.z};
       for (int i = 0; i < 3; ++i) {
         const double sample = std::clamp(c[i] + d.h * testing::uniform(random_, -1, 1), 0.0, g.dims[i] - 1.0);
-        at[i] = g.origin[i] + g.spacing[i] * sample;
+        at[i] = g.affine.origin()[i] + g.affine.spacing()[i] * sample;
       }
-      if (!naive.shows(at) || naive.depth(at) < 1e-3 * g.spacing[0]) return;
+      if (!naive.shows(at) || naive.depth(at) < 1e-3 * g.affine.spacing()[0]) return;
       ASSERT_LE(object_error(volume_, p) * naive.pixels_per_unit(at), lod.camera->pixel_error * (1 + 1e-5)) << "trial " << trial;
     });
   }

@@ -25,11 +25,11 @@ TEST(RawReader, ReadsEveryTypeXFastest) {
     std::vector<T> samples(24);
     for (int i = 0; i < 24; ++i) samples[i] = static_cast<T>(i * 5 - 7);
     const auto path = folder.file("v.raw", bytes_of(samples));
-    const auto volume = read_raw(path, {{2, 3, 4}, type, false, 0, {1, 2, 3}, {4, 5, 6}});
+    const auto volume = read_raw(path, {{2, 3, 4}, type, false, 0, Affine::of({1, 2, 3}, {4, 5, 6})});
     ASSERT_TRUE(volume) << volume.error().message;
     EXPECT_EQ(volume->name, "v");
     EXPECT_EQ(volume->type, type);
-    EXPECT_EQ(volume->grid, (Grid{{2, 3, 4}, {1, 2, 3}, {4, 5, 6}}));
+    EXPECT_EQ(volume->grid, (Grid{{2, 3, 4}, Affine::of({1, 2, 3}, {4, 5, 6})}));
     EXPECT_EQ(std::string(reinterpret_cast<const char*>(volume->bytes.data()), volume->bytes.size()), bytes_of(samples));
   };
   read(SampleType::u8, std::uint8_t{});
@@ -76,11 +76,11 @@ TEST(RawReader, RefusesLayoutsThatCannotBe) {
       {{2, 2, (1 << 20) + 1}, SampleType::u8},
       {{std::numeric_limits<std::int64_t>::max(), 2, 2}, SampleType::u8},
       {{2, 2, 2}, SampleType::u8, false, std::numeric_limits<std::uint64_t>::max()},
-      {{2, 2, 2}, SampleType::u8, false, 0, {0, 1, 1}},
-      {{2, 2, 2}, SampleType::u8, false, 0, {1, -1, 1}},
-      {{2, 2, 2}, SampleType::u8, false, 0, {1, 1, nan}},
-      {{2, 2, 2}, SampleType::u8, false, 0, {1, 1, 1}, {infinity, 0, 0}},
-      {{2, 2, 2}, SampleType::u8, false, 0, {1e308, 1, 1}, {1e308, 0, 0}},
+      {{2, 2, 2}, SampleType::u8, false, 0, Affine::of({0, 1, 1})},
+      {{2, 2, 2}, SampleType::u8, false, 0, Affine{{1, 2, 0, 0, 2, 4, 0, 0, 0, 0, 1, 0}}},
+      {{2, 2, 2}, SampleType::u8, false, 0, Affine::of({1, 1, nan})},
+      {{2, 2, 2}, SampleType::u8, false, 0, Affine::of({1, 1, 1}, {infinity, 0, 0})},
+      {{2, 2, 2}, SampleType::u8, false, 0, Affine::of({1e308, 1, 1}, {1e308, 0, 0})},
   };
   for (const auto& layout : layouts) {
     const auto volume = read_raw(path, layout);
@@ -136,7 +136,7 @@ template <class Float>
 Volume floats(SampleType type, Float bad) {
   std::vector<Float> samples(2 * 3 * 4, Float{1});
   samples[1 + 2 * (2 + 3 * 3)] = bad;  // the last but one in x, y, z: (1, 2, 3)
-  Volume volume{"v", {{2, 3, 4}, {1, 1, 1}, {0, 0, 0}}, type, std::vector<std::byte>(samples.size() * sizeof(Float))};
+  Volume volume{"v", {{2, 3, 4}, {}}, type, std::vector<std::byte>(samples.size() * sizeof(Float))};
   std::memcpy(volume.bytes.data(), samples.data(), volume.bytes.size());
   return volume;
 }

@@ -63,8 +63,8 @@ Box random_box(const Grid& g, std::mt19937& random) {
   Box box;
   const double share = random() % 3 == 0 ? 0 : 0.3;
   for (int i = 0; i < 3; ++i) {
-    const double length = g.spacing[i] * (g.dims[i] - 1);
-    box.min[i] = g.origin[i] + length * (double(random() % 1300) / 1000 - 0.2);
+    const double length = g.affine.spacing()[i] * (g.dims[i] - 1);
+    box.min[i] = g.affine.origin()[i] + length * (double(random() % 1300) / 1000 - 0.2);
     box.max[i] = box.min[i] + length * share;
   }
   return box;
@@ -91,8 +91,8 @@ TEST_P(Select, IsClosedUnderParentsAndWantsNothingElse) {
       const double c[3] = {double(d.centre.x), double(d.centre.y), double(d.centre.z)};
       for (int i = 0; i < 3 && lod.roi; ++i) {
         // Of the box, what lies in the volume, in samples.
-        const double lo = std::max(0.0, (lod.roi->min[i] - g.origin[i]) / g.spacing[i]),
-                     hi = std::min(g.dims[i] - 1.0, (lod.roi->max[i] - g.origin[i]) / g.spacing[i]);
+        const double lo = std::max(0.0, (lod.roi->min[i] - g.affine.origin()[i]) / g.affine.spacing()[i]),
+                     hi = std::min(g.dims[i] - 1.0, (lod.roi->max[i] - g.affine.origin()[i]) / g.affine.spacing()[i]);
         wanted = wanted && lo <= hi && c[i] - d.h <= hi && c[i] + d.h >= lo;
       }
       if (!wanted && !expected.contains(p.index)) return;
@@ -134,9 +134,9 @@ TEST_P(Select, ARegionOutsideTheBoxChoosesNothing) {
       for (const bool before : {false, true}) {
         Lod lod = of_region(kEverywhere);
         if (before)
-          lod.roi->max[axis] = g.origin[axis] - steps * g.spacing[axis];
+          lod.roi->max[axis] = g.affine.origin()[axis] - steps * g.affine.spacing()[axis];
         else
-          lod.roi->min[axis] = g.origin[axis] + (g.dims[axis] - 1 + steps) * g.spacing[axis];
+          lod.roi->min[axis] = g.affine.origin()[axis] + (g.dims[axis] - 1 + steps) * g.affine.spacing()[axis];
         if (lod.roi->min[axis] > lod.roi->max[axis]) lod.roi->min[axis] = lod.roi->max[axis];
         EXPECT_EQ(select(v, lod).count(), 0u) << steps << (before ? " steps before axis " : " steps behind axis ") << axis;
       }

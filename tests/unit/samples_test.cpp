@@ -53,7 +53,7 @@ TEST(Samples, SpanTheCubeFromMinusOneToOne) {
       EXPECT_EQ(volume->name, name);
       EXPECT_EQ(volume->type, SampleType::f32);
       const double spacing = 2.0 / (size - 1);
-      EXPECT_EQ(volume->grid, (Grid{{size, size, size}, {spacing, spacing, spacing}, {-1, -1, -1}}));
+      EXPECT_EQ(volume->grid, (Grid{{size, size, size}, Affine::of({spacing, spacing, spacing}, {-1, -1, -1})}));
       ASSERT_EQ(volume->bytes.size(), volume->grid.sample_count() * 4);
       for (const float sample : samples_of(*volume)) ASSERT_TRUE(std::isfinite(sample));
     }

@@ -15,18 +15,19 @@ using testing::NaiveCamera;
 using testing::Vector;
 
 // World coordinates that are not the samples'.
-const Grid kGrid{{40, 30, 20}, {0.5, 1, 3}, {-4, 100, 7}};
+const Grid kGrid{{40, 30, 20}, Affine::of({0.5, 1, 3}, {-4, 100, 7})};
 
 Vector world(const Grid& g, const Vector& sample) {
-  return {g.origin[0] + g.spacing[0] * sample[0], g.origin[1] + g.spacing[1] * sample[1], g.origin[2] + g.spacing[2] * sample[2]};
+  return {g.affine.origin()[0] + g.affine.spacing()[0] * sample[0], g.affine.origin()[1] + g.affine.spacing()[1] * sample[1],
+          g.affine.origin()[2] + g.affine.spacing()[2] * sample[2]};
 }
 
 // The region of this size in world units that has its middle there.
 ScreenError::Region region_at(const Grid& g, const Vector& middle, const Vector& reach = {}) {
   ScreenError::Region region;
   for (int i = 0; i < 3; ++i) {
-    region.middle[i] = (middle[i] - g.origin[i]) / g.spacing[i];
-    region.reach[i] = reach[i] / g.spacing[i];
+    region.middle[i] = (middle[i] - g.affine.origin()[i]) / g.affine.spacing()[i];
+    region.reach[i] = reach[i] / g.affine.spacing()[i];
   }
   return region;
 }
@@ -96,11 +97,12 @@ TEST_P(Views, PixelsAreFiniteAndAboveZeroEvenAroundTheEye) {
         camera.eye = world(kGrid, region.middle);
         break;
       case 1:
-        for (int k = 0; k < 3; ++k) camera.eye[k] = kGrid.origin[k] + kGrid.spacing[k] * (region.middle[k] - region.reach[k]);
+        for (int k = 0; k < 3; ++k) camera.eye[k] = kGrid.affine.origin()[k] + kGrid.affine.spacing()[k] * (region.middle[k] - region.reach[k]);
         break;
       case 2:
         for (int k = 0; k < 3; ++k) {
-          camera.eye[k] = kGrid.origin[k] + kGrid.spacing[k] * (region.middle[k] + region.reach[k] * testing::uniform(random_, -1, 1));
+          camera.eye[k] =
+              kGrid.affine.origin()[k] + kGrid.affine.spacing()[k] * (region.middle[k] + region.reach[k] * testing::uniform(random_, -1, 1));
         }
         break;
       default:
@@ -202,11 +204,11 @@ TEST_P(Views, CentralIsTheMiddleHalfOfThePictureEachWay) {
 
 // World units are no more than a choice: the same picture of the same samples.
 TEST_P(Views, SpacingAndOriginAreWhereTheSamplesLie) {
-  const Grid unit{kGrid.dims, {1, 1, 1}, {0, 0, 0}};
+  const Grid unit{kGrid.dims, {}};
   for (int trial = 0; trial < 200; ++trial) {
     const double scale = testing::uniform(random_, 0.01, 50);
     const Vector shift{testing::uniform(random_, -99, 99), testing::uniform(random_, -99, 99), testing::uniform(random_, -99, 99)};
-    const Grid moved{unit.dims, {scale, scale, scale}, shift};
+    const Grid moved{unit.dims, Affine::of({scale, scale, scale}, shift)};
     const Camera camera = testing::random_camera(unit, random_);
     Camera same = camera;
     for (int k = 0; k < 3; ++k) {

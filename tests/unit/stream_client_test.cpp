@@ -94,8 +94,8 @@ TEST_P(Stream, EveryLevelOfDetailEndsWithItsMesh) {
     if (kind == 3) {
       Box box;
       for (int i = 0; i < 3; ++i) {
-        box.min[i] = g.origin[i] + g.spacing[i] * double(random() % std::uint32_t(g.dims[i]));
-        box.max[i] = box.min[i] + g.spacing[i] * 3;
+        box.min[i] = g.affine.origin()[i] + g.affine.spacing()[i] * double(random() % std::uint32_t(g.dims[i]));
+        box.max[i] = box.min[i] + g.affine.spacing()[i] * 3;
       }
       lod.roi = box;
     }
@@ -119,8 +119,8 @@ TEST_P(Stream, ChangesOfMindKeepTheMeshWhole) {
     lod.error_percent = double(random() % 30);
     Box box;
     for (int i = 0; i < 3; ++i) {
-      box.min[i] = g.origin[i] + g.spacing[i] * double(random() % std::uint32_t(g.dims[i]));
-      box.max[i] = box.min[i] + g.spacing[i] * 4;
+      box.min[i] = g.affine.origin()[i] + g.affine.spacing()[i] * double(random() % std::uint32_t(g.dims[i]));
+      box.max[i] = box.min[i] + g.affine.spacing()[i] * 4;
     }
     if (view % 2 == 0) lod.roi = box;
     ASSERT_NO_FATAL_FAILURE(stream(plan, client, lod, 1 + int(random() % 2)));
@@ -175,13 +175,13 @@ TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
       {"a side of 0", [](Description& d) { d.grid.dims[1] = 0; }},
       {"a negative side", [](Description& d) { d.grid.dims[2] = std::numeric_limits<std::int32_t>::min(); }},
       {"a side that is too long", [](Description& d) { d.grid.dims[0] = kMaxSide + 1; }},
-      {"no spacing", [](Description& d) { d.grid.spacing[0] = 0; }},
-      {"negative spacing", [](Description& d) { d.grid.spacing[1] = -1; }},
-      {"infinite spacing", [](Description& d) { d.grid.spacing[2] = kInf; }},
-      {"spacing that is no number", [](Description& d) { d.grid.spacing[0] = kNan; }},
-      {"an infinite origin", [](Description& d) { d.grid.origin[0] = -kInf; }},
-      {"an origin that is no number", [](Description& d) { d.grid.origin[2] = kNan; }},
-      {"a far corner beyond all numbers", [](Description& d) { d.grid.spacing[1] = std::numeric_limits<double>::max(); }},
+      {"no spacing", [](Description& d) { d.grid.affine.rows[0] = 0; }},
+      {"an affine into a plane", [](Description& d) { d.grid.affine.rows = {1, 2, 0, 0, 2, 4, 0, 0, 0, 0, 1, 0}; }},
+      {"infinite spacing", [](Description& d) { d.grid.affine.rows[10] = kInf; }},
+      {"spacing that is no number", [](Description& d) { d.grid.affine.rows[0] = kNan; }},
+      {"an infinite origin", [](Description& d) { d.grid.affine.rows[3] = -kInf; }},
+      {"an origin that is no number", [](Description& d) { d.grid.affine.rows[11] = kNan; }},
+      {"a far corner beyond all numbers", [](Description& d) { d.grid.affine.rows[5] = std::numeric_limits<double>::max(); }},
       {"a corner's key beyond the last", [](Description& d) { d.corners[7] = d.format.last + 1; }},
       {"a last key below the corners'", [](Description& d) { d.format.last = *std::max_element(d.corners.begin(), d.corners.end()) - 1; }},
       {"a negative step", [](Description& d) { d.format.step = -1; }},

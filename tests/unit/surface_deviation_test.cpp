@@ -114,7 +114,7 @@ class NaiveTet {
     for (int k = 0; k < 3; ++k) {
       Vector step{};
       step[std::size_t(k)] = 1;
-      const double slope = (interpolant(step) - interpolant({})) / volume.grid.spacing[k];
+      const double slope = (interpolant(step) - interpolant({})) / volume.grid.affine.spacing()[k];
       square += slope * slope;
     }
     slope_ = std::sqrt(square);
@@ -169,7 +169,7 @@ double tip_of(const Case& c, const Domain& domain, const Diamond& d) {
     const auto on = [&](std::int32_t from, std::int32_t to) { return from + (to - from) / (2 * d.h) * i; };
     values.push_back(value_at(c.volume, domain, {on(a.x, b.x), on(a.y, b.y), on(a.z, b.z)}));
   }
-  const auto& spacing = c.volume.grid.spacing;
+  const Vec3 spacing = c.volume.grid.affine.spacing();
   const double length = std::hypot(spacing[0] * (b.x - a.x), spacing[1] * (b.y - a.y), spacing[2] * (b.z - a.z));
   double furthest = 0;
   for (const bool is_beta : {false, true}) {
@@ -214,7 +214,7 @@ Case case_of_seed(unsigned seed) {
     default:
       c = {"bump, a box that does not nest", testing::bump({10, 16, 3}, seed), {60, 80}};
   }
-  if (seed % 2 == 1 || seed >= 8) c.volume.grid.spacing = {0.5, 1, 3};
+  if (seed % 2 == 1 || seed >= 8) c.volume.grid.affine = Affine::of({0.5, 1, 3});
   c.name += ", seed " + std::to_string(seed);
   return c;
 }

@@ -67,7 +67,7 @@ TEST(Viewpoint, ThreeQuarterViewLooksIntoACut) {
 }
 
 TEST(Viewpoint, PutsPointsWhereAPinholeCameraDoes) {
-  const Grid grid{.dims = {20, 30, 40}, .spacing = {1, 0.5, 2}, .origin = {-5, 100, 3}};
+  const Grid grid{.dims = {20, 30, 40}, .affine = Affine::of({1, 0.5, 2}, {-5, 100, 3})};
   const Box box = box_of(grid);
   std::mt19937 random(9);
   for (int i = 0; i < 200; ++i) {

@@ -2,7 +2,7 @@
 // FlatBuffers written and read by hand. Each throws where it goes otherwise than PROTOCOL.md says.
 export const WINDOW = 256 << 10;
 const ENVELOPE = 160;
-const PAYLOAD = 2; // the version of batches
+const PAYLOAD = 3; // the version of batches
 const client = { Open: 1, View: 2, Credit: 3 }, server = { Opened: 1, Batch: 2, Done: 3, Fault: 4 };
 
 // Tables as objects of field numbers: a number is a byte, a bigint a uint64 (or, if small, a uint32), a string a string,

@@ -1,0 +1,28 @@
+// What the numbers of a data set mean to people.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+#include "common/util/result.h"
+
+namespace intervale {
+
+inline constexpr std::size_t kMaxLabel = 64;  // bytes
+
+// Each as is_label() accepts it; empty if it is not known.
+struct Labels {
+  std::string unit;        // of length
+  std::string field;       // the field's name
+  std::string field_unit;  // of its values
+  friend bool operator==(const Labels&, const Labels&) = default;
+};
+
+// Whether a text is UTF-8 of at most kMaxLabel bytes, without control characters.
+[[nodiscard]] bool is_label(std::string_view text);
+
+// Fails if one of them is no label.
+[[nodiscard]] Result<void> check_labels(const Labels& labels);
+
+}  // namespace intervale
