@@ -30,7 +30,7 @@ inline constexpr int kSurfaceGroups = 3;
 struct SurfacePiece {
   std::uint32_t id = 0;
   std::vector<SurfaceVertex> vertices;
-  std::vector<std::uint32_t> indices;  // three a triangle, counterclockwise seen from outside; by group
+  std::vector<std::uint32_t> indices;  // three a triangle, counterclockwise from outside in the world; by group
   std::vector<std::uint32_t> edges;    // two an edge, each once in its group; by group
   std::array<std::uint32_t, kSurfaceGroups> triangles{}, edge_counts{};
   std::array<float, 3> min{}, max{};  // bounds of its vertices

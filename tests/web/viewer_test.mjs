@@ -66,8 +66,8 @@ async function measuredThickness(page) {
         points.push({ x: (2 * u + 1 - width) / height, y: (height - 2 * v - 1) / height, thickness });
       }
     }
-    const { dims, spacing, origin } = window.intervale.live.dataset;
-    return { points, most, box: { min: origin, max: origin.map((o, k) => o + (dims[k] - 1) * spacing[k]) } };
+    const { dims, affine } = window.intervale.live.dataset; // axes parallel to the world's
+    return { points, most, box: { min: [3, 7, 11].map((k) => affine[k]), max: [3, 7, 11].map((k, i) => affine[k] + (dims[i] - 1) * affine[5 * i]) } };
   });
 }
 

@@ -4,9 +4,9 @@
 import { BufferAttribute, BufferGeometry, LineSegments, type Material, Mesh, Scene, Sphere, Vector3 } from 'three';
 import { type Frame, toDrawing } from './frame';
 import type { SurfaceMaterials } from './materials';
-import type { SurfaceChange, SurfacePiece, Vec3 } from './messages';
+import type { SurfaceChange, SurfacePiece } from './messages';
 import type { Uploader } from './upload';
-import { add, center, diagonal } from './vec';
+import { applied, boxAround, center, corners, diagonal } from './vec';
 
 interface PieceObjects {
   mesh: Mesh;
@@ -107,9 +107,7 @@ export class BoundarySurfaceView {
 
 // In drawing space.
 function boundingSphere(piece: SurfacePiece, frame: Frame): Sphere {
-  const { origin, spacing } = frame;
-  const world = (p: Vec3): Vec3 => add(origin, [p[0] * spacing[0], p[1] * spacing[1], p[2] * spacing[2]]);
-  const box = { min: world(piece.min), max: world(piece.max) };
+  const box = boxAround(corners(piece).map((corner) => applied(frame.affine, corner)));
   return new Sphere(new Vector3(...toDrawing(frame, center(box))), diagonal(box) / 2);
 }
 

@@ -1,11 +1,13 @@
 // The list of the server's data sets: GET api/datasets, relative to the page.
-import type { Vec3 } from './messages';
+import type { Affine, Vec3 } from './messages';
 
 export interface Dataset {
   name: string;
   dims: Vec3; // samples
-  spacing: Vec3;
-  origin: Vec3;
+  affine: Affine; // from samples to the world
+  unit: string; // of length; empty if not known, as the next two
+  field: string; // what the values are
+  fieldUnit: string; // of the values
   range: [number, number]; // closed, field units; may be infinite
   values: [number, number]; // the least and the greatest of the field
   hasEveryRange: boolean; // range is then from -Infinity to Infinity
@@ -46,6 +48,10 @@ export function streamUrl(): string {
 const number = (x: unknown): number => (x === 'inf' ? Infinity : x === '-inf' ? -Infinity : typeof x === 'number' ? x : 0);
 const vec = (x: unknown): Vec3 => (Array.isArray(x) && x.length === 3 ? [number(x[0]), number(x[1]), number(x[2])] : [0, 0, 0]);
 
+const text = (x: unknown): string => (typeof x === 'string' ? x : '');
+const kIdentity: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
+const affine = (x: unknown): Affine => (Array.isArray(x) && x.length === 12 ? (x.map(number) as Affine) : kIdentity);
+
 // null: not a data set.
 function parsed(entry: unknown): Dataset | null {
   const d = entry as Record<string, unknown>;
@@ -57,8 +63,10 @@ function parsed(entry: unknown): Dataset | null {
   return {
     name: d['name'],
     dims: vec(d['dims']),
-    spacing: vec(d['spacing']),
-    origin: vec(d['origin']),
+    affine: affine(d['affine']),
+    unit: text(d['unit']),
+    field: text(d['field']),
+    fieldUnit: text(d['field_unit']),
     range: [number(range[0]), number(range[1])],
     values: [number(values['least']), number(values['greatest'])],
     hasEveryRange,

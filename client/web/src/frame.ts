@@ -1,25 +1,23 @@
 // The coordinate frame of the graphics card ("drawing space"): world coordinates relative to the centre of the data, so
 // that float32 is precise enough wherever the data lies.
 import type { Dataset } from './datasets';
-import type { Box, Vec3 } from './messages';
-import { center, sub } from './vec';
+import type { Affine, Box, Vec3 } from './messages';
+import { applied, boxAround, center, corners, length, sub } from './vec';
 
 export interface Frame {
-  spacing: Vec3;
-  origin: Vec3; // of the data: its first sample, world coordinates
-  box: Box; // of the data, world coordinates
+  affine: Affine; // from samples to the world
+  leastSpacing: number; // the least distance of neighbouring samples on an axis, world units
+  box: Box; // around the data, world coordinates
   center: Vec3; // of that box
   coarsestLevel: number; // of detail; at least 1
 }
 
-export function frameOf({ dims, spacing, origin }: Dataset): Frame {
-  const far = origin.map((o, i) => o + spacing[i]! * (dims[i]! - 1));
-  const box: Box = {
-    min: origin.map((o, i) => Math.min(o, far[i]!)) as Vec3,
-    max: origin.map((o, i) => Math.max(o, far[i]!)) as Vec3,
-  };
+export function frameOf({ dims, affine }: Dataset): Frame {
+  const last = dims.map((n) => n - 1) as Vec3;
+  const box = boxAround(corners({ min: [0, 0, 0], max: last }).map((corner) => applied(affine, corner)));
   const coarsestLevel = Math.max(1, Math.ceil(Math.log2(Math.max(...dims) - 1)) - 1);
-  return { spacing, origin, box, center: center(box), coarsestLevel };
+  const leastSpacing = Math.min(...[0, 1, 2].map((j) => length([affine[j]!, affine[4 + j]!, affine[8 + j]!])));
+  return { affine, leastSpacing, box, center: center(box), coarsestLevel };
 }
 
 // From world coordinates to drawing space.

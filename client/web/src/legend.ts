@@ -5,12 +5,13 @@ import { short } from './format';
 import type { ViewState } from './state';
 import type { Thickness } from './thickness';
 
-export function showLegend(view: Readonly<ViewState>, { isAvailable, maximum }: Thickness): void {
+// unit: of length.
+export function showLegend(view: Readonly<ViewState>, { isAvailable, maximum }: Thickness, unit: string): void {
   const showsThickness = view.thickness && isAvailable;
   element('legend').hidden = !showsThickness && !view.levels;
   if (showsThickness) {
     const labels = ['0', short(maximum / 2), `${short(maximum)} or more`];
-    fill('Thickness along the line of sight, world units', labels, kThicknessColors);
+    fill(`Thickness along the line of sight, ${unit}`, labels, kThicknessColors);
   } else if (view.levels) {
     fill('Level of detail', ['finest', '', 'coarsest'], kLevelColors);
   }

@@ -78,7 +78,7 @@ class Page {
       const pose = viewer.pose();
       if (pose) showAxes(element<SVGSVGElement>('axes'), pose);
       this.handles.place();
-      showLegend(view.value, viewer.picture.thickness);
+      showLegend(view.value, viewer.picture.thickness, status.value.dataset?.unit || 'world units');
     };
   }
 

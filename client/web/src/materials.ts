@@ -1,6 +1,6 @@
 // The materials, and the uniforms that they share.
 import {
-  Color, CustomBlending, DoubleSide, GLSL3, type IUniform, NoBlending, OneFactor, OneMinusSrcAlphaFactor,
+  Color, CustomBlending, DoubleSide, GLSL3, type IUniform, Matrix3, NoBlending, OneFactor, OneMinusSrcAlphaFactor,
   RawShaderMaterial, type ShaderMaterialParameters, SrcAlphaFactor, Vector2, Vector3, Vector4, ZeroFactor,
 } from 'three';
 import * as shaders from './shaders';
@@ -8,7 +8,8 @@ import { kSurfaces, type SurfaceName, type SurfaceStyle } from './state';
 
 // All materials refer to these objects: a value set here holds for each of them. Positions are in drawing space.
 export const shared = {
-  spacing: { value: new Vector3(1, 1, 1) },
+  fromSamples: { value: new Matrix3() }, // the affine without its shift
+  leastSpacing: { value: 1 }, // see frame.ts
   shift: { value: new Vector3() },
   clip: { value: new Vector4(0, 0, 0, 0) },
   hiddenMin: { value: new Vector3(1, 1, 1) },

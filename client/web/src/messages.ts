@@ -2,10 +2,14 @@
 // draws.
 //
 // Positions are in samples (0 at the first, dims - 1 at the last) unless said otherwise, so that float32 is precise
-// enough; world = origin + spacing * position. Cameras, planes and boxes are in world coordinates.
+// enough; the data set's affine takes them to the world. Cameras, planes and boxes are in world coordinates.
 import type { Pose } from './camera';
 
 export type Vec3 = [number, number, number];
+
+// 3 x 4 numbers, row by row: world = A * position + t, where A is the first three columns and t the fourth. A may turn,
+// shear and mirror.
+export type Affine = [number, number, number, number, number, number, number, number, number, number, number, number];
 
 export interface Box {
   min: Vec3;
@@ -86,7 +90,7 @@ export interface Progress {
 // The triangles of the mesh's boundary surface in one part of the data's box. 16 bytes per vertex: x, y, z as float32;
 // the normal in world space as int8 of length 127 (averaged over the triangles of the vertex's own surface, or that of
 // the box's face); the level of detail as uint8: the scale of the triangles around it, 0 the finest.
-// Triangles: three uint32 indices, counterclockwise seen from outside; first those on the alpha surface, then those on
+// Triangles: three uint32 indices, counterclockwise seen from outside in the world; first those on the alpha surface, then those on
 // beta, then those on the faces of the data's box.
 export interface SurfacePiece {
   id: number;

@@ -62,8 +62,9 @@ function watchSurfaces(view: Store<ViewState>, status: Store<Status>): void {
   const showValues = () => {
     const { dataset } = status.value;
     const range = dataset && (rangeOf(dataset, view.value.range) ?? dataset.range);
-    setText(element('alpha-value'), range ? `field = ${short(range[0])}` : '');
-    setText(element('beta-value'), range ? `field = ${short(range[1])}` : '');
+    const value = (x: number) => `${dataset?.field || 'field'} = ${short(x)} ${dataset?.fieldUnit ?? ''}`.trimEnd();
+    setText(element('alpha-value'), range ? value(range[0]) : '');
+    setText(element('beta-value'), range ? value(range[1]) : '');
   };
   status.watch(['dataset'], showValues);
   view.watch(['range'], showValues);

@@ -59,8 +59,10 @@ export class Picture {
 
   // Another data set: nothing of the last one is shown any more.
   open(frame: Frame): void {
-    shared.spacing.value.set(...frame.spacing);
-    shared.shift.value.set(...toDrawing(frame, frame.origin));
+    const [a, b, c, x, d, e, f, y, g, h, i, z] = frame.affine;
+    shared.fromSamples.value.set(a, b, c, d, e, f, g, h, i);
+    shared.shift.value.set(...toDrawing(frame, [x, y, z]));
+    shared.leastSpacing.value = frame.leastSpacing;
     shared.coarsestLevel.value = frame.coarsestLevel;
     this.surface.clear();
     this.setCap(frame, null);

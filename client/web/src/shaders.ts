@@ -10,9 +10,10 @@ precision highp int;
 // Vertex shaders: from samples to drawing space (vPosition, see frame.ts) and to clip space.
 const kTransform = `
 uniform mat4 viewMatrix, projectionMatrix;
-uniform vec3 spacing, shift;
+uniform mat3 fromSamples;
+uniform vec3 shift;
 out vec3 vPosition;
-vec3 drawing_position(uvec3 bits) { return spacing * uintBitsToFloat(bits) + shift; }
+vec3 drawing_position(uvec3 bits) { return fromSamples * uintBitsToFloat(bits) + shift; }
 void transform(vec3 p) {
   vPosition = p;
   gl_Position = projectionMatrix * viewMatrix * vec4(p, 1.0);
@@ -119,14 +120,13 @@ export const kEdgeFragment = `${kPrecision}
 in vec3 vNormal;
 flat in float vLevel;
 uniform vec4 lineColor;
-uniform vec3 spacing;
-uniform float pixelScale;
+uniform float leastSpacing, pixelScale;
 ${kClipping}
 out vec4 fragColor;
 void main() {
   discard_clipped();
   // About the length of an edge on screen. Short edges fade: where many lie close together they would merge to black.
-  float pixels = exp2(vLevel) * min(spacing.x, min(spacing.y, spacing.z)) * pixelScale * gl_FragCoord.w;
+  float pixels = exp2(vLevel) * leastSpacing * pixelScale * gl_FragCoord.w;
   fragColor = vec4(lineColor.rgb, lineColor.a * clamp(pixels / 8.0, 0.12, 1.0));
 }`;
 

@@ -1,5 +1,5 @@
 // Vectors of three doubles, and boxes: for cameras and planes.
-import type { Box, Vec3 } from './messages';
+import type { Affine, Box, Vec3 } from './messages';
 
 export const kAxes: readonly Vec3[] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 export const clamp = (x: number, least: number, greatest: number): number => Math.min(greatest, Math.max(least, x));
@@ -25,6 +25,18 @@ export function rotated(v: Vec3, axis: Vec3, angle: number): Vec3 {
   const c = Math.cos(angle);
   const s = Math.sin(angle);
   return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
+}
+
+// The affine's image of a point.
+export function applied(m: Affine, p: Vec3): Vec3 {
+  const row = (i: number) => m[i]! * p[0] + m[i + 1]! * p[1] + m[i + 2]! * p[2] + m[i + 3]!;
+  return [row(0), row(4), row(8)];
+}
+
+// The box around some points.
+export function boxAround(points: Vec3[]): Box {
+  const over = (pick: (...numbers: number[]) => number) => [0, 1, 2].map((i) => pick(...points.map((p) => p[i]!))) as Vec3;
+  return { min: over(Math.min), max: over(Math.max) };
 }
 
 export const center = (b: Box): Vec3 => scale(add(b.min, b.max), 0.5);

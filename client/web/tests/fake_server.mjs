@@ -19,7 +19,7 @@ const kPolicy =
   "connect-src 'self' ws: wss:; worker-src 'self'; font-src 'self'";
 // The name selects what the worker simulates: see fake_worker.js.
 const kDatasets = ['gyroid', 'lost', 'broken', 'full'].map((name) => ({
-  name, scope: 'one', dims: [49, 49, 49], spacing: [1, 1, 1], origin: [-24, -24, -24], range: [-0.45, 0.75], refine: 'boundary',
+  name, scope: 'one', dims: [49, 49, 49], affine: [1, 0, 0, -24, 0, 1, 0, -24, 0, 0, 1, -24], range: [-0.45, 0.75], refine: 'boundary',
   values: { least: -1.5, greatest: 1.5 }, step: 0.001, max_error: 0.61, updates: 48000, coefficients: 90000,
   full: { vertices: 41000, tets: 197000, indexed_bytes: 3.6e6 },
 }));

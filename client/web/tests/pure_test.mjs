@@ -11,8 +11,8 @@ const server = await createServer({
   appType: 'custom',
 });
 const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
-const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec'];
-const [{ fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec] = await Promise.all(kModules.map(load));
+const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame'];
+const [{ fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec, frame] = await Promise.all(kModules.map(load));
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -163,6 +163,24 @@ test('a region stays within the data, and min below max', () => {
     now = i % 3 ? region.faceMoved(now, within, i % 2, i % 5 ? 'min' : 'max', random(-40, 40)) : region.wholeMoved(now, within, randomVec(40));
     for (const axis of [0, 1, 2]) assert.ok(now.min[axis] >= -1e-9 && now.max[axis] <= within.max[axis] + 1e-9 && now.min[axis] < now.max[axis]);
   }
+});
+
+test('a frame has the box around the corners of any grid', () => {
+  for (let i = 0; i < 200; ++i) {
+    const affine = Array.from({ length: 12 }, () => random(-3, 3));
+    const dims = [0, 1, 2].map(() => Math.floor(random(2, 50)));
+    const { box, leastSpacing } = frame.frameOf({ dims, affine });
+    for (const axis of [0, 1, 2]) {
+      const row = affine.slice(4 * axis, 4 * axis + 4);
+      const reach = (sign) => row[3] + [0, 1, 2].reduce((sum, k) => sum + (row[k] * sign > 0 ? row[k] * (dims[k] - 1) : 0), 0);
+      assertNear(box.min[axis], reach(-1));
+      assertNear(box.max[axis], reach(1));
+      assert.ok(leastSpacing <= vec.length([affine[axis], affine[4 + axis], affine[8 + axis]]) + 1e-9);
+    }
+  }
+  const plain = frame.frameOf({ dims: [3, 4, 5], affine: [0.5, 0, 0, -1, 0, 2, 0, 3, 0, 0, 1, 0] });
+  assert.deepEqual(plain.box, { min: [-1, 3, 0], max: [0, 9, 4] });
+  assert.equal(plain.leastSpacing, 0.5);
 });
 
 test('numbers have the digits that are significant', () => {
