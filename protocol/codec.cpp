@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <utility>
 
 #include "common/codec/split_names.h"
+#include "common/codec/value_table.h"
 #include "common/diamond/domain.h"
 #include "protocol/stream_generated.h"
 
@@ -69,9 +71,10 @@ Offset<fbs::Description> encode_description(FlatBufferBuilder& out, const Descri
   const auto label = [&out](const std::string& text) { return text.empty() ? Offset<flatbuffers::String>() : out.CreateString(text); };
   const auto unit = label(d.labels.unit), field = label(d.labels.field), field_unit = label(d.labels.field_unit);
   const ValueFormat& format = d.format;
+  const auto table = format.table ? out.CreateVector(encode_value_table(*format.table)) : 0;
   return fbs::CreateDescription(out, name, &dims, d.range.alpha, d.range.beta, std::uint8_t(d.refine), d.max_error, d.updates, d.coefficients,
                                 d.full.vertices, d.full.tets, d.content_hash, std::uint8_t(format.type), format.step, format.first, format.last,
-                                d.is_exact, corners, weights, d.has_every_range, affine, unit, field, field_unit);
+                                d.is_exact, corners, weights, d.has_every_range, affine, unit, field, field_unit, table);
 }
 
 Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
@@ -158,6 +161,13 @@ Result<void> decode_values(const fbs::Description& wire, Description& d) {
   const std::size_t weights = weight_count(d.grid);
   if (VectorLength(wire.weights()) != weights) return malformed("a description does not have the weights of its levels");
   d.format = {SampleType(wire.type()), wire.step(), wire.first(), wire.last()};
+  if (has_table(d.format.step, d.format.type)) {
+    if (VectorLength(wire.value_table()) > kMaxTableBytes || wire.last() >= kMaxTableValues) return malformed("the table of values is too large");
+    if (wire.value_table() == nullptr) return malformed("a description has no table of values");
+    auto table = decode_value_table({wire.value_table()->data(), wire.value_table()->size()}, std::size_t(wire.last()) + 1);
+    if (!table) return malformed(table.error().message);
+    d.format.table = std::make_shared<const std::vector<double>>(std::move(*table));
+  }
   d.is_exact = wire.is_exact();
   std::copy(wire.corners()->begin(), wire.corners()->end(), d.corners.begin());
   for (std::size_t i = 0; i < weights; ++i) weight_at(d.weights, i) = wire.weights()->Get(flatbuffers::uoffset_t(i));
@@ -258,6 +268,12 @@ std::vector<std::uint8_t> encode(const ServerMessage& message) {
   };
   out.Finish(std::visit([&](const auto& m) { return body(encode_body(out, m)); }, message));
   return finished(out);
+}
+
+Result<void> check_sendable(const Description& description) {
+  const auto& table = description.format.table;
+  if (!table || (table->size() <= kMaxTableValues && encode_value_table(*table).size() <= kMaxTableBytes)) return {};
+  return fail("the table of its " + std::to_string(table->size()) + " exact values is too large for a message: build it with --step S to serve it");
 }
 
 Result<ClientMessage> decode_client_message(Bytes bytes) {

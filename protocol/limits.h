@@ -21,7 +21,11 @@ inline constexpr std::size_t kMaxBatchPayload = 128 << 10;
 // besides it.
 inline constexpr std::size_t kBatchEnvelope = 160;
 
-// Largest message from the server: a Batch. An Opened is much smaller.
+// Largest table of values in a Description: as it is coded, and the number of its values. An Opened has room for it.
+inline constexpr std::size_t kMaxTableBytes = 120 << 10;
+inline constexpr std::size_t kMaxTableValues = 128 << 10;
+
+// Largest message from the server: a Batch. An Opened is smaller.
 inline constexpr std::size_t kMaxServerMessage = kMaxBatchPayload + kBatchEnvelope;
 
 // Smallest bound on a payload: large against the envelope, and small enough that a client can use up its byte budget.

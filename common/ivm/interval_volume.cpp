@@ -25,6 +25,7 @@ std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& pa
   h = hash(&step, sizeof step, h);
   const std::uint64_t format[4] = {std::uint64_t(d.format.type), std::uint64_t(d.format.first), d.format.last, std::uint64_t(d.is_exact)};
   h = hash(format, sizeof format, h);
+  if (d.format.table) h = hash(std::span<const double>(*d.format.table), h);
   h = hash(std::span<const ValueKey>(d.corners), h);
   h = hash(&d.weights, sizeof d.weights, h);
   for (const SupercubeSet::Brick& b : parts.set.bricks()) {
@@ -76,7 +77,8 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
 }
 
 std::size_t IntervalVolume::memory_bytes() const {
-  return sizeof *this + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() + error_steps_.size() * sizeof(float) + relevant_.memory_bytes();
+  return sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
+         error_steps_.size() * sizeof(float) + relevant_.memory_bytes();
 }
 
 }  // namespace intervale

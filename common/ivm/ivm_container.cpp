@@ -37,13 +37,14 @@ constexpr std::size_t kMostHeadBytes = sizeof(Header) + kMaxStreams * sizeof(Ent
 
 constexpr std::uint32_t bit_of(StreamType type) { return std::uint32_t(1) << std::uint32_t(type); }
 
-// The types of a scope's streams, as bits.
+// The types of a scope's streams, as bits. A file has all of them, but kSometimes only if needed.
 constexpr std::uint32_t kCommon =
     bit_of(StreamType::field) | bit_of(StreamType::weights) | bit_of(StreamType::page_index) | bit_of(StreamType::pages) | bit_of(StreamType::labels);
 constexpr std::uint32_t kStatistics = bit_of(StreamType::histogram) | bit_of(StreamType::volumes);
 constexpr std::uint32_t kForPeople = kStatistics | bit_of(StreamType::labels);  // what a mesh can do without
+constexpr std::uint32_t kSometimes = bit_of(StreamType::value_table);
 constexpr std::uint32_t types_of(Scope scope) {
-  if (scope == Scope::every_range) return kCommon | kStatistics;
+  if (scope == Scope::every_range) return kCommon | kStatistics | kSometimes;
   return ((std::uint32_t(1) << kStreamTypes) - 2) & ~kStatistics;
 }
 
@@ -81,7 +82,7 @@ Result<void> check_entries(const Head& head) {
     found |= bit;
   }
   if (next != head.header.file_bytes) return fail("bytes after the last stream");
-  for (const int type : set_bits(types_of(head.scope()) & ~found))
+  for (const int type : set_bits(types_of(head.scope()) & ~kSometimes & ~found))
     return fail(name_of(std::uint32_t(type)) + " is missing: an older program wrote the file, or it is damaged; build it again");
   return {};
 }
@@ -149,7 +150,8 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
 }  // namespace
 
 std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, const Streams& streams) {
-  const std::uint32_t types = types_of(scope);
+  std::uint32_t types = types_of(scope);
+  if (streams[StreamType::value_table].empty()) types &= ~bit_of(StreamType::value_table);
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   header.version = kIvmVersion;

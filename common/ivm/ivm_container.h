@@ -33,8 +33,10 @@ enum class StreamType : std::uint32_t {
   error_steps = 13,
   // both
   labels = 14,
+  // both, if values need a table
+  value_table = 15,
 };
-inline constexpr std::uint32_t kStreamTypes = 15;  // and one more, as 0 is none
+inline constexpr std::uint32_t kStreamTypes = 16;  // and one more, as 0 is none
 
 enum class Scope { every_range, one_range };
 
@@ -62,8 +64,8 @@ void append(std::vector<std::byte>& out, std::span<const T> values) {
 // The file's bytes.
 [[nodiscard]] std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, const Streams& streams);
 
-// A file from outside: its header, table and checksums are in order, and it has exactly the streams of its scope. Pages
-// have checksums of their own, which whoever reads them must check.
+// A file from outside: its header, table and checksums are in order, and it has the streams of its scope. Pages have
+// checksums of their own, which whoever reads them must check. value_table is empty if the file has none.
 class Container {
  public:
   // The file must outlive the result. Fails, in one line, if it is not a file of this scope.

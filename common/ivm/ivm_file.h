@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
-#include "common/ivm/ivm_container.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 

@@ -103,8 +103,11 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
   append_labels(streams, d.labels);
   append_statistics(d, streams[StreamType::histogram], streams[StreamType::volumes]);
   const auto &index = streams[StreamType::page_index], &field = streams[StreamType::field];
-  const std::uint64_t pages_hash = XXH3_64bits(index.data(), index.size());
-  return make_container(Scope::every_range, XXH3_64bits_withSeed(field.data(), field.size(), pages_hash), streams);
+  const auto& table = streams[StreamType::value_table];
+  std::uint64_t hash = XXH3_64bits(index.data(), index.size());
+  hash = XXH3_64bits_withSeed(field.data(), field.size(), hash);
+  if (!table.empty()) hash = XXH3_64bits_withSeed(table.data(), table.size(), hash);
+  return make_container(Scope::every_range, hash, streams);
 }
 
 Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {

@@ -7,9 +7,12 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/codec/value_table.h"
 #include "common/ivm/value_page.h"
 
 namespace intervale {
@@ -41,6 +44,17 @@ FieldRecord record_of(const PagedValues& v, bool is_exact) {
   return r;
 }
 
+// The table of values, if the format has one. A writer keeps hardly more values than the pages have.
+Result<void> read_table(const Container& file, ValueFormat& format) {
+  const auto stored = file[StreamType::value_table];
+  if (!has_table(format.step, format.type)) return stored.empty() ? Result<void>() : fail("a table of values does not belong to these values");
+  if (format.last / kValuesPerByte > file.file_bytes()) return fail("the file claims more values than it can hold");
+  auto table = decode_value_table(octets(stored), std::size_t(format.last) + 1);
+  if (!table) return tl::unexpected(table.error());
+  format.table = std::make_shared<const std::vector<double>>(std::move(*table));
+  return {};
+}
+
 template <class D>
 Result<void> read_record(const Container& file, D& d) {
   FieldRecord r;
@@ -52,6 +66,7 @@ Result<void> read_record(const Container& file, D& d) {
   if (auto ok = check_grid(d.grid); !ok) return ok;
   if (r.type >= std::uint32_t(kSampleTypes)) return fail("the type of the samples is unknown");
   d.format = {SampleType(r.type), r.step, r.first, r.last};
+  if (auto ok = read_table(file, d.format); !ok) return ok;
   if (auto ok = check_value_format(d.format); !ok) return ok;
   if (r.is_exact > 1) return fail("the field's record is damaged");
   d.is_exact = r.is_exact != 0;
@@ -94,6 +109,7 @@ void append_values(Streams& streams, const PagedValues& values, bool is_exact, c
   parallel(pages.size(), [&](std::size_t page) { coded[page] = encode_page(values, pages[page]); });
   const FieldRecord field = record_of(values, is_exact);
   append(streams[StreamType::field], std::span(&field, 1));
+  if (values.format.table) append<std::uint8_t>(streams[StreamType::value_table], encode_value_table(*values.format.table));
   const auto scales = std::size_t(Domain(values.grid.dims).levels());
   append(streams[StreamType::weights], std::span<const PredictorWeights>(&values.weights.of[0][0], scales * 3));
   for (auto& page : coded) {

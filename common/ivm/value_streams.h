@@ -13,7 +13,7 @@ namespace intervale {
 // No page has more values in a byte, and no error step takes less either: no bit is less probable than 1/1040.
 inline constexpr std::uint64_t kValuesPerByte = 8192;
 
-// Writes field, weights, page_index and pages. The same bytes whatever `parallel` is.
+// Writes field, weights, page_index, pages, and value_table if the format has one. The same bytes whatever `parallel` is.
 void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel);
 
 // The inverse, of bytes from outside. read_field() sets and checks grid, format, corners, max_error and is_exact.

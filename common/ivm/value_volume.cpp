@@ -27,7 +27,9 @@ std::uint64_t updated_slots(const Domain& domain, int scale, Vertex position) {
 
 ValueVolume::ValueVolume(Parts parts) : parts_(std::move(parts)), domain_(parts_.description.grid.dims) {}
 
-std::size_t ValueVolume::memory_bytes() const { return parts_.set.memory_bytes() + parts_.keys.memory_bytes() + parts_.error_levels.size(); }
+std::size_t ValueVolume::memory_bytes() const {
+  return description().format.memory_bytes() + parts_.set.memory_bytes() + parts_.keys.memory_bytes() + parts_.error_levels.size();
+}
 
 double ValueVolume::error_of_level(double max_error, ErrorLevel level) {
   if (level == 0) return 0;

@@ -243,6 +243,7 @@ Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>&
   for (const float error : errors_) parts.steps.push_back(std::uint8_t(step_of(error)));
   parts.keys = ValueKeys(set_.size(), format->last);
   find_keys(volume_, *format, set_, parts.keys);
+  drop_unused_values(d.format, d.corners, parts.keys);
   d.weights = fit_weights(parts, on_all_cores);
   std::vector<BrickPart> by_brick(set_.bricks().size());
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <span>
-#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "common/diamond/domain.h"
 #include "common/util/bits.h"
+#include "server/builder/value_steps.h"
 
 namespace intervale {
 namespace {
@@ -25,13 +27,7 @@ class KeyAt {
   // Of the sample that a vertex clamps to.
   ValueKey operator()(Vertex v) const { return of(index(domain_.clamp(v))); }
   // Of a sample, by its place among the samples.
-  [[nodiscard]] ValueKey of(std::size_t sample) const {
-    if constexpr (std::is_integral_v<T>) {
-      return ValueKey(samples_[sample]) - ValueKey(format_.first);  // modulo 2^32
-    } else {
-      return format_.key(double(samples_[sample]));
-    }
-  }
+  [[nodiscard]] ValueKey of(std::size_t sample) const { return key_of_sample(format_, samples_[sample]); }
   [[nodiscard]] std::size_t index(Vertex v) const { return std::size_t(v.z) * slice_ + std::size_t(v.y) * row_ + std::size_t(v.x); }
 
  private:
@@ -85,6 +81,26 @@ std::array<ValueKey, kRootVertices> corner_keys(const Volume& volume, const Valu
     for (int v = 0; v < kRootVertices; ++v) keys[std::size_t(v)] = key(root.vertex(v));
   });
   return keys;
+}
+
+void drop_unused_values(ValueFormat& format, std::array<ValueKey, kRootVertices>& corners, ValueKeys& keys) {
+  if (!format.table) return;
+  const std::vector<double>& table = *format.table;
+  std::vector<bool> is_used(table.size());
+  is_used.front() = is_used.back() = true;
+  for (const ValueKey key : corners) is_used[key] = true;
+  for (std::size_t i = 0; i < keys.size(); ++i) is_used[keys[i]] = true;
+  std::vector<ValueKey> rank(table.size());  // among those that are used
+  std::vector<double> used;
+  for (std::size_t key = 0; key < table.size(); ++key) {
+    rank[key] = ValueKey(used.size());
+    if (is_used[key]) used.push_back(table[key]);
+  }
+  for (ValueKey& key : corners) key = rank[key];
+  ValueKeys ranked(keys.size(), ValueKey(used.size() - 1));
+  for (std::size_t i = 0; i < keys.size(); ++i) ranked.set(i, rank[keys[i]]);
+  keys = std::move(ranked);
+  format = format_of_table(format.type, std::move(used));
 }
 
 bool has_exact_values(const Volume& volume, const ValueFormat& format) {

@@ -16,6 +16,10 @@ void find_keys(const Volume& volume, const ValueFormat& format, const SupercubeS
 // The keys at the root's vertices, in local order.
 [[nodiscard]] std::array<ValueKey, kRootVertices> corner_keys(const Volume& volume, const ValueFormat& format);
 
+// If the format has a table: removes the values that are no key's, but for the least and the greatest one, and gives the
+// keys their new numbers.
+void drop_unused_values(ValueFormat& format, std::array<ValueKey, kRootVertices>& corners, ValueKeys& keys);
+
 // Whether every sample is the value of its key.
 [[nodiscard]] bool has_exact_values(const Volume& volume, const ValueFormat& format);
 

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <span>
-#include <type_traits>
+
+#include "server/builder/value_steps.h"
 
 namespace intervale {
 namespace {
@@ -32,13 +34,7 @@ Counts count(std::span<const T> samples, const BinOf& bin_of) {
 // Bins of `keys` keys each.
 Counts count_keys(const Volume& volume, const ValueFormat& format, ValueKey keys) {
   return visit_samples(volume, [&]<class T>(std::span<const T> samples) {
-    return count(samples, [&](T v) -> std::size_t {
-      if constexpr (std::is_integral_v<T>) {
-        return (ValueKey(v) - ValueKey(format.first)) / keys;  // the difference modulo 2^32
-      } else {
-        return format.key(double(v)) / keys;
-      }
-    });
+    return count(samples, [&](T v) -> std::size_t { return key_of_sample(format, v) / keys; });
   });
 }
 
@@ -50,12 +46,16 @@ ValueHistogram make_value_histogram(const Volume& volume, const ValueFormat& for
   Counts counts{};
   std::size_t bins = 1;
   if (format.step == 0 && format.last > 0) {
-    bins = kMostBins;
-    result.width = (greatest - least) / double(bins);
+    const double half = std::isfinite(greatest - least) ? 1 : 0.5;  // the difference of two doubles can overflow
+    const double span = greatest * half - least * half;
+    double width = span / double(kMostBins);
+    if (width * double(kMostBins) < span) width = std::nextafter(width, span);  // of few of the smallest doubles
+    bins = std::min(kMostBins, std::size_t(span / width) + 1);
+    result.width = width / half;
     counts = visit_samples(volume, [&](auto samples) {
       return count(samples, [&](auto v) {
-        const double along = format.value(format.key(double(v))) - least;
-        return std::min(bins - 1, std::size_t(along / (greatest - least) * double(bins)));
+        const double value = format.value(key_of_sample(format, v));
+        return std::min(bins - 1, std::size_t((value * half - least * half) / width));
       });
     });
   } else {

@@ -13,6 +13,7 @@
 #include <limits>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "common/util/decimal.h"
 #include "server/builder/exact_step.h"
@@ -139,8 +140,12 @@ ValueFormat format_of_numbers(double least, double greatest) {
 template <class T>
 Result<ValueFormat> exact_format(SampleType type, std::span<const T> samples, double least, double greatest) {
   if (type == SampleType::f32) return format_of_numbers(least, greatest);
-  if (const auto found = find_exact_format(type, all_distinct(samples), std::numeric_limits<ValueKey>::max() - 1)) return *found;
-  return misuse("these f64 samples have no exact step of at most 2^32 values; give a step greater than 0: --step S");
+  std::vector<double> values = all_distinct(samples);
+  if constexpr (std::is_floating_point_v<T>) {
+    if (const auto found = find_exact_format(type, values, std::numeric_limits<ValueKey>::max() - 1)) return *found;
+  }
+  if (values.size() > std::numeric_limits<ValueKey>::max()) return fail("the samples have more than 2^32 - 1 different values, and no exact step");
+  return format_of_table(type, std::move(values));
 }
 
 template <class T>
@@ -150,9 +155,7 @@ Result<ValueFormat> choose(SampleType type, std::span<const T> samples, std::opt
     if (step && *step != 0 && *step != 1) {
       return misuse(std::string("samples of type ") + name_of(type) + " are stored exactly: the step may be 0 or 1, not " + text_of(*step));
     }
-    if (greatest - least >= double(std::numeric_limits<ValueKey>::max())) {
-      return fail(std::string("the samples take all values of type ") + name_of(type) + ": at most 2^32 - 1 can be stored");
-    }
+    if (greatest - least >= double(std::numeric_limits<ValueKey>::max())) return exact_format(type, samples, least, greatest);
     return ValueFormat{type, 1, std::int64_t(least), ValueKey(greatest - least)};
   } else {
     if (step && !(*step >= 0 && std::isfinite(*step))) {
@@ -177,13 +180,7 @@ std::vector<ValueKey> keys_of(const Volume& volume, const ValueFormat& format) {
   std::vector<ValueKey> keys(volume.grid.sample_count());
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
     tbb::parallel_for(Indices(0, samples.size(), kGrain), [&](const Indices& part) {
-      for (std::size_t i = part.begin(); i < part.end(); ++i) {
-        if constexpr (std::is_integral_v<T>) {
-          keys[i] = ValueKey(samples[i]) - ValueKey(format.first);  // modulo 2^32
-        } else {
-          keys[i] = format.key(double(samples[i]));
-        }
-      }
+      for (std::size_t i = part.begin(); i < part.end(); ++i) keys[i] = key_of_sample(format, samples[i]);
     });
   });
   return keys;

@@ -32,7 +32,7 @@ std::string bars_of(const ValueHistogram& histogram) {
   for (std::size_t line = 0; line < sums.size(); ++line) {
     // The cube root shows small peaks beside large ones; a bar is never empty if there is a sample.
     const auto length = std::size_t(std::ceil(std::cbrt(double(sums[line]) / double(most)) * kWidth));
-    text += fmt::format("{:>12.6g} {}\n", histogram.least + double(line * bins) * histogram.width, std::string(length, '#'));
+    text += fmt::format("{:>12.6g} {}\n", std::fma(double(line * bins), histogram.width, histogram.least), std::string(length, '#'));
   }
   return text;
 }

@@ -5,6 +5,7 @@
 
 #include "common/util/printable.h"
 #include "common/util/utf8.h"
+#include "protocol/codec.h"
 #include "protocol/limits.h"
 
 namespace intervale {
@@ -26,6 +27,7 @@ Result<void> Catalogue::check_name(const std::string& name) {
 Result<void> Catalogue::add(Volume volume) {
   const std::string name = volume->description().name;
   if (auto valid = check_name(name); !valid) return valid;
+  if (auto fits = protocol::check_sendable(volume->description()); !fits) return fail("'" + name + "': " + fits.error().message);
   if (!volumes_.emplace(name, std::move(volume)).second) return fail("two data sets are named '" + name + "': rename one of the files");
   return {};
 }

@@ -20,7 +20,8 @@ class Catalogue {
   // Failure: the name is not a valid path segment of a URL, or not UTF-8.
   static Result<void> check_name(const std::string& name);
 
-  // Adds it under its description's name. Failure: the name is taken, or invalid.
+  // Adds it under its description's name. Failure: the name is taken, or invalid, or the description cannot be sent
+  // (protocol::check_sendable()).
   Result<void> add(Volume volume);
 
   [[nodiscard]] Volume find(std::string_view name) const;  // nullptr: none

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "common/ivm/load_volume.h"
+#include "protocol/codec.h"
 #include "server/serve/admission.h"
 
 namespace intervale {
@@ -90,6 +91,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
   file.last_warning.clear();
   auto volume = catching(path, [&] { return decode_volume(*bytes, name); });
   if (!volume) return skip(path.string() + ": " + volume.error().message);
+  if (auto fits = protocol::check_sendable(volume->description()); !fits) return skip(path.string() + ": " + fits.error().message);
   // It includes a hash of the contents.
   if (file.volume && file.volume->description() == volume->description()) return false;
   file.volume = std::make_shared<const IntervalVolume>(std::move(*volume));

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <random>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/builder/field_hierarchy.h"
 #include "server/serve/http_routes.h"
@@ -39,6 +41,19 @@ TEST(Catalogue, NamesAreUtf8) {
   const auto listed = respond({.method = "GET", .target = "/api/datasets", .scope = Scope::everything().get()},
                               {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
   EXPECT_EQ(listed.status, 200u) << "JSON can hold every name there is";
+}
+
+TEST(Catalogue, ADescriptionFitsAMessage) {
+  std::mt19937_64 random(1);
+  std::vector<double> samples(40 * 40 * 40);
+  for (double& v : samples) v = double(random());
+  Volume volume = testing::volume_of_type(SampleType::f64, {40, 40, 40}, samples);
+  volume.name = "noise";
+  Catalogue catalogue;
+  const auto added = catalogue.add(std::make_shared<const IntervalVolume>(FieldHierarchy(volume, {.range = {1e18, 2e18}}).compact().value()));
+  ASSERT_FALSE(added);
+  EXPECT_THAT(added.error().message, HasSubstr("'noise': the table of its "));
+  EXPECT_THAT(added.error().message, HasSubstr("--step S"));
 }
 
 TEST(Catalogue, NamesAreUniquePathSegmentsOfAUrl) {

@@ -10,6 +10,7 @@
 #include <memory>
 #include <random>
 
+#include "common/ivm/ivm_container.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_page.h"
 #include "common/ivm/verify.h"

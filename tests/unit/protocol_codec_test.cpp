@@ -42,6 +42,13 @@ Description some_description() {
   return d;
 }
 
+Description described_by_table() {
+  Description d = some_description();
+  d.format = format_of_table(SampleType::f64, {-1e300, 0, 5e-324, 1, 1e300});
+  for (ValueKey& key : d.corners) key %= 5;
+  return d;
+}
+
 std::vector<ClientMessage> client_messages() {
   return {Open{"buckyball", "test 1", 262144},
           View{1, {}},
@@ -61,8 +68,9 @@ std::vector<ClientMessage> client_messages() {
 }
 
 std::vector<ServerMessage> server_messages() {
-  return {Opened{some_description(), {}}, Batch{1, 2, 3, 4.5, 5.5, 6, {7, 8, 9}}, Batch{}, Done{1, 22, true},
-          Fault{CloseCode::too_large, "too large"}};
+  return {
+      Opened{some_description(), {}},          Opened{described_by_table(), {}}, Batch{1, 2, 3, 4.5, 5.5, 6, {7, 8, 9}}, Batch{}, Done{1, 22, true},
+      Fault{CloseCode::too_large, "too large"}};
 }
 
 Result<ClientMessage> decode(const ClientMessage&, std::span<const std::uint8_t> bytes) { return decode_client_message(bytes); }
@@ -180,7 +188,7 @@ std::size_t described(const Bytes& bytes, std::size_t slot) {
   const std::size_t opened = target(bytes, field(bytes, target(bytes, 0), 1));
   return field(bytes, target(bytes, field(bytes, opened, 0)), slot);
 }
-constexpr std::size_t kType = 14, kCorners = 19, kWeights = 20;  // slots of the description
+constexpr std::size_t kType = 14, kLast = 17, kCorners = 19, kWeights = 20;  // slots of the description
 
 TEST(Codec, ADescriptionHasTheCornersAndWeightsOfItsGrid) {
   const Bytes good = encode(ServerMessage(Opened{some_description(), {}}));
@@ -195,6 +203,39 @@ TEST(Codec, ADescriptionHasTheCornersAndWeightsOfItsGrid) {
   for (const std::uint32_t count : {0u, 1u, 7u * 9 - 1, 8u * 9}) EXPECT_TRUE(refused(target(good, described(good, kWeights)), count, 4)) << count;
   EXPECT_TRUE(refused(described(good, kType), 8, 1)) << "no type of samples";
   EXPECT_FALSE(refused(described(good, kType), 7, 1));
+}
+
+TEST(Codec, ATableOfValuesHasTheSizeOfItsFormatAndFitsAMessage) {
+  const Bytes good = encode(ServerMessage(Opened{described_by_table(), {}}));
+  const auto refused = [&good](std::size_t slot, std::uint32_t value) {
+    Bytes bytes = good;
+    std::memcpy(bytes.data() + described(bytes, slot), &value, sizeof value);
+    return !decode_exact(ServerMessage{}, bytes);
+  };
+  for (const std::uint32_t last : {0u, 3u, 5u, 0xfffffffeu, 0xffffffffu}) EXPECT_TRUE(refused(kLast, last)) << last;
+  EXPECT_FALSE(refused(kLast, 4));
+  Opened opened{described_by_table(), {}};
+  opened.description.format.table = nullptr;
+  EXPECT_FALSE(decode_exact(ServerMessage{}, encode(ServerMessage(opened))));
+  std::mt19937_64 random(5);
+  const auto noise_of = [&random](std::size_t count) {
+    std::vector<double> values(count);
+    for (double& v : values) v = double(random()) * 1e-30;
+    std::sort(values.begin(), values.end());
+    return format_of_table(SampleType::f64, values);
+  };
+  std::size_t fitting = 0;
+  for (std::size_t count = 12000; count < 24000; count += 500) {
+    opened.description.format = noise_of(count);
+    const auto fits = check_sendable(opened.description);
+    const auto back = decode_exact(ServerMessage{}, encode(ServerMessage(opened)));
+    ASSERT_EQ(fits.has_value(), back.has_value());
+    if (!fits) continue;
+    ++fitting;
+    EXPECT_EQ(std::get<Opened>(*back).description.format, opened.description.format);
+    EXPECT_LE(encode(ServerMessage(opened)).size(), kMaxServerMessage);
+  }
+  EXPECT_TRUE(fitting > 0 && fitting < 24);
 }
 
 TEST(Codec, ADescriptionOfAnotherVersionKeepsWhatBothHave) {
