@@ -9,14 +9,10 @@
 #include "common/ivm/block_lattice.h"
 #include "common/ivm/saturate.h"
 #include "common/patch/key_sides.h"
+#include "common/util/round_up.h"
 
 namespace intervale {
 namespace {
-
-float round_up(double error) {
-  const float f = float(error);
-  return double(f) < error ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
-}
 
 // The lowest level among a diamond's nearest ancestors of scale 1 or coarser, which are all as large as its error. around:
 // at its supercube.

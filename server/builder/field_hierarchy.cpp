@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "common/diamond/supercube_neighbours.h"
@@ -14,6 +13,7 @@
 #include "common/ivm/value_page.h"
 #include "common/patch/tet_cases.h"
 #include "common/util/bits.h"
+#include "common/util/round_up.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/error_steps.h"
 #include "server/builder/error_to_distance.h"
@@ -104,12 +104,6 @@ double error_in_parallel(const DiamondErrors<T>& error_of, const Diamond& d, con
         return worst;
       },
       [](double a, double b) { return std::max(a, b); });
-}
-
-float round_up(double error) {
-  if (error >= std::numeric_limits<float>::max()) return std::numeric_limits<float>::max();
-  const float f = float(error);
-  return f < error ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
 }
 
 }  // namespace

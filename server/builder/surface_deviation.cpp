@@ -7,12 +7,12 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <span>
 
 #include "common/ivm/interval_volume.h"
 #include "common/util/bits.h"
+#include "common/util/round_up.h"
 #include "common/util/vec3.h"
 #include "server/builder/bisection.h"
 #include "server/builder/interpolation_error.h"
@@ -63,11 +63,6 @@ struct Cube {
   // those behind, which clamping makes flat.
   Vec3 most;
 };
-
-float round_up(double value) {
-  const float f = float(std::min(value, double(std::numeric_limits<float>::max())));
-  return double(f) < value ? std::nextafter(f, std::numeric_limits<float>::max()) : f;
-}
 
 // Sets a shared number to the larger of it and `value`.
 void raise(float& to, float value) {

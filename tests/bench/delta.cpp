@@ -15,6 +15,7 @@
 
 #include "common/diamond/supercube.h"
 #include "common/util/bits.h"
+#include "common/util/round_up.h"
 #include "server/builder/border_shape.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/interpolation_error.h"
@@ -27,11 +28,6 @@ constexpr const char* kTooSoon = "Delta wants a diamond split before its parents
 
 // A diamond's name: its centre in 63 bits.
 std::uint64_t id_of(Vertex c) { return std::uint64_t(c.x) | std::uint64_t(c.y) << 21 | std::uint64_t(c.z) << 42; }
-
-float round_up(double error) {
-  const float f = float(std::min(error, double(std::numeric_limits<float>::max())));
-  return double(f) < error ? std::nextafter(f, std::numeric_limits<float>::max()) : f;
-}
 
 // Offsets of a type's children in an array of samples; times h, or of class 2 times h / 2.
 using Steps = std::array<std::ptrdiff_t, kMaxChildren>;
