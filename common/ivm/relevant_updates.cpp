@@ -67,7 +67,6 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
       } else {
         for (const Slot slot : set_bits<Slot>(relevant)) most = std::max(most, errors.steps[first + count_below(occupancy, slot)]);
       }
-      count_ += std::uint64_t(std::popcount(relevant));
       supercube_step_[s] = most;
       if (relevant == 0) return;
       brick_step_[b] = std::max(brick_step_[b], most);

@@ -57,7 +57,6 @@ class RelevantUpdates {
                   std::vector<ErrorToDistance> error_to_distance);
 
   [[nodiscard]] const ShownRange& shown() const { return shown_; }
-  [[nodiscard]] std::uint64_t count() const { return count_; }
   // Of a supercube with this occupancy.
   [[nodiscard]] std::uint64_t slots(SupercubeIndex supercube, std::uint64_t occupancy) const {
     return slots_.empty() ? occupancy : slots_[supercube];
@@ -88,7 +87,6 @@ class RelevantUpdates {
   std::vector<float> error_;                        // by error step
   std::array<float, 256> factor_;                   // by code of an ErrorToDistance
   float reach_ = 0;                                 // the largest object error for h = 1: half a diamond's width
-  std::uint64_t count_ = 0;
 };
 
 }  // namespace intervale
