@@ -182,11 +182,10 @@ Result<Container> Container::open(std::span<const std::byte> file, Scope scope) 
   container.content_hash_ = head->header.content_hash;
   container.file_bytes_ = file.size();
   for (const Entry& e : head->entries) {
-    if (e.type == 0 || e.type >= kStreamTypes) continue;
     const auto bytes = file.subspan(e.offset, e.bytes);
     const bool is_pages = StreamType(e.type) == StreamType::pages;
     if (e.checksum != (is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size()))) return fail(name_of(e.type) + " is damaged (checksum)");
-    container.streams_[e.type] = bytes;
+    if (e.type < kStreamTypes) container.streams_[e.type] = bytes;
   }
   return container;
 }

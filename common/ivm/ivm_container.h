@@ -64,7 +64,8 @@ void append(std::vector<std::byte>& out, std::span<const T> values) {
 // The file's bytes.
 [[nodiscard]] std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, const Streams& streams);
 
-// A file from outside: its header, table and checksums are in order, and it has the streams of its scope. Pages have
+// A file from outside: its header, table and checksums are in order, and it has the streams of its scope; optional ones
+// of an unknown type are skipped, once their checksums were checked. Pages have
 // checksums of their own, which whoever reads them must check. value_table is empty if the file has none.
 class Container {
  public:

@@ -101,10 +101,9 @@ Result<RangeRecord> read_range(const Container& file, Description& d) {
   if (!(r.alpha <= r.beta)) return fail("invalid range: alpha is greater than beta");
   if (r.errors > std::uint32_t(kMaxErrorSteps)) return fail("the number of errors is out of range");
   if (r.updates / kValuesPerByte > file.file_bytes()) return fail("the file claims more values than it can hold");
-  if (r.bricks > r.supercubes || r.supercubes > r.updates || r.updates > r.supercubes * kSlots || r.coefficients > r.updates * kMostCuts ||
-      r.updates > std::numeric_limits<std::uint32_t>::max()) {
+  if (r.updates > std::numeric_limits<std::uint32_t>::max()) return fail("more updates than this program can read");
+  if (r.bricks > r.supercubes || r.supercubes > r.updates || r.updates > r.supercubes * kSlots || r.coefficients > r.updates * kMostCuts)
     return fail("the counts contradict each other");
-  }
   d.refine = Refine(r.refine);
   d.range = {r.alpha, r.beta};
   d.coefficients = r.coefficients;

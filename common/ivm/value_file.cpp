@@ -120,7 +120,7 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
   if (auto ok = read_field(*file, d); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_labels(*file, d.labels); !ok) return tl::unexpected(ok.error());
   // Sizes before contents.
-  if (d.grid.sample_count() > std::uint64_t(~std::uint32_t(0)) / 2) return fail("more samples than this program can read");
+  if (d.grid.sample_count() > kMostSamples) return fail("more samples than this program can read");
   if (d.grid.sample_count() / kValuesPerByte > bytes.size()) return fail("the file claims more values than it can hold");
   const Domain domain(d.grid.dims);
   if (auto ok = read_weights(*file, domain.levels(), parts.weights); !ok) return tl::unexpected(ok.error());

@@ -40,6 +40,8 @@ struct ValueHistogram {
 };
 inline constexpr std::size_t kMostBins = 256;
 
+inline constexpr std::uint64_t kMostSamples = 0x7fffffff;  // of a field; so that numbers of diamonds have 32 bits
+
 // What is known of a field besides its values.
 struct FieldDescription {
   std::string name;

@@ -127,6 +127,8 @@ Result<nlohmann::ordered_json> build_range(const BuildCommand& options, Volume& 
 
 // Of every range.
 Result<nlohmann::ordered_json> build_values(const BuildCommand& options, Volume& volume, std::string& text) {
+  if (volume.grid.sample_count() > kMostSamples)
+    return misuse("the volume has more than 2^31 - 1 samples, too many for every range: give --range LO HI");
   const auto format = choose_value_format(volume, options.step);
   if (!format) return tl::unexpected(format.error());
   Progress progress("building " + volume.name);

@@ -165,8 +165,8 @@ TEST(IvmFile, AFileOfTheOtherScopeIsRefused) {
   EXPECT_TRUE(load_values(every));
 }
 
-// The bytes of a file with one more stream, an empty one, behind its others.
-std::vector<std::byte> with_stream(std::vector<std::byte> bytes, std::uint32_t type, std::uint32_t flags) {
+// The bytes of a file with one more stream behind its others.
+std::vector<std::byte> with_stream(std::vector<std::byte> bytes, std::uint32_t type, std::uint32_t flags, std::span<const std::byte> contents = {}) {
   constexpr std::size_t kHeader = 40, kEntry = 32;
   const auto add = [&bytes](std::size_t at, std::uint64_t more, std::size_t size) {
     std::uint64_t number = 0;
@@ -182,21 +182,37 @@ std::vector<std::byte> with_stream(std::vector<std::byte> bytes, std::uint32_t t
   add(at, type, 4);
   add(at + 4, flags, 4);
   add(at + 8, bytes.size(), 8);
-  add(at + 24, XXH3_64bits(nullptr, 0), 8);
-  add(16, kEntry, 8);
+  add(at + 16, contents.size(), 8);
+  add(at + 24, XXH3_64bits(contents.data(), contents.size()), 8);
+  add(16, kEntry + contents.size(), 8);
   std::memset(&bytes[32], 0, 8);
   add(32, XXH3_64bits(bytes.data(), at + kEntry), 8);
+  bytes.insert(bytes.end(), contents.begin(), contents.end());
   return bytes;
 }
 
 TEST(IvmFile, StreamsThatAreUnknownAreSkippedOnlyIfTheySaySo) {
   const auto bytes = encode_ivm(small_volume());
-  const auto refusal = [&bytes](std::uint32_t type, std::uint32_t flags) {
-    const auto decoded = decode_exact(with_stream(bytes, type, flags));
-    return decoded ? std::string() : decoded.error().message;
+  Volume volume = testing::digits({5, 4, 6}, 1);
+  const auto every = encode_values(build_value_volume(volume, choose_value_format(volume, {}).value()));
+  const std::vector<std::byte> contents(77, std::byte(5));
+  const auto refusal_of = [](const std::vector<std::byte>& file) {
+    const auto one = decode_exact(file);
+    const auto values = decode_values(file, "every");
+    EXPECT_FALSE(one && values);
+    return one || values ? std::string() : one.error().message + values.error().message;
   };
-  EXPECT_EQ(refusal(40, 1), "");
-  EXPECT_THAT(refusal(40, 0), HasSubstr("stream 40 is unknown; use a newer program"));
+  for (const auto& file : {bytes, every}) {
+    EXPECT_EQ(refusal_of(with_stream(file, 40, 1, contents)), "");
+    EXPECT_EQ(refusal_of(with_stream(file, 40, 1)), "");
+    EXPECT_THAT(refusal_of(with_stream(file, 40, 0, contents)), HasSubstr("stream 40 is unknown; use a newer program"));
+    auto damaged = with_stream(file, 40, 1, contents);
+    damaged.back() ^= std::byte(1);
+    EXPECT_THAT(refusal_of(damaged), HasSubstr("stream 40 is damaged (checksum)"));
+    damaged.pop_back();
+    EXPECT_THAT(refusal_of(damaged), HasSubstr("cut short"));
+  }
+  const auto refusal = [&](std::uint32_t type, std::uint32_t flags) { return refusal_of(with_stream(bytes, type, flags)); };
   EXPECT_THAT(refusal(40, 3), HasSubstr("damaged"));
   EXPECT_THAT(refusal(0, 0), HasSubstr("unknown"));
   EXPECT_THAT(refusal(std::uint32_t(StreamType::bricks), 0), HasSubstr("twice"));
