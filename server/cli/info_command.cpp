@@ -1,11 +1,19 @@
-#include <memory>
+#include <fmt/core.h>
 
+#include <memory>
+#include <type_traits>
+
+#include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_verify.h"
 #include "common/ivm/verify.h"
+#include "common/mesh/mesh.h"
+#include "common/program/range_option.h"
 #include "common/util/printable.h"
+#include "common/view/lod.h"
 #include "server/builder/all_cores.h"
+#include "server/builder/find_relevant_updates.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 
@@ -14,38 +22,72 @@ namespace {
 
 struct InfoCommand {
   std::string file;
+  std::vector<std::string> range;  // of info only
   bool json = false;
 };
 
 std::uint64_t size_of(const IntervalVolume& volume) { return volume.size(); }
 std::uint64_t size_of(const ValueVolume& volume) { return volume.set().size(); }
 
+double box_volume(const Grid& grid) {
+  const Box box = box_of(grid);
+  return (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]) * (box.max[2] - box.min[2]);
+}
+
+// The share of the box where the interpolated field lies in a range: from the table of volumes, or summed over the mesh.
+Result<double> share_of(const std::shared_ptr<const ValueVolume>& set, const Range& range) { return set->description().volumes.share_of(range); }
+Result<double> share_of(const std::shared_ptr<const IntervalVolume>& set, const Range& range) {
+  const ShownRange shown = resolve(set->description(), {range, {}});
+  if (auto held = check_held(set->description(), shown); !held) return tl::unexpected(held.error());
+  const auto extracted = extract(*set, *find_relevant_updates(set, shown, false), {}, on_all_cores);
+  if (!extracted) return tl::unexpected(extracted.error());
+  return volume_of(extracted->front.mesh(on_all_cores)) / box_volume(set->description().grid);
+}
+
 // What both commands do, with a data set of one range or of every range.
 struct Info {
   template <class DataSet>
-  Result<void> operator()(const InfoCommand& options, const DataSet& set) const {
-    if (options.json) return print_json(stats_of(set, options.file));
-    return print(text_of(set, options.file));
+  Result<void> operator()(const InfoCommand& options, const std::shared_ptr<const DataSet>& set) const {
+    const auto range = parse_range(options.range);
+    if (!range) return tl::unexpected(range.error());
+    const auto share = *range ? share_of(set, **range) : Result<double>(0);
+    if (!share) return tl::unexpected(share.error());
+    const double volume = *share * box_volume(set->description().grid);
+    if (options.json) {
+      auto stats = stats_of(*set, options.file);
+      if (*range) {
+        stats["enclosed_volume"] = volume;
+        stats["enclosed_share"] = *share;
+      }
+      return print_json(stats);
+    }
+    std::string text = text_of(*set, options.file);
+    if (*range)
+      text += fmt::format("range [{:g}, {:g}]: volume {:.6g}, {:.4g} % of the box\n", (*range)->alpha, (*range)->beta, volume, 100 * *share);
+    return print(text);
   }
 };
 
 struct Verify {
   template <class DataSet>
-  Result<void> operator()(const InfoCommand& options, const DataSet& set) const {
-    if (auto valid = validate(set); !valid) return fail(options.file + ": " + valid.error().message);
-    if (options.json) return print_json({{"file", options.file}, {"valid", true}, {"updates", size_of(set)}});
-    return print(printable(options.file) + ": all checksums and invariants hold (" + std::to_string(size_of(set)) + " updates)\n");
+  Result<void> operator()(const InfoCommand& options, const std::shared_ptr<const DataSet>& set) const {
+    if (auto valid = validate(*set); !valid) return fail(options.file + ": " + valid.error().message);
+    if (options.json) return print_json({{"file", options.file}, {"valid", true}, {"updates", size_of(*set)}});
+    return print(printable(options.file) + ": all checksums and invariants hold (" + std::to_string(size_of(*set)) + " updates)\n");
   }
 };
 
 template <class Command>
 void add(Program& program, const char* name, const char* description) {
   const auto options = std::make_shared<InfoCommand>();
-  const auto run = [options](const auto& set) { return Command()(*options, *set); };
+  const auto run = [options](const auto& set) { return Command()(*options, set); };
   CLI::App& command = program.add_command(name, description, [options, run] {
     return is_value_file(options->file) ? load_values(options->file, on_all_cores).and_then(run) : load_ivm(options->file).and_then(run);
   });
   command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
+  if constexpr (std::is_same_v<Command, Info>) {
+    add_range_option(command, options->range, "Print the volume that this closed range of values encloses, too: numbers, -inf or inf");
+  }
   add_json_flag(command, options->json);
 }
 

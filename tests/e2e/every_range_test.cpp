@@ -42,6 +42,24 @@ TEST_F(EveryRange, InfoSaysWhatIsInIt) {
   EXPECT_EQ(run({program("intervale"), "verify", every}).status, 0);
 }
 
+TEST_F(EveryRange, InfoSaysHowMuchARangeEncloses) {
+  constexpr double kBox = 8;  // from -1 to 1 on each axis
+  for (const auto& [low, high] : {std::pair{"-0.5", "0.75"}, std::pair{"0.1", "inf"}, std::pair{"0.2", "0.2"}, std::pair{"7", "8"}}) {
+    const auto mesh = json_of(run({program("intervale"), "extract", every, "--range", low, high, "--json"}));
+    const auto info = json_of(run({program("intervale"), "info", every, "--range", low, high, "--json"}));
+    EXPECT_NEAR(info.at("enclosed_volume").get<double>(), mesh.at("volume").get<double>(), 0.001 * kBox) << low;
+    EXPECT_NEAR(info.at("enclosed_share").get<double>() * kBox, info.at("enclosed_volume").get<double>(), 1e-12);
+  }
+  EXPECT_THAT(run({program("intervale"), "info", every, "--range", "-inf", "5"}).out, HasSubstr("range [-inf, 5]: volume 8, 100 % of the box"));
+  EXPECT_FALSE(json_of(run({program("intervale"), "info", every, "--json"})).contains("enclosed_volume"));
+  // A data set of one range has its own, or all within it.
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", "-0.5", "0.75", "--step", "0.001"}).status, 0);
+  const auto own = json_of(run({program("intervale"), "info", one, "--range", "-0.5", "0.75", "--json"}));
+  EXPECT_EQ(own.at("enclosed_volume").get<double>(), json_of(run({program("intervale"), "extract", one, "--json"})).at("volume").get<double>());
+  expect_complaint(run({program("intervale"), "info", one, "--range", "0", "0.5"}), 2, "built for the range [-0.5, 0.75] alone", "intervale: ");
+  expect_complaint(run({program("intervale"), "info", every, "--range", "2", "1"}), 2, "greater than HI", "intervale: ");
+}
+
 TEST_F(EveryRange, AnyRangeGivesTheMeshOfADataSetOfThatRange) {
   // Whole numbers, so that both have the same values.
   ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "20", "-o", volume}).status, 0);
