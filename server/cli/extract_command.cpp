@@ -2,10 +2,14 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "common/ivm/extraction.h"
 #include "common/ivm/load_volume.h"
@@ -14,6 +18,7 @@
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
+#include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
 #include "server/builder/all_cores.h"
@@ -47,6 +52,19 @@ Result<ShownRange> shown_of(const ExtractCommand& options, const Description& d)
   return shown;
 }
 
+// Uses all cores, and shows which of the loops one after the other runs, and how much of it is done.
+ParallelFor with_progress(Progress& progress) {
+  if (!progress.is_seen()) return on_all_cores;
+  return [&progress, step = 0](std::size_t count, const std::function<void(std::size_t)>& piece) mutable {
+    ++step;
+    std::atomic<std::size_t> done = 0;
+    on_all_cores(count, [&](std::size_t i) {
+      piece(i);
+      progress.text(fmt::format("step {}, {:.0f} %", step, 100 * double(++done) / double(count)));
+    });
+  };
+}
+
 Result<void> run(const ExtractCommand& options) {
   if (const auto range = parse_range(options.range); !range) return tl::unexpected(range.error());
   if (options.output) {
@@ -64,9 +82,12 @@ Result<void> run(const ExtractCommand& options) {
   if (!shown) return tl::unexpected(shown.error());
   const auto start = Clock::now();
   const auto relevant = find_relevant_updates(*volume, *shown, options.lod.camera.has_value());
-  const auto extracted = extract(**volume, *relevant, options.lod, on_all_cores);
+  std::optional<Progress> progress(std::in_place, "extracting " + description.name);
+  const ParallelFor parallel = with_progress(*progress);
+  const auto extracted = extract(**volume, *relevant, options.lod, parallel);
   if (!extracted) return tl::unexpected(extracted.error());
-  const Mesh mesh = extracted->front.mesh(on_all_cores);
+  const Mesh mesh = extracted->front.mesh(parallel);
+  progress.reset();  // erases its line
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (options.output) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
