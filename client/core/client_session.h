@@ -87,6 +87,9 @@ class ClientSession {
   // What is wanted from now on. Before connected(), and while there is no connection, it is only kept. Fails, and changes
   // nothing, if the data set is known and has not all that is to be shown.
   Result<void> look(ViewRequest request);
+  // What the mesh shows until the next look(), of the updates that are here; the server is asked for nothing. Fails, and
+  // changes nothing, if the data set has not all of it. Nothing happens while there is no mesh.
+  Result<void> preview(const RangeRequest& shown) { return mesh_ ? mesh_->show(shown) : Result<void>(); }
   // Asks for the same view again, and gives up more: there was no room for all of it.
   void look_again() { send_view(); }
 

@@ -8,7 +8,7 @@ Result<void> ViewingSession::look(const WantedView& view) {
   lod.camera = view.camera;
   if (auto ok = check_lod(lod); !ok) return ok;
   if (view.budget.max_updates < kMinRoom) return fail("there must be room for at least " + std::to_string(kMinRoom) + " updates");
-  if (view_ == view) return {};
+  if (view_ == view) return session_.preview(view.shown);  // the end of a preview
   if (view.region) lod.camera.reset();
   if (auto looked = session_.look({lod, view.camera, view.budget, view.shown}); !looked) return looked;
   view_ = view;

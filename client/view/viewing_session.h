@@ -36,6 +36,9 @@ class ViewingSession {
   // the data set has not all that is to be shown.
   Result<void> look(const WantedView& view);
 
+  // What is shown until the next look(): see ClientSession::preview().
+  Result<void> preview(const RangeRequest& shown) { return session_.preview(shown); }
+
   void connected(Clock::time_point now) { session_.connected(now); }  // after the first look()
   void disconnected() { session_.disconnected(); }
   Result<ClientSession::Event> receive(std::span<const std::uint8_t> message, Clock::time_point now);

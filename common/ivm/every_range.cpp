@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include "common/diamond/supercube_neighbours.h"
@@ -121,6 +122,7 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   parts.steps = std::move(levels);
   parts.error_to_distance.resize(volume.set().supercubes());
   values = std::move(volume).take();
+  parts.statistics = std::make_shared<const FieldStatistics>(std::move(values.description.statistics));
   parts.set = std::move(values.set);
   parts.keys = std::move(values.keys);
   return IntervalVolume::assemble(std::move(parts));

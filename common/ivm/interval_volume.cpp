@@ -48,7 +48,8 @@ IntervalVolume::IntervalVolume(Parts parts)
       keys_(std::move(parts.keys)),
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
-      relevant_(description_.grid, set_, {steps_, error_steps_}, description_.whole(), {}, std::move(parts.error_to_distance)) {}
+      relevant_(description_.grid, set_, {steps_, error_steps_}, description_.whole(), {}, std::move(parts.error_to_distance)),
+      statistics_(std::move(parts.statistics)) {}
 
 Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
@@ -78,7 +79,7 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
 
 std::size_t IntervalVolume::memory_bytes() const {
   return sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
-         error_steps_.size() * sizeof(float) + relevant_.memory_bytes();
+         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + (statistics_ ? statistics_->memory_bytes() : 0);
 }
 
 }  // namespace intervale

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,6 +16,7 @@
 
 #include "common/diamond/domain.h"
 #include "common/diamond/supercube.h"
+#include "common/ivm/field_statistics.h"
 #include "common/ivm/relevant_updates.h"
 #include "common/ivm/value_keys.h"
 #include "common/patch/description.h"
@@ -35,6 +37,7 @@ class IntervalVolume {
     std::vector<std::uint8_t> steps;                 // by number of the update: which of error_steps its error is
     std::vector<float> error_steps;                  // ascending, at most kMaxErrorSteps
     std::vector<ErrorToDistance> error_to_distance;  // by supercube
+    std::shared_ptr<const FieldStatistics> statistics = {};
   };
   // Fails where sizes or ranges of the parts do not match; validate() checks the meaning.
   static Result<IntervalVolume> assemble(Parts parts);
@@ -53,6 +56,8 @@ class IntervalVolume {
   [[nodiscard]] const ValueKeys& keys() const { return keys_; }
   // What the range of the description needs: all updates.
   [[nodiscard]] const RelevantUpdates& relevant() const { return relevant_; }
+  // Null: a data set of one range has none.
+  [[nodiscard]] const FieldStatistics* statistics() const { return statistics_.get(); }
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -64,6 +69,7 @@ class IntervalVolume {
   std::vector<std::uint8_t> steps_;
   std::vector<float> error_steps_;
   RelevantUpdates relevant_;
+  std::shared_ptr<const FieldStatistics> statistics_;
 };
 
 }  // namespace intervale

@@ -49,28 +49,28 @@ std::optional<std::vector<double>> take_shares(std::span<const std::uint8_t>& by
 
 void append_statistics(const FieldDescription& d, std::vector<std::byte>& histogram, std::vector<std::byte>& volumes) {
   std::vector<std::uint8_t> counts, shares;
-  for (const std::uint64_t n : d.histogram.count) append_varint(counts, n);
-  append(histogram, std::span(&d.histogram.width, 1));
+  for (const std::uint64_t n : d.statistics.histogram.count) append_varint(counts, n);
+  append(histogram, std::span(&d.statistics.histogram.width, 1));
   append<std::uint8_t>(histogram, counts);
-  append_shares(shares, d.volumes.below);
-  append_shares(shares, d.volumes.not_above);
-  const std::uint64_t rows = d.volumes.position.size();
+  append_shares(shares, d.statistics.volumes.below);
+  append_shares(shares, d.statistics.volumes.not_above);
+  const std::uint64_t rows = d.statistics.volumes.position.size();
   append(volumes, std::span(&rows, 1));
-  append<double>(volumes, d.volumes.position);
+  append<double>(volumes, d.statistics.volumes.position);
   append<std::uint8_t>(volumes, shares);
 }
 
 Result<void> read_histogram(std::span<const std::byte> bytes, FieldDescription& d) {
   const auto damaged = [] { return fail("the histogram is damaged"); };
   if (bytes.size() < sizeof(double)) return damaged();
-  d.histogram = {d.format.least(), numbers_of<double>(bytes.first(sizeof(double)))[0], {}};
-  if (!(d.histogram.width > 0)) return damaged();
+  d.statistics.histogram = {d.format.least(), numbers_of<double>(bytes.first(sizeof(double)))[0], {}};
+  if (!(d.statistics.histogram.width > 0)) return damaged();
   for (auto counts = octets(bytes.subspan(sizeof(double))); !counts.empty();) {
     const auto count = take_varint(counts);
-    if (!count || d.histogram.count.size() == kMostBins) return damaged();
-    d.histogram.count.push_back(*count);
+    if (!count || d.statistics.histogram.count.size() == kMostBins) return damaged();
+    d.statistics.histogram.count.push_back(*count);
   }
-  if (d.histogram.count.empty()) return damaged();
+  if (d.statistics.histogram.count.empty()) return damaged();
   return {};
 }
 
@@ -79,13 +79,13 @@ Result<void> read_volumes(std::span<const std::byte> bytes, FieldDescription& d)
   if (bytes.size() < 8) return damaged();
   const std::uint64_t rows = numbers_of<std::uint64_t>(bytes.first(8))[0];
   if (rows == 0 || rows > kMostPositions || bytes.size() < 8 * (rows + 1)) return damaged();
-  d.volumes.position = numbers_of<double>(bytes.subspan(8, 8 * rows));
+  d.statistics.volumes.position = numbers_of<double>(bytes.subspan(8, 8 * rows));
   auto shares = octets(bytes.subspan(8 * (rows + 1)));
   const auto below = take_shares(shares, rows), not_above = take_shares(shares, rows);
   if (!below || !not_above || !shares.empty()) return damaged();
-  d.volumes.below = *below;
-  d.volumes.not_above = *not_above;
-  const auto& position = d.volumes.position;
+  d.statistics.volumes.below = *below;
+  d.statistics.volumes.not_above = *not_above;
+  const auto& position = d.statistics.volumes.position;
   for (std::size_t i = 0; i < rows; ++i) {
     if (!std::isfinite(position[i]) || (i > 0 && position[i] <= position[i - 1])) return damaged();
   }

@@ -17,8 +17,8 @@
 #include "common/diamond/domain.h"
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
+#include "common/ivm/field_statistics.h"
 #include "common/ivm/value_keys.h"
-#include "common/ivm/volume_table.h"
 #include "common/patch/labels.h"
 #include "common/patch/value_format.h"
 #include "common/util/result.h"
@@ -29,16 +29,6 @@ namespace intervale {
 // largest error over powers of two. Those of scale 0 follow from the values.
 using ErrorLevel = std::uint8_t;
 inline constexpr int kErrorLevels = 32;
-
-// Bin i counts the samples v with least + i * width <= v < least + (i + 1) * width; the last bin also those at its
-// upper end.
-struct ValueHistogram {
-  double least = 0;                  // the least value of the field
-  double width = 0;                  // of each bin; greater than 0
-  std::vector<std::uint64_t> count;  // by bin; 1 to kMostBins bins, the first and the last are not empty
-  friend bool operator==(const ValueHistogram&, const ValueHistogram&) = default;
-};
-inline constexpr std::size_t kMostBins = 256;
 
 inline constexpr std::uint64_t kMostSamples = 0x7fffffff;  // of a field; so that numbers of diamonds have 32 bits
 
@@ -51,8 +41,7 @@ struct FieldDescription {
   std::array<ValueKey, kRootVertices> corners{};  // at the root's vertices, in local order
   bool is_exact = true;                           // whether every sample is the value of its key
   double max_error = 0;                           // the largest error, in the field's units
-  ValueHistogram histogram;
-  VolumeTable volumes;             // what any range encloses
+  FieldStatistics statistics;
   std::uint64_t content_hash = 0;  // of the contents; the name and the labels do not count
   friend bool operator==(const FieldDescription&, const FieldDescription&) = default;
 };

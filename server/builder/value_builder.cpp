@@ -25,8 +25,8 @@ ValueVolume build_value_volume(Volume& volume, const ValueFormat& format, const 
   d.labels = volume.labels;
   d.format = format;
   d.is_exact = is_exact;
-  d.histogram = make_value_histogram(volume, format);
-  d.volumes = make_volume_table(volume);
+  d.statistics.histogram = make_value_histogram(volume, format);
+  d.statistics.volumes = make_volume_table(volume);
   parts.set = hierarchy.set();
   const std::uint32_t size = parts.set.size(), coarse = coarse_diamonds(parts.set);
   for (UpdateIndex i{0}; i < size; ++i) d.max_error = std::max(d.max_error, double(hierarchy.error(i)));

@@ -92,8 +92,8 @@ nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem
       {"supercubes", volume.set().supercubes()},
       {"memory_bytes", volume.memory_bytes()},
       {"file_bytes", size_of(file)},
-      {"histogram", d.histogram.count},
-      {"histogram_width", d.histogram.width},
+      {"histogram", d.statistics.histogram.count},
+      {"histogram_width", d.statistics.histogram.width},
   });
   return stats;
 }
@@ -111,7 +111,7 @@ std::string text_of(const ValueVolume& volume, const std::filesystem::path& file
   text += fmt::format("in memory {} ({:.2f} bytes a sample), in the file {} ({:.2f} times smaller than the samples)\n",
                       human_bytes(volume.memory_bytes()), double(volume.memory_bytes()) / double(d.grid.sample_count()), human_bytes(file_bytes),
                       file_bytes == 0 ? 0.0 : double(raw) / double(file_bytes));
-  return text + "histogram (bars: cube root of the number of samples)\n" + bars_of(d.histogram);
+  return text + "histogram (bars: cube root of the number of samples)\n" + bars_of(d.statistics.histogram);
 }
 
 }  // namespace intervale

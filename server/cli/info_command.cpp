@@ -35,7 +35,9 @@ double box_volume(const Grid& grid) {
 }
 
 // The share of the box where the interpolated field lies in a range: from the table of volumes, or summed over the mesh.
-Result<double> share_of(const std::shared_ptr<const ValueVolume>& set, const Range& range) { return set->description().volumes.share_of(range); }
+Result<double> share_of(const std::shared_ptr<const ValueVolume>& set, const Range& range) {
+  return set->description().statistics.volumes.share_of(range);
+}
 Result<double> share_of(const std::shared_ptr<const IntervalVolume>& set, const Range& range) {
   const ShownRange shown = resolve(set->description(), {range, {}});
   if (auto held = check_held(set->description(), shown); !held) return tl::unexpected(held.error());

@@ -31,6 +31,18 @@ std::string datasets_json(const Catalogue& catalogue, const Scope& scope) {
   return nlohmann::ordered_json{{"datasets", std::move(datasets)}}.dump() + "\n";
 }
 
+// As in the list, and what there is of statistics.
+std::string dataset_json(const IntervalVolume& volume) {
+  nlohmann::ordered_json json = to_json(volume.description());
+  if (const FieldStatistics* statistics = volume.statistics()) {
+    json["histogram"] = statistics->histogram.count;
+    json["histogram_width"] = statistics->histogram.width;
+    const VolumeTable& volumes = statistics->volumes;
+    json["volumes"] = {{"values", volumes.position}, {"below", volumes.below}, {"not_above", volumes.not_above}};
+  }
+  return json.dump() + "\n";
+}
+
 std::string front_page(const Catalogue& catalogue, const Scope* scope) {
   std::string page =
       "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Intervale</title>\n<h1>Intervale</h1>\n"
@@ -95,10 +107,25 @@ HttpResponse preflight() {
               {"Access-Control-Allow-Methods", "GET, HEAD"}, {"Access-Control-Allow-Headers", "Authorization"}, {"Access-Control-Max-Age", "600"}}};
 }
 
+constexpr std::string_view kList = "/api/datasets";
+
+bool is_api(std::string_view path) { return path.starts_with(kList) && (path.size() == kList.size() || path[kList.size()] == '/'); }
+
+// The list, or one data set of it.
+HttpResponse datasets_response(const HttpRequest& request, const HttpState& state, std::string_view path) {
+  if (request.scope == nullptr) return unauthorized();
+  // An empty list would be wrong.
+  if (state.server_status == ServerStatus::loading) return retry_later("loading: the data sets are still being read", "1");
+  if (path.size() == kList.size()) return ok(kJson, datasets_json(state.catalogue, *request.scope));
+  const std::string name(path.substr(kList.size() + 1));
+  const auto volume = request.scope->allows(name) ? state.catalogue.find(name) : nullptr;
+  return volume ? ok(kJson, dataset_json(*volume)) : text_response(404, "no such data set; see /api/datasets");
+}
+
 bool is_known(std::string_view path, const HttpState& state) {
   if (path == "/healthz" || path == "/readyz") return true;
   if (path == "/metrics") return state.role == PortRole::metrics || !state.has_metrics_port;
-  return state.role == PortRole::all && (path == "/" || path == "/api/datasets");
+  return state.role == PortRole::all && (path == "/" || is_api(path));
 }
 
 }  // namespace
@@ -126,14 +153,9 @@ HttpResponse respond(const HttpRequest& request, const HttpState& state) {
   if (!path) return text_response(400, "malformed request target");
   const StaticFile* const file = state.role == PortRole::all ? state.viewer.find(*path) : nullptr;
   if (!is_known(*path, state) && file == nullptr) return text_response(404, "not found");
-  if (*path == "/api/datasets" && request.method == "OPTIONS" && !request.allowed_origin.empty()) return with_cors(request, preflight());
+  if (is_api(*path) && request.method == "OPTIONS" && !request.allowed_origin.empty()) return with_cors(request, preflight());
   if (request.method != "GET" && request.method != "HEAD") return text_response(405, "method not allowed: use GET or HEAD");
-  if (*path == "/api/datasets") {
-    // An empty list would be wrong.
-    if (request.scope != nullptr && state.server_status == ServerStatus::loading)
-      return with_cors(request, retry_later("loading: the data sets are still being read", "1"));
-    return with_cors(request, request.scope != nullptr ? ok(kJson, datasets_json(state.catalogue, *request.scope)) : unauthorized());
-  }
+  if (is_api(*path)) return with_cors(request, datasets_response(request, state, *path));
   if (*path == "/metrics" && state.role == PortRole::all) {
     if (request.scope == nullptr) return unauthorized();
     if (!request.scope->is_everything()) return text_response(403, "metrics cover every data set: a token that grants all of them is required");

@@ -106,6 +106,7 @@ void add_requests(const Corpus& corpus) {
   corpus.add("http", "hidden", plain, "/assets/../.hidden/secret\n");
   corpus.add("http", "unreadable", plain, "/%4\n");
   corpus.add("http", "datasets", everything, "/api/datasets\n\n\n\nen\"gine <1>");
+  corpus.add("http", "dataset", everything, "/api/datasets/scans-%C3%A9\n\n\n\n");
   corpus.add("http", "datasets-some", some, "/api/datasets\n\n\n\nscans-\xc3\xa9");
   corpus.add("http", "datasets-none", {1, 4}, "/\n\n\n\nnothing");
   corpus.add("http", "page", {1, 12}, "/\n\n\n\na&b");

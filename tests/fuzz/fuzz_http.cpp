@@ -139,9 +139,10 @@ void check(const HttpRequest& request, const HttpState& state, const HttpRespons
     }
   }
   if (!reads) testing::require(answer.status >= 400 || (request.method == "OPTIONS" && answer.status == 204), "other methods get nothing");
-  const bool is_list = path == "/api/datasets" && answer.status != 404 && answer.status != 405;
-  testing::require(header_of(answer, "Access-Control-Allow-Origin") == (is_list ? request.allowed_origin : ""),
-                   "pages from elsewhere read the list only");
+  const bool is_dataset = path && path->starts_with("/api/datasets/");
+  const bool is_api = state.role == PortRole::all && (path == "/api/datasets" || is_dataset) && answer.status != 405;
+  testing::require(header_of(answer, "Access-Control-Allow-Origin") == (is_api ? request.allowed_origin : ""),
+                   "pages from elsewhere read what there is of data sets only");
 
   if (answer.status != 200 || path == "/metrics") return;
   std::set<std::string> shown;
@@ -150,6 +151,11 @@ void check(const HttpRequest& request, const HttpState& state, const HttpRespons
     const auto json = nlohmann::json::parse(body, nullptr, false);
     testing::require(json.is_object(), "JSON is JSON");
     for (const auto& one : json["datasets"]) shown.insert(one["name"]);
+  }
+  if (is_dataset) {
+    const std::string wanted = path->substr(path->rfind('/') + 1);
+    testing::require(request.scope != nullptr && request.scope->allows(wanted), "a data set is told to who may know of it");
+    testing::require(nlohmann::json::parse(body, nullptr, false).value("name", "") == wanted, "the data set is the one asked for");
   }
   for (const auto& [dataset, volume] : state.catalogue.volumes()) {
     const bool allowed = request.scope != nullptr && request.scope->allows(dataset);

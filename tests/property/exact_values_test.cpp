@@ -106,7 +106,7 @@ TEST_P(ExactValues, AFileOfEveryRangeGivesBackAllSamples) {
   const Diamond root(field.domain.root());
   for (int v = 0; v < kRootVertices; ++v) EXPECT_EQ(d.format.value(d.corners[std::size_t(v)]), field.value(root.vertex(v)));
   std::uint64_t counted = 0;
-  for (const std::uint64_t n : d.histogram.count) counted += n;
+  for (const std::uint64_t n : d.statistics.histogram.count) counted += n;
   EXPECT_EQ(counted, field.volume.grid.sample_count());
 }
 

@@ -75,6 +75,12 @@ TEST_P(RangeStream, EndsWithTheMeshOfAFreshClient) {
     testing::SessionServer server(volume, session);
     for (int i = 0; i < 4; ++i) {
       server.run(int(random() % 6));
+      if (random() % 2 == 0) {  // asks for nothing, and what is on its way still fits
+        const std::uint64_t epoch = session.epoch();
+        ASSERT_TRUE(session.preview(random_request()));
+        EXPECT_EQ(session.epoch(), epoch);
+        server.run(int(random() % 3));
+      }
       if (session.mesh() != nullptr) {
         ASSERT_EQ(session.mesh()->front().validate().value_or(""), "");
       }

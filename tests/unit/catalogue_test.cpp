@@ -4,12 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "common/ivm/every_range.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/builder/value_builder.h"
+#include "server/builder/value_steps.h"
 #include "server/serve/http_routes.h"
 #include "tests/support/analytic_fields.h"
 
@@ -54,6 +59,39 @@ TEST(Catalogue, ADescriptionFitsAMessage) {
   ASSERT_FALSE(added);
   EXPECT_THAT(added.error().message, HasSubstr("'noise': the table of its "));
   EXPECT_THAT(added.error().message, HasSubstr("--step S"));
+}
+
+TEST(Catalogue, OneDataSetTellsItsStatistics) {
+  Volume volume = testing::gyroid({5, 4, 3});
+  volume.name = "any range";
+  const ValueFormat format = choose_value_format(volume, {}).value();
+  round_samples(volume, format);
+  Catalogue catalogue;
+  ASSERT_TRUE(catalogue.add(std::make_shared<const IntervalVolume>(of_every_range(build_value_volume(volume, format).take()).value())));
+  ASSERT_TRUE(add(catalogue, "one"));
+  const Metrics metrics;
+  const StaticFiles viewer;
+  const auto ask = [&](std::string_view target, const Scope* scope) {
+    return respond({.method = "GET", .target = target, .scope = scope}, {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
+  };
+  const auto all = Scope::everything();
+  const auto json = nlohmann::json::parse(*ask("/api/datasets/any%20range", all.get()).body);
+  EXPECT_EQ(json.at("name"), "any range");
+  EXPECT_EQ(json.at("scope"), "every");
+  std::uint64_t samples = 0;
+  for (const auto& bin : json.at("histogram")) samples += bin.get<std::uint64_t>();
+  EXPECT_EQ(samples, volume.grid.sample_count());
+  EXPECT_GT(json.at("histogram_width").get<double>(), 0);
+  const auto& volumes = json.at("volumes");
+  EXPECT_EQ(volumes.at("values").front(), json.at("values").at("least"));
+  EXPECT_EQ(volumes.at("values").back(), json.at("values").at("greatest"));
+  EXPECT_EQ(volumes.at("below").front(), 0.0);
+  EXPECT_EQ(volumes.at("not_above").back(), 1.0);
+
+  EXPECT_FALSE(nlohmann::json::parse(*ask("/api/datasets/one", all.get()).body).contains("histogram"));
+  for (const char* target : {"/api/datasets/", "/api/datasets/none", "/api/datasets/one/", "/api/datasetsx"})
+    EXPECT_EQ(ask(target, all.get()).status, 404u);
+  EXPECT_EQ(ask("/api/datasets/one", nullptr).status, 401u);
 }
 
 TEST(Catalogue, NamesAreUniquePathSegmentsOfAUrl) {

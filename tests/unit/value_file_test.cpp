@@ -52,7 +52,7 @@ TEST(ValueFile, GivesBackAllValues) {
     EXPECT_EQ(encode_values(*decoded), bytes);
     EXPECT_EQ(decoded->description().format, field.format);
     EXPECT_EQ(decoded->description().max_error, volume.description().max_error);
-    EXPECT_EQ(decoded->description().histogram, volume.description().histogram);
+    EXPECT_EQ(decoded->description().statistics.histogram, volume.description().statistics.histogram);
     EXPECT_EQ(decoded->parts().error_levels, volume.parts().error_levels);
     EXPECT_TRUE(validate(*decoded));
     decoded->set().for_each_down([&](const Place& p) { ASSERT_EQ(field.format.value(decoded->key(p.index)), field.value(SupercubeSet::centre(p))); });

@@ -71,6 +71,11 @@ class Viewer {
     stale_ = true;  // a budget hides and shows at once
     return text_of(session_.look(wanted));
   }
+  // The range that is shown until the next look().
+  std::string preview(const val& range) {
+    stale_ = true;
+    return text_of(session_.preview({.range = Range{range[0].as<double>(), range[1].as<double>()}}));
+  }
   void connected(double now) { session_.connected(time_of(now)); }
   void disconnected() { session_.disconnected(); }
 
@@ -201,6 +206,7 @@ EMSCRIPTEN_BINDINGS(intervale) {
   emscripten::class_<Viewer>("Viewer")
       .constructor<const std::string&>()
       .function("look", &Viewer::look)
+      .function("preview", &Viewer::preview)
       .function("connected", &Viewer::connected)
       .function("disconnected", &Viewer::disconnected)
       .function("inbox", &Viewer::inbox)

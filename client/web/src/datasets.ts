@@ -1,5 +1,6 @@
 // The list of the server's data sets: GET api/datasets, relative to the page.
 import type { Affine, Vec3 } from './messages';
+import { cross, dot, scale } from './vec';
 
 export interface Dataset {
   name: string;
@@ -16,6 +17,15 @@ export interface Dataset {
   updates: number; // of the full mesh
   fullTets: number;
   fullBytes: number; // of the full mesh as indexed arrays
+}
+
+// Of a field, to choose a range by.
+export interface Statistics {
+  least: number; // the first bin begins here
+  width: number; // of each bin
+  counts: number[]; // samples by bin
+  // Shares of the box, 0 to 1, where the field is below a value, and where it is not above it; linear in between.
+  volumes: { values: number[]; below: number[]; notAbove: number[] };
 }
 
 export type Listing = { datasets: Dataset[] } | { needsToken: true } | { error: string };
@@ -37,6 +47,31 @@ export async function listDatasets(token: string | null): Promise<Listing> {
   }
 }
 
+export const volumeUnit = (dataset: Dataset | null): string => `${dataset?.unit || 'units'}³`;
+
+// Of the box of the samples, in cubic world units.
+export function boxVolume({ dims, affine }: Dataset): number {
+  const [x, y, z] = [0, 1, 2].map((j) => scale([affine[j]!, affine[4 + j]!, affine[8 + j]!], dims[j]! - 1));
+  return Math.abs(dot(cross(x!, y!), z!));
+}
+
+// null: the data set has none, or the server did not send them.
+export async function fetchStatistics({ name, values }: Dataset, token: string | null): Promise<Statistics | null> {
+  const url = new URL(`api/datasets/${encodeURIComponent(name)}`, document.baseURI);
+  try {
+    const response = await fetch(url, token === null ? {} : { headers: { Authorization: `Bearer ${token}` } });
+    const body = response.ok ? ((await response.json()) as Record<string, unknown>) : {};
+    const volumes = (body['volumes'] ?? {}) as Record<string, unknown>;
+    const counts = numbers(body['histogram']);
+    const width = number(body['histogram_width']);
+    if (counts.length === 0 || !(width > 0)) return null;
+    const table = { values: numbers(volumes['values']), below: numbers(volumes['below']), notAbove: numbers(volumes['not_above']) };
+    return { least: values[0], width, counts, volumes: table };
+  } catch {
+    return null; // the range has number fields, too
+  }
+}
+
 // The address of the WebSocket, relative to the page.
 export function streamUrl(): string {
   const url = new URL('v1/stream', document.baseURI);
@@ -46,6 +81,7 @@ export function streamUrl(): string {
 }
 
 const number = (x: unknown): number => (x === 'inf' ? Infinity : x === '-inf' ? -Infinity : typeof x === 'number' ? x : 0);
+const numbers = (x: unknown): number[] => (Array.isArray(x) ? x.map(number) : []);
 const vec = (x: unknown): Vec3 => (Array.isArray(x) && x.length === 3 ? [number(x[0]), number(x[1]), number(x[2])] : [0, 0, 0]);
 
 const text = (x: unknown): string => (typeof x === 'string' ? x : '');

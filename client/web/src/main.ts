@@ -3,7 +3,7 @@ import { automation } from './automation';
 import { showAxes } from './axes';
 import { watchBanner } from './banner';
 import { ClipControls } from './clip';
-import { type Dataset, listDatasets } from './datasets';
+import { type Dataset, fetchStatistics, listDatasets } from './datasets';
 import { element, input, onClick } from './dom';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
@@ -12,6 +12,7 @@ import { watchPanel } from './panel';
 import { watchPointers } from './pointer';
 import { watchProgress } from './progress';
 import { rangeOf } from './range';
+import { watchRange } from './range_controls';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
 import { fromHash, toHash, type ViewState } from './state';
@@ -93,6 +94,7 @@ class Page {
     onClick('fullscreen', toggleFullScreen);
     onClick('help', showHelp);
     watchPanel(view, status);
+    watchRange(view, status, (range) => this.worker.preview(range));
     watchSaving(status, viewer, this.worker);
     watchTheme(() => {
       viewer.picture.setBackground(getComputedStyle(element('stage')).backgroundColor);
@@ -151,8 +153,14 @@ class Page {
     if (wanted && status.value.dataset) this.worker.update(wanted);
   }
 
+  private async loadStatistics(dataset: Dataset): Promise<void> {
+    const statistics = await fetchStatistics(dataset, status.value.token);
+    if (status.value.dataset === dataset) status.set({ statistics });
+  }
+
   private open(dataset: Dataset): void {
-    status.set({ dataset, surfaceVersion: 0 });
+    status.set({ dataset, statistics: null, surfaceVersion: 0 });
+    if (dataset.hasEveryRange) void this.loadStatistics(dataset);
     this.viewer.open(dataset);
     this.clip.opened();
     this.region.opened();

@@ -31,6 +31,8 @@ export type Request =
   // The view that is wanted from now on. With a region: that at full detail. Without: everything, until the error is at
   // most pixelError on the camera's screen. Before the first 'open': the view that the session starts with.
   | { type: 'view'; view: View }
+  // Shown until the next 'view', of what was received; the server is not asked. Answered by a report of the same type.
+  | { type: 'preview'; range: [number, number] }
   // Each is answered by a Cap; if a new one arrives before the answer, only the last is answered.
   | { type: 'clip'; plane: Plane | null }
   | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
@@ -56,6 +58,7 @@ export type Report =
   | { type: 'surface'; change: SurfaceChange }
   | { type: 'cap'; cap: Cap }
   | { type: 'tets'; tets: Tets }
+  | { type: 'preview' }
   | { type: 'saved'; format: MeshFormat; name: string; bytes: ArrayBuffer }
   | { type: 'digest'; digest: string; updates: number; tets: number }
   | { type: 'error'; text: string }; // for the user; the session is closed

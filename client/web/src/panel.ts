@@ -2,7 +2,7 @@
 import type { Dataset } from './datasets';
 import { create, element, input, onClick, setText } from './dom';
 import { bytes, count, short } from './format';
-import { rangeOf, watchRange } from './range';
+import { rangeOf } from './range';
 import { kSurfaces, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
@@ -27,7 +27,6 @@ function nearest(choices: (number | null)[], value: number | null): number {
 }
 
 export function watchPanel(view: Store<ViewState>, status: Store<Status>): void {
-  watchRange(view, status);
   watchSurfaces(view, status);
   watchSwitches(view);
   watchSliders(view);

@@ -1,4 +1,5 @@
 // How far the view is refined: the status line below the picture, and the statistics in the panel.
+import { volumeUnit } from './datasets';
 import { create, element, setText } from './dom';
 import { bounded, bytes, count, short } from './format';
 import type { Progress } from './messages';
@@ -48,9 +49,6 @@ function fieldError({ progress: p, dataset }: Readonly<Status>): string | null {
   return p && (p.remainingError > 0 || !dataset || p.updatesShown >= dataset.updates) ? short(p.remainingError) : null;
 }
 
-// The unit of volumes.
-const cubed = ({ dataset }: Readonly<Status>): string => `${dataset?.unit || 'units'}³`;
-
 const screenError = (p: Progress): string => `${short(p.remainingPixels)} px`;
 
 function showStatusLine(status: Readonly<Status>): void {
@@ -61,7 +59,7 @@ function showStatusLine(status: Readonly<Status>): void {
     parts.push([screenError(p), 'error']);
     if (field !== null) parts.push([field, 'field error']);
     parts.push([bytes(p.bytes), ''], [count(p.updates), 'updates'], [count(p.tets), 'tetrahedra']);
-    parts.push([bounded(p.volume, p.volumeBound), cubed(status)]);
+    parts.push([bounded(p.volume, p.volumeBound), volumeUnit(status.dataset)]);
   }
   element('status-values').replaceChildren(
     ...parts.map(([value, label]) => create('span', {}, create('b', {}, value), label && ` ${label}`)),
@@ -72,7 +70,7 @@ function statistics(status: Readonly<Status>): [name: string, value: string][] {
   const { progress: p, dataset } = status;
   if (!p) return [['Received', 'nothing yet']];
   const rows: [string, string][] = [
-    ['Volume', `${bounded(p.volume, p.volumeBound)} ${cubed(status)}`],
+    ['Volume', `${bounded(p.volume, p.volumeBound)} ${volumeUnit(status.dataset)}`],
     ['Screen-space error', screenError(p)],
   ];
   const field = fieldError(status);

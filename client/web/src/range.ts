@@ -1,10 +1,6 @@
-// The range of values that is shown. A data set of one range is shown in it; one that has more, in any range within: then
-// there are two number fields. An empty field is an infinite bound.
-import { type Dataset } from './datasets';
-import { element, input } from './dom';
-import type { ViewState } from './state';
-import type { Status } from './status';
-import type { Store } from './store';
+// The range of values that is shown. A data set of one range is shown in it; one that has more, in any range within.
+// Pure functions.
+import type { Dataset, Statistics } from './datasets';
 import { clamp } from './vec';
 
 export type Range = [least: number, greatest: number];
@@ -24,29 +20,24 @@ export function boundMoved(range: Range, end: 0 | 1, to: number): Range {
   return end === 0 ? [to, Math.max(to, range[1])] : [Math.min(to, range[0]), to];
 }
 
-export function watchRange(view: Store<ViewState>, status: Store<Status>): void {
-  const fields = [input('range-low'), input('range-high')];
-  const current = (): Range | null => {
-    const { dataset } = status.value;
-    return dataset && (rangeOf(dataset, view.value.range) ?? dataset.range);
-  };
-  const show = () => {
-    const { dataset } = status.value;
-    element('range-section').hidden = !dataset?.hasRangesWithin;
-    const range = current();
-    fields.forEach((field, end) => {
-      const bound = range?.[end] ?? NaN;
-      field.value = Number.isFinite(bound) ? String(Number(bound.toPrecision(7))) : '';
-    });
-  };
-  fields.forEach((field, end) => {
-    field.addEventListener('change', () => {
-      const range = current();
-      const to = field.value.trim() === '' ? (end === 0 ? -Infinity : Infinity) : field.valueAsNumber;
-      if (range && !Number.isNaN(to)) view.set({ range: boundMoved(range, end === 0 ? 0 : 1, to) });
-      show();
-    });
-  });
-  view.watch(['range'], show);
-  status.watch(['dataset'], show);
+// The value, off by half a step at most, with few digits. step: above 0.
+export function rounded(value: number, step: number): number {
+  if (Math.abs(value) <= step / 2) return 0;
+  const place = (x: number) => Math.floor(Math.log10(x)); // of its first digit
+  return Number(value.toPrecision(clamp(1 + place(Math.abs(value)) - place(step), 1, 17)));
 }
+
+// The share of the box, 0 to 1, in which the field is below a value, or not above it.
+function share({ values, below, notAbove }: Statistics['volumes'], value: number, withEqual: boolean): number {
+  const after = values.findIndex((at) => at >= value); // the first position that is not less
+  if (after < 0) return 1;
+  if (values[after] === value) return (withEqual ? notAbove : below)[after]!;
+  if (after === 0) return 0;
+  const [low, high] = [values[after - 1]!, values[after]!];
+  const [from, to] = [notAbove[after - 1]!, below[after]!];
+  return from + ((to - from) * (value - low)) / (high - low);
+}
+
+// The share of the box that a range encloses.
+export const enclosedShare = ({ volumes }: Statistics, [low, high]: Range): number =>
+  Math.max(0, share(volumes, high, true) - share(volumes, low, false));

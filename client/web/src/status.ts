@@ -1,10 +1,11 @@
 // The status of the page: what it knows of the server and the mesh. Not part of the address.
-import type { Dataset } from './datasets';
+import type { Dataset, Statistics } from './datasets';
 import type { ConnectionState, MeshFormat, Progress } from './messages';
 
 export class Status {
   datasets: Dataset[] | null = null; // null: not received yet
   dataset: Dataset | null = null; // the open one
+  statistics: Statistics | null = null; // of its field, where there are any
   connection: ConnectionState = { state: 'closed' };
   opened = { times: 0, resumed: false }; // how often a session was opened; whether the last one was resumed
   progress: Progress | null = null;

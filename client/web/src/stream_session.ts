@@ -67,6 +67,14 @@ export class StreamSession {
     this.scheduleSurface();
   }
 
+  preview(range: [number, number]): void {
+    const error = this.viewer.preview(range);
+    if (error) return this.fail(error);
+    this.isChanged = true;
+    this.reportProgress(true);
+    this.scheduleSurface();
+  }
+
   pageShows(version: number): void {
     this.shown = version;
     this.scheduleSurface();

@@ -24,6 +24,9 @@ async function handle(request: Request): Promise<void> {
     case 'view':
       view = request.view;
       return session?.look(view);
+    case 'preview':
+      session?.preview(request.range);
+      return report({ type: 'preview' });
     case 'clip':
       extras.plane = request.plane;
       return session?.sendCap();

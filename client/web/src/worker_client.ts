@@ -1,6 +1,7 @@
 // The page's side of the worker: sends what the view needs at a limited rate, and keeps the status current.
 import { streamUrl } from './datasets';
 import type { Box, Plane, Report, Request, View } from './messages';
+import type { Range } from './range';
 import type { Status } from './status';
 import type { Store } from './store';
 
@@ -29,6 +30,9 @@ export class WorkerClient {
   private viewTimer = 0;
   private sentPlane: Plane | null = null;
   private isAwaitingCap = false;
+  private wantedPreview: Range | null = null;
+  private previewed: Range | null = null; // sent
+  private isAwaitingPreview = false;
   private tetsTimer = 0;
 
   // received: called with each report, after the status has changed.
@@ -84,6 +88,16 @@ export class WorkerClient {
     if (wanted.edges !== (last?.edges ?? false)) this.send({ type: 'edges', wanted: wanted.edges });
   }
 
+  // Shows a range of what was received, until the next view. One request at a time: the latest range is sent when the
+  // last one was answered.
+  preview(range: Range): void {
+    this.wantedPreview = range;
+    if (this.isAwaitingPreview || sameJson(range, this.previewed)) return;
+    this.previewed = range;
+    this.isAwaitingPreview = true;
+    this.send({ type: 'preview', range });
+  }
+
   // Sends at once, or when the interval since the last one is over: the last view of a motion is always sent.
   private requestView(): void {
     if (this.viewTimer !== 0 || sameJson(this.wanted?.view, this.sentView)) return;
@@ -98,6 +112,7 @@ export class WorkerClient {
     if (!this.wanted || sameJson(this.wanted.view, this.sentView)) return;
     this.sentView = this.wanted.view;
     this.nextViewAt = performance.now() + kIntervalMs;
+    this.wantedPreview = this.previewed = null; // the view is shown from now on
     this.send({ type: 'view', view: this.sentView });
   }
 
@@ -133,6 +148,10 @@ export class WorkerClient {
         this.isAwaitingCap = false;
         this.requestCap();
         break;
+      case 'preview':
+        this.isAwaitingPreview = false;
+        if (this.wantedPreview) this.preview(this.wantedPreview);
+        break;
       case 'tets':
         this.status.set({ tets: report.tets.box ? { count: report.tets.count, outOf: report.tets.outOf } : null });
         break;
@@ -148,6 +167,6 @@ export class WorkerClient {
 
   private fail(text: string): void {
     this.status.set({ error: text, saving: null, connection: { state: 'closed' } });
-    this.isAwaitingCap = false;
+    this.isAwaitingCap = this.isAwaitingPreview = false;
   }
 }

@@ -253,6 +253,38 @@ onPage('of every range, the range is chosen by two numbers, and stands in the ad
   await page.waitForFunction(() => location.hash.includes('range=-0.25,inf'));
 });
 
+onPage('of every range, handles on the histogram show what is there, and ask for the rest when they rest', async (page) => {
+  await page.getByRole('radio', { name: 'any' }).check();
+  await page.waitForSelector('#histogram:not([hidden])');
+  assert.equal(await page.textContent('#range-volume'), 'encloses 55,296 units³, 50.0 % of the box');
+  await page.evaluate(() => {
+    window.sent = [];
+    const post = Worker.prototype.postMessage;
+    Worker.prototype.postMessage = function (...message) {
+      const { type, range, view } = message[0];
+      if (range || view) window.sent.push([type, ...(range ?? view.range)]);
+      post.apply(this, message);
+    };
+  });
+  const [handle, chart] = [page.getByRole('slider', { name: 'Least value shown' }), await page.locator('#histogram').boundingBox()];
+  const at = async (share) => page.mouse.move(chart.x + share * chart.width, chart.y + chart.height / 2);
+  await at(0.5);
+  await page.mouse.down();
+  for (const share of [0.6, 0.7, 0.77]) await at(share);
+  assert.equal(await page.inputValue('#range-low'), '0.8');
+  await page.mouse.up();
+  await page.waitForFunction(() => window.sent.at(-1)?.[0] === 'view');
+  const sent = await page.evaluate(() => window.sent);
+  assert.deepEqual(sent.at(-1), ['view', 0.8, 1.5]);
+  assert.equal(sent.filter(([type]) => type === 'view').length, 1, 'no view while it moves');
+  assert.deepEqual(sent[0].slice(0, 1), ['preview']);
+  await handle.press('Home');
+  await page.waitForFunction(() => window.intervale.state.range?.[0] === -1.5);
+  assert.equal(await handle.getAttribute('aria-valuenow'), '-1.5');
+  await handle.press('ArrowRight');
+  await page.waitForFunction(() => Math.abs(window.intervale.state.range?.[0] + 1.25) < 0.1);
+});
+
 onPage('the picture returns when a lost WebGL context is restored', async (page) => {
   const old = await pixels(page);
   await page.evaluate(() => {

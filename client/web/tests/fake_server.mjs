@@ -25,6 +25,11 @@ const kDatasets = ['gyroid', 'lost', 'broken', 'full'].map((name) => ({
 }));
 const { range: _range, refine: _refine, full: _full, coefficients: _coefficients, ...common } = kDatasets[0];
 kDatasets.push({ ...common, name: 'any', scope: 'every' });
+// Values that are distributed evenly.
+const kAny = {
+  ...kDatasets.at(-1), histogram: Array(12).fill(1000), histogram_width: 0.25,
+  volumes: { values: [-1.5, 1.5], below: [0, 1], not_above: [0, 1] },
+};
 
 // token: what api/datasets requires; null: nothing.
 export async function startFakeServer(token = null) {
@@ -35,6 +40,7 @@ export async function startFakeServer(token = null) {
       if (token !== null && request.headers.authorization !== `Bearer ${token}`) return response.writeHead(401).end();
       return send(JSON.stringify({ datasets: kDatasets }), 'application/json');
     }
+    if (path === '/api/datasets/any') return send(JSON.stringify(kAny), 'application/json');
     try {
       const isWorker = /\/worker-[^/]*\.js$/.test(path);
       const file = isWorker ? join(here, 'fake_worker.js') : join(kPage, path === '/' ? 'index.html' : path);

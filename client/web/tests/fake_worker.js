@@ -259,6 +259,8 @@ self.onmessage = ({ data }) => {
     open(data.dataset);
   } else if (data.type === 'shown' && name !== 'lost') {
     timer = setTimeout(refine, 30);
+  } else if (data.type === 'preview') {
+    postMessage({ type: 'preview' });
   } else if (data.type === 'clip') {
     plane = data.plane;
     postCap();

@@ -84,6 +84,32 @@ test('a range is that of the data set, or one within it', () => {
   assert.deepEqual(values.boundMoved([1, 2], 1, Infinity), [1, Infinity]);
 });
 
+test('the share that a range encloses is the sum over what lies between', () => {
+  const pieces = Array.from({ length: 12 }, () => [random(-3, 3), random(0, 1)]); // at a value, so much
+  const total = pieces.reduce((sum, [, share]) => sum + share, 0);
+  const below = (value, withEqual) => pieces.reduce((sum, [at, share]) => sum + (at < value || (withEqual && at === value) ? share : 0), 0) / total;
+  const at = pieces.map(([value]) => value).sort((a, b) => a - b);
+  const statistics = { volumes: { values: at, below: at.map((v) => below(v, false)), notAbove: at.map((v) => below(v, true)) } };
+  for (const low of [-Infinity, -4, ...at, 0.1]) {
+    for (const high of [...at, 0.2, 4, Infinity].filter((value) => value >= low)) {
+      assertNear(values.enclosedShare(statistics, [low, high]), below(high, true) - below(low, false));
+    }
+  }
+  const even = { volumes: { values: [0, 4], below: [0, 1], notAbove: [0, 1] } };
+  assertNear(values.enclosedShare(even, [1, 2]), 0.25);
+});
+
+test('a value with few digits is off by half a step at most', () => {
+  for (let i = 0; i < 100; ++i) {
+    const [value, step] = [random(-1000, 1000), 10 ** random(-6, 2)];
+    assert.ok(Math.abs(values.rounded(value, step) - value) <= step / 2 + 1e-9);
+  }
+  assert.equal(values.rounded(57.6, 1), 58);
+  assert.equal(values.rounded(0.5039, 0.0078), 0.504);
+  assert.equal(values.rounded(0.3, 1), 0);
+  assert.equal(values.rounded(0, 1), 0);
+});
+
 test('a rotation keeps the distance, and its inverse restores the camera', () => {
   for (let i = 0; i < 100; ++i) {
     const pose = randomPose();
