@@ -22,52 +22,52 @@ void expect_near(const Vec3& a, const Vec3& b, double within) {
 class Affines : public ::testing::TestWithParam<unsigned> {
  protected:
   [[nodiscard]] Vec3 random_point(double most) {
-    return {testing::uniform(random, -most, most), testing::uniform(random, -most, most), testing::uniform(random, -most, most)};
+    return {testing::uniform(random_, -most, most), testing::uniform(random_, -most, most), testing::uniform(random_, -most, most)};
   }
-  std::mt19937 random{GetParam()};
-  Affine map = testing::random_affine(random, GetParam() % 5);
+  std::mt19937 random_{GetParam()};
+  Affine map_ = testing::random_affine(random_, GetParam() % 5);
 };
 
 TEST_P(Affines, PointsAndDirectionsComeBackByTheInverse) {
-  const Affine back = map.inverse();
+  const Affine back = map_.inverse();
   for (int trial = 0; trial < 20; ++trial) {
     const Vec3 p = random_point(9);
-    expect_near(back.point(map.point(p)), p, 1e-11);
-    expect_near(back.direction(map.direction(p)), p, 1e-11);
+    expect_near(back.point(map_.point(p)), p, 1e-11);
+    expect_near(back.direction(map_.direction(p)), p, 1e-11);
   }
-  EXPECT_NEAR(back.determinant() * map.determinant(), 1, 1e-11);
-  EXPECT_EQ(map.is_mirrored(), map.determinant() < 0);
+  EXPECT_NEAR(back.determinant() * map_.determinant(), 1, 1e-11);
+  EXPECT_EQ(map_.is_mirrored(), map_.determinant() < 0);
 }
 
 TEST_P(Affines, ATransposedNormalMeasuresInSamples) {
   for (int trial = 0; trial < 20; ++trial) {
     const Vec3 n = random_point(1), v = random_point(9);
-    EXPECT_NEAR(dot(n, map.direction(v)), dot(map.transposed(n), v), 1e-11);
-    expect_near(map.inverse().transposed(map.transposed(n)), n, 1e-11);
+    EXPECT_NEAR(dot(n, map_.direction(v)), dot(map_.transposed(n), v), 1e-11);
+    expect_near(map_.inverse().transposed(map_.transposed(n)), n, 1e-11);
   }
 }
 
 TEST_P(Affines, WhatIsTurnedKeepsLengthsAndIsTheSameForEveryRotation) {
-  const TurnedAffine turned(map);
+  const TurnedAffine turned(map_);
   for (int trial = 0; trial < 20; ++trial) {
     const Vec3 p = random_point(9);
-    expect_near(turned.turned(map.point(p)), turned.map.point(p), 1e-12 * 100);
+    expect_near(turned.turned(map_.point(p)), turned.map.point(p), 1e-12 * 100);
     EXPECT_NEAR(length(turned.turned(p)), length(p), 1e-12 * 100);
   }
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_GT(turned.map.rows[5 * i], 0);
     for (std::size_t j = 0; j < i; ++j) EXPECT_EQ(turned.map.rows[4 * i + j], 0);
   }
-  const TurnedAffine other(testing::rotated(map, testing::random_axes(random)));
+  const TurnedAffine other(testing::rotated(map_, testing::random_axes(random_)));
   for (std::size_t i = 0; i < 12; ++i) EXPECT_NEAR(other.map.rows[i], turned.map.rows[i], 1e-12 * 100);
 }
 
 TEST_P(Affines, TheBoxAroundTheSamplesHoldsAllCornersAndNoMore) {
-  const Grid grid{{4, 9, 3}, map};
+  const Grid grid{{4, 9, 3}, map_};
   const Box box = box_of(grid);
   Box corners{{kInf, kInf, kInf}, {-kInf, -kInf, -kInf}};
   for (unsigned corner = 0; corner < 8; ++corner) {
-    const Vec3 p = map.point({corner & 1 ? 3.0 : 0.0, corner & 2 ? 8.0 : 0.0, corner & 4 ? 2.0 : 0.0});
+    const Vec3 p = map_.point({corner & 1 ? 3.0 : 0.0, corner & 2 ? 8.0 : 0.0, corner & 4 ? 2.0 : 0.0});
     for (std::size_t i = 0; i < 3; ++i) {
       corners.min[i] = std::min(corners.min[i], p[i]);
       corners.max[i] = std::max(corners.max[i], p[i]);
@@ -80,23 +80,23 @@ TEST_P(Affines, TheBoxAroundTheSamplesHoldsAllCornersAndNoMore) {
 
 // A naive model: the world box around the eight corners of a diamond's box.
 TEST_P(Affines, ADiamondMeetsARegionThatItsWorldBoxTouches) {
-  const Grid grid{{17, 17, 17}, map};
+  const Grid grid{{17, 17, 17}, map_};
   const Box all = box_of(grid);
   unsigned met = 0;
   for (int trial = 0; trial < 300; ++trial) {
     Box roi;
     for (std::size_t i = 0; i < 3; ++i) {
-      roi.min[i] = testing::uniform(random, all.min[i], all.max[i]);
-      roi.max[i] = roi.min[i] + testing::uniform(random, 0, all.max[i] - all.min[i]) / 4;
+      roi.min[i] = testing::uniform(random_, all.min[i], all.max[i]);
+      roi.max[i] = roi.min[i] + testing::uniform(random_, 0, all.max[i] - all.min[i]) / 4;
     }
     const SeenBox seen(roi, grid);
-    const Vertex c{std::int32_t(random() % 17), std::int32_t(random() % 17), std::int32_t(random() % 17)};
-    const std::int32_t h = 1 << random() % 3;
+    const Vertex c{std::int32_t(random_() % 17), std::int32_t(random_() % 17), std::int32_t(random_() % 17)};
+    const std::int32_t h = 1 << random_() % 3;
     bool meets = true;
     for (std::size_t i = 0; i < 3; ++i) {
       double low = kInf, high = -kInf;
       for (unsigned corner = 0; corner < 8; ++corner) {
-        const double at = map.point({c.x + (corner & 1 ? h : -h) * 1.0, c.y + (corner & 2 ? h : -h) * 1.0, c.z + (corner & 4 ? h : -h) * 1.0})[i];
+        const double at = map_.point({c.x + (corner & 1 ? h : -h) * 1.0, c.y + (corner & 2 ? h : -h) * 1.0, c.z + (corner & 4 ? h : -h) * 1.0})[i];
         low = std::min(low, at);
         high = std::max(high, at);
       }
