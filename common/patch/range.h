@@ -37,18 +37,23 @@ struct Cuts {
 
 // The cuts of an edge whose ends have the finite values `from` and `to`; exchanging the ends gives the reversed cuts.
 // Where alpha < beta and both surfaces cut, the cut nearer to `from` stays strictly nearer: if quantisation makes them
-// equal, one moves by a step.
+// equal, one moves by a step, so that neither is off by more than a step; nor by more than one and a half at the ends of the edge.
 [[nodiscard]] inline Cuts cuts_between(double from, double to, const Range& range) {
   const double low = std::min(from, to), high = std::max(from, to);
   const Side a = side_of(low, range), b = side_of(high, range);
   const double whole = high / 2 - low / 2;  // halved: the difference of two doubles can overflow
-  const auto quantised = [low, whole](double kappa) { return std::uint8_t(std::clamp((kappa / 2 - low / 2) / whole * 256, 0.0, 255.0)); };
+  const auto half_steps = [low, whole](double kappa) { return unsigned(std::clamp((kappa / 2 - low / 2) / whole * 512, 0.0, 511.0)); };
   Cuts cuts;
-  if (alpha_cuts(a, b)) cuts.q[cuts.count++] = quantised(range.alpha);
-  if (beta_cuts(a, b)) cuts.q[cuts.count++] = quantised(range.beta);
-  if (cuts.count == 2 && range.alpha < range.beta && cuts.q[0] >= cuts.q[1]) {
-    if (cuts.q[0] == 255) cuts.q[0] = 254;
-    cuts.q[1] = std::uint8_t(cuts.q[0] + 1);
+  if (alpha_cuts(a, b)) cuts.q[cuts.count++] = std::uint8_t(half_steps(range.alpha) / 2);
+  if (beta_cuts(a, b)) cuts.q[cuts.count++] = std::uint8_t(half_steps(range.beta) / 2);
+  if (cuts.count == 2 && range.alpha < range.beta && cuts.q[0] == cuts.q[1]) {
+    // If beta lies in the lower half of the step, so does alpha.
+    const bool is_lower = half_steps(range.beta) % 2 == 0;
+    if (cuts.q[0] == 255 || (is_lower && cuts.q[0] > 0)) {
+      --cuts.q[0];
+    } else {
+      ++cuts.q[1];
+    }
   }
   return from > to ? reversed(cuts) : cuts;
 }

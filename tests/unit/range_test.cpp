@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <random>
+#include <utility>
 
 namespace intervale {
 namespace {
@@ -60,6 +61,24 @@ TEST(Range, ACutIsWithinHalfAStepOfTheTruth) {
     const Cuts c = cuts_between(0, 10, {kappa, kInf});
     ASSERT_EQ(c.count, 1);
     EXPECT_LE(std::abs((c.q[0] + 0.5) / 256 - kappa / 10), 0.5 / 256 + 1e-12);
+  }
+}
+
+TEST(Range, TwoCutsInOneStepAreOffByAStepAtMost) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> share(0, 1);
+  for (int i = 0; i < 100000; ++i) {
+    const int step = int(random() % 256);
+    double a = (step + share(random)) / 256, b = (step + share(random)) / 256;
+    if (a > b) std::swap(a, b);
+    if (a == b || a == 0) continue;
+    const Cuts up = cuts_between(0, 1, {a, b}), down = reversed(cuts_between(1, 0, {a, b}));
+    ASSERT_EQ(up.count, 2);
+    ASSERT_LT(up.q[0], up.q[1]);
+    ASSERT_TRUE(up.q[0] == down.q[0] && up.q[1] == down.q[1]);
+    const double most = (step == 0 || step == 255 ? 1.5 : 1) / 256 + 1e-12;
+    EXPECT_LE(std::abs((up.q[0] + 0.5) / 256 - a), most);
+    EXPECT_LE(std::abs((up.q[1] + 0.5) / 256 - b), most);
   }
 }
 
