@@ -30,6 +30,12 @@ constexpr double kInsideBox = 1.0 / (1 << 16);  // of a sample: points in the fa
 
 using Tet = BisectionTet;
 
+// Where a value lies between two others, 0 at `from` and 1 at `to`. Halved if their difference is more than a double holds.
+double part_of(double value, double from, double to) {
+  const double whole = to - from;
+  return std::isfinite(whole) ? (value - from) / whole : (value / 2 - from / 2) / (to / 2 - from / 2);
+}
+
 // A point where the field crosses a surface.
 struct Crossing {
   std::array<float, 4> at;  // barycentric coordinates
@@ -132,11 +138,11 @@ class Descent {
     for (int k = 0; k < surfaces_; ++k) {
       const double isovalue = surface_[k].value, first = double(samples[0]), last = double(samples[steps * stride]);
       if (!surface_[k].separates(first, last)) continue;
-      const double cut = steps * (isovalue - first) / (last - first);
+      const double cut = steps * part_of(isovalue, first, last);
       double nearest = steps;
       for (int i = 0; i < steps; ++i) {
         const double u = double(samples[i * stride]), w = double(samples[(i + 1) * stride]);
-        if (surface_[k].separates(u, w)) nearest = std::min(nearest, std::abs(i + (isovalue - u) / (w - u) - cut));
+        if (surface_[k].separates(u, w)) nearest = std::min(nearest, std::abs(i + part_of(isovalue, u, w) - cut));
       }
       far = std::max(far, nearest);
     }
@@ -199,7 +205,7 @@ class Descent {
     const double a = double(*first), b = double(*second);
     for (int k = 0; k < surfaces_; ++k) {
       if (!surface_[k].separates(a, b)) continue;
-      const double t = (surface_[k].value - a) / (b - a);
+      const double t = part_of(surface_[k].value, a, b);
       Vec3 p;  // in the cube, from 0 at the start of the spine to 1 at its end
       for (int i = 0; i < 3; ++i) {
         p[i] = std::min(v[i] - cube.low[i] + even[i] + t * (odd[i] - even[i]), cube.most[i]);
