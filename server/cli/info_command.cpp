@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <cmath>
 #include <memory>
 #include <type_traits>
 
@@ -29,21 +30,23 @@ struct InfoCommand {
 std::uint64_t size_of(const IntervalVolume& volume) { return volume.size(); }
 std::uint64_t size_of(const ValueVolume& volume) { return volume.set().size(); }
 
+// Of the box of the samples, which may be oblique: in cubic world units.
 double box_volume(const Grid& grid) {
-  const Box box = box_of(grid);
-  return (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]) * (box.max[2] - box.min[2]);
+  double volume = std::abs(grid.affine.determinant());
+  for (const std::int32_t n : grid.dims) volume *= n - 1;
+  return volume;
 }
 
-// The share of the box where the interpolated field lies in a range: from the table of volumes, or summed over the mesh.
-Result<double> share_of(const std::shared_ptr<const ValueVolume>& set, const Range& range) {
-  return set->description().statistics.volumes.share_of(range);
+// The volume where the interpolated field lies in a range: from the table of volumes, or summed over the mesh.
+Result<double> enclosed_volume(const std::shared_ptr<const ValueVolume>& set, const Range& range) {
+  return set->description().statistics.volumes.share_of(range) * box_volume(set->description().grid);
 }
-Result<double> share_of(const std::shared_ptr<const IntervalVolume>& set, const Range& range) {
+Result<double> enclosed_volume(const std::shared_ptr<const IntervalVolume>& set, const Range& range) {
   const ShownRange shown = resolve(set->description(), {range, {}});
   if (auto held = check_held(set->description(), shown); !held) return tl::unexpected(held.error());
   const auto extracted = extract(*set, *find_relevant_updates(set, shown, false), {}, on_all_cores);
   if (!extracted) return tl::unexpected(extracted.error());
-  return volume_of(extracted->front.mesh(on_all_cores)) / box_volume(set->description().grid);
+  return volume_of(extracted->front.mesh(on_all_cores));
 }
 
 // What both commands do, with a data set of one range or of every range.
@@ -52,20 +55,20 @@ struct Info {
   Result<void> operator()(const InfoCommand& options, const std::shared_ptr<const DataSet>& set) const {
     const auto range = parse_range(options.range);
     if (!range) return tl::unexpected(range.error());
-    const auto share = *range ? share_of(set, **range) : Result<double>(0);
-    if (!share) return tl::unexpected(share.error());
-    const double volume = *share * box_volume(set->description().grid);
+    const auto volume = *range ? enclosed_volume(set, **range) : Result<double>(0);
+    if (!volume) return tl::unexpected(volume.error());
+    const double share = *volume / box_volume(set->description().grid);
     if (options.json) {
       auto stats = stats_of(*set, options.file);
       if (*range) {
-        stats["enclosed_volume"] = volume;
-        stats["enclosed_share"] = *share;
+        stats["enclosed_volume"] = *volume;
+        stats["enclosed_share"] = share;
       }
       return print_json(stats);
     }
     std::string text = text_of(*set, options.file);
     if (*range)
-      text += fmt::format("range [{:g}, {:g}]: volume {:.6g}, {:.4g} % of the box\n", (*range)->alpha, (*range)->beta, volume, 100 * *share);
+      text += fmt::format("range [{:g}, {:g}]: volume {:.6g}, {:.4g} % of the box\n", (*range)->alpha, (*range)->beta, *volume, 100 * share);
     return print(text);
   }
 };

@@ -59,6 +59,16 @@ TEST(Oblique, AnAffineOfTheCommandLineGoesThroughEveryProgram) {
   const auto after = json_of(run({program("intervale"), "extract", oblique, "--json", "--digest"}));
   EXPECT_EQ(after.at("tets"), before.at("tets"));
   EXPECT_NEAR(after.at("volume").get<double>(), 6 * before.at("volume").get<double>(), 1e-9 * after.at("volume").get<double>());
+  const std::string every = folder / "every.ivm";
+  std::vector<std::string> build{program("intervale"), "build", raw, "-o", every, "--dims", "9", "8", "7", "--type", "u8"};
+  build.insert(build.end(), kAffine.begin(), kAffine.end());
+  ASSERT_EQ(run(build).status, 0);
+  constexpr double kBox = 6 * 8 * 7 * 6;  // of the samples; the box around them in the world is larger
+  for (const std::string& file : {oblique, every}) {
+    const auto enclosed = json_of(run({program("intervale"), "info", file, "--range", "40", "90", "--json"}));
+    EXPECT_NEAR(enclosed.at("enclosed_volume").get<double>(), after.at("volume").get<double>(), 0.001 * kBox) << file;
+    EXPECT_NEAR(enclosed.at("enclosed_share").get<double>() * kBox, enclosed.at("enclosed_volume").get<double>(), 1e-9) << file;
+  }
   ServerProgram server(oblique);
   EXPECT_EQ(fetch_json({"--digest"}, server.url("oblique")).at("digest"), after.at("digest"));
   const auto listed = json_of(run({client(), "list", server.url(), "--json"})).at("datasets").at(0);
