@@ -118,6 +118,7 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   to.corners = d.corners;
   to.weights = volume.weights();
   to.max_error = d.max_error;
+  to.content_hash = d.content_hash;
   for (int level = 0; level < kErrorLevels; ++level) parts.error_steps.push_back(round_up(volume.error(ErrorLevel(level))));
   parts.steps = std::move(levels);
   parts.error_to_distance.resize(volume.set().supercubes());

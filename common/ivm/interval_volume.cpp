@@ -1,45 +1,9 @@
 #include "common/ivm/interval_volume.h"
 
-#include <xxhash.h>
-
 #include <algorithm>
 #include <cmath>
 
 namespace intervale {
-namespace {
-
-std::uint64_t hash(const void* data, std::size_t bytes, std::uint64_t seed) { return XXH3_64bits_withSeed(data, bytes, seed); }
-
-template <class T>
-std::uint64_t hash(std::span<const T> values, std::uint64_t seed) {
-  return hash(values.data(), values.size_bytes(), seed);
-}
-
-std::uint64_t content_hash(const Description& d, const IntervalVolume::Parts& parts) {
-  std::uint64_t h = 0;
-  h = hash(std::span<const std::int32_t>(d.grid.dims), h);
-  h = hash(std::span<const double>(d.grid.affine.rows), h);
-  const double range[2] = {d.range.alpha, d.range.beta};
-  h = hash(range, sizeof range, h);
-  const double step = d.format.step;
-  h = hash(&step, sizeof step, h);
-  const std::uint64_t format[4] = {std::uint64_t(d.format.type), std::uint64_t(d.format.first), d.format.last, std::uint64_t(d.is_exact)};
-  h = hash(format, sizeof format, h);
-  if (d.format.table) h = hash(std::span<const double>(*d.format.table), h);
-  h = hash(std::span<const ValueKey>(d.corners), h);
-  h = hash(&d.weights, sizeof d.weights, h);
-  for (const SupercubeSet::Brick& b : parts.set.bricks()) {
-    const std::uint64_t brick[2] = {b.key, b.mask};
-    h = hash(brick, sizeof brick, h);
-  }
-  h = hash(parts.set.occupancy(), h);
-  h = hash(parts.keys.bytes(), h);
-  h = hash(std::span<const std::uint8_t>(parts.steps), h);
-  h = hash(std::span<const float>(parts.error_steps), h);
-  return hash(std::span<const ErrorToDistance>(parts.error_to_distance), h);
-}
-
-}  // namespace
 
 IntervalVolume::IntervalVolume(Parts parts)
     : description_(std::move(parts.description)),
@@ -73,7 +37,6 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
     if (parts.keys[i] > d.format.last) return fail("an update's value is out of range");
   }
   parts.description.updates = parts.set.size();
-  parts.description.content_hash = content_hash(d, parts);
   return IntervalVolume(std::move(parts));
 }
 

@@ -31,7 +31,7 @@ class IntervalVolume {
  public:
   // The arrays that an interval volume is made of.
   struct Parts {
-    Description description;  // updates and content_hash are computed
+    Description description;  // updates are computed
     SupercubeSet set;
     ValueKeys keys;                                  // by number of the update: of the value at the diamond's centre
     std::vector<std::uint8_t> steps;                 // by number of the update: which of error_steps its error is

@@ -43,8 +43,8 @@ constexpr std::uint32_t kCommon =
 constexpr std::uint32_t kStatistics = bit_of(StreamType::histogram) | bit_of(StreamType::volumes);
 constexpr std::uint32_t kForPeople = kStatistics | bit_of(StreamType::labels);  // what a mesh can do without
 constexpr std::uint32_t kSometimes = bit_of(StreamType::value_table);
-constexpr std::uint32_t types_of(Scope scope) {
-  if (scope == Scope::every_range) return kCommon | kStatistics | kSometimes;
+constexpr std::uint32_t types_of(FileScope scope) {
+  if (scope == FileScope::every_range) return kCommon | kStatistics | kSometimes;
   return ((std::uint32_t(1) << kStreamTypes) - 2) & ~kStatistics;
 }
 
@@ -54,6 +54,18 @@ std::uint64_t head_checksum(std::span<const std::byte> head) {
   return XXH3_64bits(copy.data(), copy.size());
 }
 
+// Of what makes the mesh: over the checksums of the streams that are not optional, by type. That of the page index stands
+// for the pages, whose checksums it has.
+std::uint64_t hash_of_contents(std::vector<Entry> entries) {
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.type < b.type; });
+  std::vector<std::uint64_t> checksums;
+  checksums.reserve(entries.size());
+  for (const Entry& e : entries) {
+    if ((e.flags & kOptional) == 0) checksums.push_back(e.checksum);
+  }
+  return XXH3_64bits(checksums.data(), 8 * checksums.size());
+}
+
 // A header and its table, checked.
 struct Head {
   Header header{};
@@ -61,7 +73,7 @@ struct Head {
   [[nodiscard]] bool has(StreamType type) const {
     return std::any_of(entries.begin(), entries.end(), [type](const Entry& e) { return e.type == std::uint32_t(type); });
   }
-  [[nodiscard]] Scope scope() const { return has(StreamType::range) ? Scope::one_range : Scope::every_range; }
+  [[nodiscard]] FileScope scope() const { return has(StreamType::range) ? FileScope::one_range : FileScope::every_range; }
 };
 
 std::string name_of(std::uint32_t type) { return "stream " + std::to_string(type); }
@@ -112,10 +124,10 @@ Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes) {
 }
 
 // The same, of a file that must have a scope, if there is one.
-Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes, std::optional<Scope> scope) {
+Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes, std::optional<FileScope> scope) {
   auto head = read_head(start, bytes);
   if (!head || !scope || head->scope() == *scope) return head;
-  if (*scope == Scope::one_range) return fail("a data set of every range, not of one range");
+  if (*scope == FileScope::one_range) return fail("a data set of every range, not of one range");
   return fail("a data set of one range, not of every range");
 }
 
@@ -131,7 +143,7 @@ Result<std::vector<std::byte>> read_start(std::ifstream& in, std::uint64_t& byte
   return start;
 }
 
-Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std::optional<Scope> scope) {
+Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std::optional<FileScope> scope) {
   std::error_code code;
   if (std::filesystem::is_directory(path, code)) return fail("is a folder, not an interval volume file (.ivm)");
   std::ifstream in(path, std::ios::binary | std::ios::ate);
@@ -149,24 +161,27 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
 
 }  // namespace
 
-std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, const Streams& streams) {
+std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
   std::uint32_t types = types_of(scope);
   if (streams[StreamType::value_table].empty()) types &= ~bit_of(StreamType::value_table);
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   header.version = kIvmVersion;
   header.streams = std::uint32_t(std::popcount(types));
-  header.content_hash = content_hash;
   header.file_bytes = sizeof(Header) + header.streams * sizeof(Entry);
   std::vector<std::byte> file(sizeof(Header));
+  std::vector<Entry> entries;
+  entries.reserve(header.streams);
   for (const int type : set_bits(types)) {
     const auto& bytes = streams[StreamType(type)];
     const bool is_pages = StreamType(type) == StreamType::pages;
     const Entry e{std::uint32_t(type), (kForPeople >> type & 1) != 0 ? kOptional : 0, header.file_bytes, bytes.size(),
                   is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size())};
-    append(file, std::span(&e, 1));
+    entries.push_back(e);
     header.file_bytes += bytes.size();
   }
+  append<Entry>(file, entries);
+  header.content_hash = hash_of_contents(entries);
   std::memcpy(file.data(), &header, sizeof header);
   header.checksum = head_checksum(file);
   std::memcpy(file.data(), &header, sizeof header);
@@ -175,9 +190,10 @@ std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, c
   return file;
 }
 
-Result<Container> Container::open(std::span<const std::byte> file, Scope scope) {
+Result<Container> Container::open(std::span<const std::byte> file, FileScope scope) {
   const auto head = read_head(file, file.size(), scope);
   if (!head) return tl::unexpected(head.error());
+  if (head->header.content_hash != hash_of_contents(head->entries)) return fail("the header is damaged (content hash)");
   Container container;
   container.content_hash_ = head->header.content_hash;
   container.file_bytes_ = file.size();
@@ -196,12 +212,12 @@ Result<std::span<const std::byte>> Container::stream(StreamType type, std::size_
   return fail(name_of(std::uint32_t(type)) + " has " + std::to_string(found.size()) + " bytes, " + std::to_string(bytes) + " expected");
 }
 
-std::optional<Scope> scope_of(std::span<const std::byte> file) {
+std::optional<FileScope> scope_of(std::span<const std::byte> file) {
   const auto head = read_head(file, file.size());
   return head ? std::optional(head->scope()) : std::nullopt;
 }
 
-std::optional<Scope> scope_of(const std::filesystem::path& path) {
+std::optional<FileScope> scope_of(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   std::uint64_t size = 0;
   if (!in) return {};
@@ -212,7 +228,7 @@ std::optional<Scope> scope_of(const std::filesystem::path& path) {
   return head->scope();
 }
 
-Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<Scope> scope) {
+Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<FileScope> scope) {
   auto bytes = read_bytes(path, scope);
   if (!bytes) return fail(path.string() + ": " + bytes.error().message);
   return bytes;

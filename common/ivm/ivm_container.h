@@ -38,7 +38,7 @@ enum class StreamType : std::uint32_t {
 };
 inline constexpr std::uint32_t kStreamTypes = 16;  // and one more, as 0 is none
 
-enum class Scope { every_range, one_range };
+enum class FileScope { every_range, one_range };  // of which ranges a data set is
 
 // The streams of a file, by type. A scope has some of the types; the others are empty.
 class Streams {
@@ -62,17 +62,17 @@ void append(std::vector<std::byte>& out, std::span<const T> values) {
 }
 
 // The file's bytes.
-[[nodiscard]] std::vector<std::byte> make_container(Scope scope, std::uint64_t content_hash, const Streams& streams);
+[[nodiscard]] std::vector<std::byte> make_container(FileScope scope, const Streams& streams);
 
 // A file from outside: its header, table and checksums are in order, and it has the streams of its scope; optional ones
-// of an unknown type are skipped, once their checksums were checked. Pages have
-// checksums of their own, which whoever reads them must check. value_table is empty if the file has none.
+// of an unknown type are skipped, once their checksums were checked. Pages have checksums of their own, which whoever
+// reads them must check. value_table is empty if the file has none.
 class Container {
  public:
   // The file must outlive the result. Fails, in one line, if it is not a file of this scope.
-  static Result<Container> open(std::span<const std::byte> file, Scope scope);
+  static Result<Container> open(std::span<const std::byte> file, FileScope scope);
 
-  [[nodiscard]] std::uint64_t content_hash() const { return content_hash_; }  // as the header has it
+  [[nodiscard]] std::uint64_t content_hash() const { return content_hash_; }  // Description::content_hash
   [[nodiscard]] std::size_t file_bytes() const { return file_bytes_; }
   // The bytes of a stream of the scope.
   [[nodiscard]] std::span<const std::byte> operator[](StreamType type) const { return streams_[std::size_t(type)]; }
@@ -87,14 +87,14 @@ class Container {
 
 // The scope of a file, from its beginning. Nothing if it cannot be read, or is not a whole file of this version: those
 // who open it say why.
-[[nodiscard]] std::optional<Scope> scope_of(const std::filesystem::path& path);
+[[nodiscard]] std::optional<FileScope> scope_of(const std::filesystem::path& path);
 
 // The same, from all of a file's bytes.
-[[nodiscard]] std::optional<Scope> scope_of(std::span<const std::byte> file);
+[[nodiscard]] std::optional<FileScope> scope_of(std::span<const std::byte> file);
 
 // The bytes of a file, for Container::open. Checks the header, the scope if one is given, and the length first, and
 // allocates nothing for another file. Errors begin with the path.
-[[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<Scope> scope);
+[[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<FileScope> scope);
 
 // Writes a temporary file and renames it. Errors name the path.
 [[nodiscard]] Result<void> save_container(const std::filesystem::path& path, std::span<const std::byte> bytes);

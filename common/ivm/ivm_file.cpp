@@ -187,15 +187,16 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
     append_plane(stored, contents_of(volume, kCompressed[i]), kCompression);
     append<std::uint8_t>(streams[kCompressed[i]], stored);
   });
-  return make_container(Scope::one_range, volume.description().content_hash, streams);
+  return make_container(FileScope::one_range, streams);
 }
 
 Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {
-  const auto file = Container::open(bytes, Scope::one_range);
+  const auto file = Container::open(bytes, FileScope::one_range);
   if (!file) return tl::unexpected(file.error());
   IntervalVolume::Parts parts;
   Description& d = parts.description;
   d.name = std::move(name);
+  d.content_hash = file->content_hash();
   if (auto ok = read_field(*file, d); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_labels(*file, d.labels); !ok) return tl::unexpected(ok.error());
   const auto record = read_range(*file, d);
@@ -208,9 +209,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   parts.keys = ValueKeys(parts.set.size(), d.format.last);
   if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_errors(*file, *record, parts); !ok) return tl::unexpected(ok.error());
-  auto volume = IntervalVolume::assemble(std::move(parts));
-  if (volume && volume->description().content_hash != file->content_hash()) return fail("the contents differ from what was written (content hash)");
-  return volume;
+  return IntervalVolume::assemble(std::move(parts));
 }
 
 Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel) {
@@ -218,7 +217,7 @@ Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& v
 }
 
 Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel) {
-  const auto bytes = read_container(path, Scope::one_range);
+  const auto bytes = read_container(path, FileScope::one_range);
   if (!bytes) return tl::unexpected(bytes.error());
   auto volume = decode_ivm(*bytes, path.stem().string(), parallel);
   if (!volume) return fail(path.string() + ": " + volume.error().message);

@@ -12,7 +12,7 @@ namespace intervale {
 Result<std::vector<std::byte>> read_volume_file(const std::filesystem::path& path) { return read_container(path, {}); }
 
 Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {
-  if (scope_of(bytes) != Scope::every_range) return decode_ivm(bytes, std::move(name), parallel);
+  if (scope_of(bytes) != FileScope::every_range) return decode_ivm(bytes, std::move(name), parallel);
   auto values = decode_values(bytes, std::move(name), parallel);
   if (!values) return tl::unexpected(values.error());
   return of_every_range(std::move(*values).take(), parallel);

@@ -1,7 +1,5 @@
 #include "common/ivm/value_file.h"
 
-#include <xxhash.h>
-
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -94,7 +92,7 @@ Result<void> read_volumes(std::span<const std::byte> bytes, FieldDescription& d)
 
 }  // namespace
 
-bool is_value_file(const std::filesystem::path& path) { return scope_of(path) == Scope::every_range; }
+bool is_value_file(const std::filesystem::path& path) { return scope_of(path) == FileScope::every_range; }
 
 std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel) {
   const FieldDescription& d = volume.description();
@@ -102,16 +100,11 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
   append_values(streams, volume.parts(), d.is_exact, parallel);
   append_labels(streams, d.labels);
   append_statistics(d, streams[StreamType::histogram], streams[StreamType::volumes]);
-  const auto &index = streams[StreamType::page_index], &field = streams[StreamType::field];
-  const auto& table = streams[StreamType::value_table];
-  std::uint64_t hash = XXH3_64bits(index.data(), index.size());
-  hash = XXH3_64bits_withSeed(field.data(), field.size(), hash);
-  if (!table.empty()) hash = XXH3_64bits_withSeed(table.data(), table.size(), hash);
-  return make_container(Scope::every_range, hash, streams);
+  return make_container(FileScope::every_range, streams);
 }
 
 Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {
-  const auto file = Container::open(bytes, Scope::every_range);
+  const auto file = Container::open(bytes, FileScope::every_range);
   if (!file) return tl::unexpected(file.error());
   ValueVolume::Parts parts;
   FieldDescription& d = parts.description;
@@ -140,7 +133,7 @@ Result<std::uint64_t> save_values(const std::filesystem::path& path, const Value
 }
 
 Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel) {
-  const auto bytes = read_container(path, Scope::every_range);
+  const auto bytes = read_container(path, FileScope::every_range);
   if (!bytes) return tl::unexpected(bytes.error());
   auto volume = decode_values(*bytes, path.stem().string(), parallel);
   if (!volume) return fail(path.string() + ": " + volume.error().message);

@@ -42,7 +42,8 @@ struct FieldDescription {
   bool is_exact = true;                           // whether every sample is the value of its key
   double max_error = 0;                           // the largest error, in the field's units
   FieldStatistics statistics;
-  std::uint64_t content_hash = 0;  // of the contents; the name and the labels do not count
+  // Of the file that it was read from: of its contents, where the name and the labels do not count. 0: it was not read.
+  std::uint64_t content_hash = 0;
   friend bool operator==(const FieldDescription&, const FieldDescription&) = default;
 };
 

@@ -63,7 +63,8 @@ struct Description {
   std::uint64_t updates = 0;                      // relevant diamonds
   std::uint64_t coefficients = 0;                 // cuts on their subdivision edges, at full detail
   FullMesh full;
-  std::uint64_t content_hash = 0;  // of the contents; the name and the labels do not count
+  // Of the file that it was read from: of its contents, where the name and the labels do not count. 0: it was not read.
+  std::uint64_t content_hash = 0;
   // What is shown if nothing else is asked for.
   [[nodiscard]] ShownRange whole() const { return {range, refine}; }
   friend bool operator==(const Description&, const Description&) = default;

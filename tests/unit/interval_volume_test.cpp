@@ -1,4 +1,5 @@
 #include "common/ivm/interval_volume.h"
+#include "common/ivm/ivm_file.h"
 #include "common/ivm/verify.h"
 #include "common/patch/key_sides.h"
 
@@ -259,9 +260,11 @@ TEST_P(IntervalVolumeAssemble, RefusesAFormatThatIsNone) {
 }
 
 TEST_P(IntervalVolumeAssemble, AnotherPartIsAnotherContent) {
-  const auto hash_after = [&](auto change) { return changed(change)->description().content_hash; };
-  const std::uint64_t hash = made_.description().content_hash;
+  const auto hash_of = [](const IntervalVolume& volume) { return decode_ivm(encode_ivm(volume), "read")->description().content_hash; };
+  const auto hash_after = [&](auto change) { return hash_of(*changed(change)); };
+  const std::uint64_t hash = hash_of(made_);
   EXPECT_EQ(hash_after([](Parts& p) { p.description.name += "'"; }), hash);
+  EXPECT_EQ(hash_after([](Parts& p) { p.description.labels.field = "density"; }), hash);
   EXPECT_NE(hash_after([](Parts& p) { p.error_to_distance.back() = ErrorToDistance(std::uint8_t(p.error_to_distance.back().code() ^ 1)); }), hash);
   EXPECT_NE(hash_after([](Parts& p) { p.keys.set(0, p.keys[0] == 0 ? 1 : p.keys[0] - 1); }), hash);
   EXPECT_NE(hash_after([](Parts& p) { p.steps.back() = std::uint8_t(p.steps.back() == 0 ? 1 : 0); }), hash);

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "common/ivm/extraction.h"
+#include "common/ivm/ivm_file.h"
 #include "protocol/codec.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
@@ -87,7 +88,7 @@ TEST_F(ViewingSessionTest, StartsAgainWithOtherData) {
     server.run(3);
     session.disconnected();
   }
-  const auto other = volume_of({12, 20, 9});
+  const auto other = std::make_shared<const IntervalVolume>(decode_ivm(encode_ivm(*volume_of({12, 20, 9})), volume->description().name).value());
   Server server(other, session);
   server.run();
   EXPECT_EQ(session.session().stats().updates, other->size());
