@@ -9,7 +9,6 @@
 #include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/block_lattice.h"
 #include "common/ivm/saturate.h"
-#include "common/patch/key_sides.h"
 #include "common/util/round_up.h"
 
 namespace intervale {
@@ -61,42 +60,6 @@ void add_finest_levels(const ValueVolume& volume, std::vector<ErrorLevel>& level
   saturate(set, levels, 1, parallel);
 }
 
-// Whether a diamond counts for a range. around: the keys of its vertices, or kNoKey.
-bool counts(const KeySides& sides, Refine refine, int vertices, const VertexKeys& around, ValueKey centre) {
-  ValueKey least = centre, greatest = centre;
-  for (std::size_t v = 0; v < std::size_t(vertices); ++v) {
-    if (around[v] == kNoKey) continue;
-    least = std::min(least, around[v]);
-    greatest = std::max(greatest, around[v]);
-  }
-  const Side low = sides.side(least), high = sides.side(greatest);
-  return low != high || (refine == Refine::uniform && low == Side::inside);
-}
-
-// Adds all ancestors. slots: by supercube.
-void close(const SupercubeSet& set, std::vector<std::uint64_t>& slots) {
-  SetNeighbours around(set);
-  for (int scale = 0; scale < kMaxLevels; ++scale) {
-    const auto [begin, end] = set.of_scale(scale);
-    for (int cls = 2; cls >= 0; --cls) {
-      for (BrickIndex brick = begin; brick < end; ++brick) {
-        set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-          const std::uint64_t chosen = slots[s] & kSlotsOfClass[std::size_t(cls)];
-          if (chosen == 0) return;
-          around.move_to(key);
-          for (const Slot slot : set_bits<Slot>(chosen)) {
-            const Links& links = around.links(slot);
-            for (std::size_t k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
-              const auto parent = around.at(links.vertex[links.parent[k]]);
-              if (parent.supercube.has(parent.slot)) slots[parent.supercube.supercube] |= std::uint64_t(1) << parent.slot;
-            }
-          }
-        });
-      }
-    }
-  }
-}
-
 }  // namespace
 
 Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelFor& parallel) {
@@ -126,32 +89,7 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   parts.statistics = std::make_shared<const FieldStatistics>(std::move(values.description.statistics));
   parts.set = std::move(values.set);
   parts.keys = std::move(values.keys);
-  return IntervalVolume::assemble(std::move(parts));
-}
-
-std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel) {
-  const SupercubeSet& set = volume.set();
-  const KeySides sides(volume.description().format, shown.range);
-  const std::vector<BrickRun> blocks = blocks_of(set);
-  std::vector<std::uint64_t> slots(set.supercubes());
-  parallel(blocks.size(), [&](std::size_t block) {
-    BlockLattice lattice(volume);
-    lattice.move_to(block_of(set.bricks()[blocks[block].first].key), BlockLattice::Load::all);
-    VertexKeys around{};
-    for (BrickIndex brick = blocks[block].first; brick < blocks[block].end; ++brick) {
-      set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey supercube) {
-        const BlockLattice::Point at = lattice.at(supercube);
-        for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
-          const BlockLattice::Point centre = at + BlockLattice::of_slot(slot);
-          lattice.gather(centre, slot, around);
-          if (counts(sides, shown.refine, diamond_type(kTypeOfSlot[slot]).vertices, around, lattice.key(centre)))
-            slots[s] |= std::uint64_t(1) << slot;
-        }
-      });
-    }
-  });
-  close(set, slots);
-  return slots;
+  return IntervalVolume::assemble(std::move(parts), parallel);
 }
 
 }  // namespace intervale

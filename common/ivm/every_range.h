@@ -11,8 +11,4 @@ namespace intervale {
 // all updates, and no distances.
 [[nodiscard]] Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelFor& parallel = serial);
 
-// The slots of a volume's diamonds that are relevant, by supercube: those that count for the range (front.h), and their
-// ancestors.
-[[nodiscard]] std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel = serial);
-
 }  // namespace intervale

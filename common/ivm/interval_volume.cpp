@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/ivm/value_bounds.h"
+
 namespace intervale {
 
-IntervalVolume::IntervalVolume(Parts parts)
+IntervalVolume::IntervalVolume(Parts parts, std::shared_ptr<const ValueBounds> bounds)
     : description_(std::move(parts.description)),
       domain_(description_.grid.dims),
       set_(std::move(parts.set)),
@@ -13,9 +15,10 @@ IntervalVolume::IntervalVolume(Parts parts)
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
       relevant_(description_.grid, set_, {steps_, error_steps_}, description_.whole(), {}, std::move(parts.error_to_distance)),
+      bounds_(std::move(bounds)),
       statistics_(std::move(parts.statistics)) {}
 
-Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
+Result<IntervalVolume> IntervalVolume::assemble(Parts parts, const ParallelFor& parallel) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
   if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.error_to_distance.size() != parts.set.supercubes())
@@ -37,12 +40,15 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
     if (parts.keys[i] > d.format.last) return fail("an update's value is out of range");
   }
   parts.description.updates = parts.set.size();
-  return IntervalVolume(std::move(parts));
+  std::shared_ptr<const ValueBounds> bounds;
+  if (d.refine == Refine::uniform) bounds = std::make_shared<const ValueBounds>(parts, parallel);
+  return IntervalVolume(std::move(parts), std::move(bounds));
 }
 
 std::size_t IntervalVolume::memory_bytes() const {
   return sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
-         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + (statistics_ ? statistics_->memory_bytes() : 0);
+         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + (bounds_ ? bounds_->memory_bytes() : 0) +
+         (statistics_ ? statistics_->memory_bytes() : 0);
 }
 
 }  // namespace intervale

@@ -21,11 +21,14 @@
 #include "common/ivm/value_keys.h"
 #include "common/patch/description.h"
 #include "common/patch/range.h"
+#include "common/util/parallel.h"
 #include "common/util/result.h"
 
 namespace intervale {
 
 inline constexpr int kMaxErrorSteps = 256;  // distinct errors at most; each update's is rounded up to one of them
+
+class ValueBounds;
 
 class IntervalVolume {
  public:
@@ -40,7 +43,7 @@ class IntervalVolume {
     std::shared_ptr<const FieldStatistics> statistics = {};
   };
   // Fails where sizes or ranges of the parts do not match; validate() checks the meaning.
-  static Result<IntervalVolume> assemble(Parts parts);
+  static Result<IntervalVolume> assemble(Parts parts, const ParallelFor& parallel = serial);
 
   [[nodiscard]] const Description& description() const { return description_; }
   [[nodiscard]] const Domain& domain() const { return domain_; }
@@ -56,12 +59,14 @@ class IntervalVolume {
   [[nodiscard]] const ValueKeys& keys() const { return keys_; }
   // What the range of the description needs: all updates.
   [[nodiscard]] const RelevantUpdates& relevant() const { return relevant_; }
+  // Null if it was not refined uniformly: then it has no other ranges.
+  [[nodiscard]] const ValueBounds* bounds() const { return bounds_.get(); }
   // Null: a data set of one range has none.
   [[nodiscard]] const FieldStatistics* statistics() const { return statistics_.get(); }
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  explicit IntervalVolume(Parts parts);
+  IntervalVolume(Parts parts, std::shared_ptr<const ValueBounds> bounds);
   Description description_;
   Domain domain_;
   SupercubeSet set_;
@@ -69,6 +74,7 @@ class IntervalVolume {
   std::vector<std::uint8_t> steps_;
   std::vector<float> error_steps_;
   RelevantUpdates relevant_;
+  std::shared_ptr<const ValueBounds> bounds_;
   std::shared_ptr<const FieldStatistics> statistics_;
 };
 

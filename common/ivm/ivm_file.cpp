@@ -209,7 +209,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   parts.keys = ValueKeys(parts.set.size(), d.format.last);
   if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_errors(*file, *record, parts); !ok) return tl::unexpected(ok.error());
-  return IntervalVolume::assemble(std::move(parts));
+  return IntervalVolume::assemble(std::move(parts), parallel);
 }
 
 Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel) {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/ivm/every_range.h"
+#include "common/ivm/relevant_slots.h"
 #include "common/patch/key_sides.h"
 #include "common/util/bits.h"
 #include "server/builder/all_cores.h"

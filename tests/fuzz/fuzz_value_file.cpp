@@ -3,6 +3,7 @@
 
 #include "common/ivm/every_range.h"
 #include "common/ivm/extraction.h"
+#include "common/ivm/relevant_slots.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_verify.h"
 #include "tests/fuzz/small_volumes.h"
