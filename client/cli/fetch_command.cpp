@@ -116,8 +116,9 @@ Result<void> run(const FetchCommand& options) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
   }
   if (options.picture) {
-    const Box box = box_of(fetched->client.description().grid);
-    if (auto drawn = write_picture(*options.picture, mesh, box, options.fetch.lod.camera); !drawn) return drawn;
+    const Description& description = fetched->client.description();
+    const Range shown = resolve(description, fetch.shown).range;
+    if (auto drawn = write_picture(*options.picture, {mesh, description, shown}, options.fetch.lod.camera); !drawn) return drawn;
   }
   return report(options, *fetched, mesh);
 }

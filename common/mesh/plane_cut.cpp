@@ -1,6 +1,7 @@
 #include "common/mesh/plane_cut.h"
 
 #include <cmath>
+#include <span>
 
 namespace intervale {
 namespace {
@@ -69,6 +70,7 @@ TetCut cut_tet(const std::array<Vec3, 4>& corners, const std::array<double, 4>& 
     if (touched != kNone && (touched == last || touched == first)) continue;
     if (cut.count == 0) first = touched;
     last = touched;
+    cut.on[cut.count] = {from, to, distances[from] / (distances[from] - distances[to])};
     cut.corners[cut.count++] = crossing(corners[from], distances[from], corners[to], distances[to]);
   }
   if (cut.count < 3) cut.count = 0;
@@ -78,10 +80,12 @@ TetCut cut_tet(const std::array<Vec3, 4>& corners, const std::array<double, 4>& 
 std::vector<TetCut> plane_cut(const Mesh& mesh, const Plane& plane) {
   const std::vector<double> distances = plane_distances(mesh, plane);
   std::vector<TetCut> cuts;
-  for (const auto& [a, b, c, d] : mesh.tets) {
-    const TetCut cut =
-        cut_tet({mesh.points[a], mesh.points[b], mesh.points[c], mesh.points[d]}, {distances[a], distances[b], distances[c], distances[d]});
-    if (cut.count != 0) cuts.push_back(cut);
+  for (const auto& tet : mesh.tets) {
+    const auto& [a, b, c, d] = tet;
+    TetCut cut = cut_tet({mesh.points[a], mesh.points[b], mesh.points[c], mesh.points[d]}, {distances[a], distances[b], distances[c], distances[d]});
+    if (cut.count == 0) continue;
+    for (CutEdge& edge : std::span(cut.on).first(cut.count)) edge = {tet[edge.kept], tet[edge.away], edge.fraction};
+    cuts.push_back(cut);
   }
   return cuts;
 }

@@ -32,11 +32,18 @@ struct Plane {
 // Where the edge between a kept end (distance < 0) and one cut away (distance >= 0) crosses the plane.
 [[nodiscard]] Vec3 crossing(const Vec3& kept, double kept_distance, const Vec3& away, double away_distance);
 
+// A place on the edge between a kept corner and one cut away, as a fraction of the edge from the kept one.
+struct CutEdge {
+  std::uint32_t kept = 0, away = 0;
+  double fraction = 0;
+};
+
 // A convex polygon: the first `count` corners, 0 (no cut), 3 or 4, counterclockwise seen from the normal's side. Each
 // side lies in a face of the tetrahedron.
 struct TetCut {
   std::uint8_t count = 0;
   std::array<Vec3, 4> corners{};
+  std::array<CutEdge, 4> on{};  // the edge that each corner lies on: numbers of the tetrahedron's corners; of plane_cut(), of the mesh's points
 };
 
 // The cut through a positive tetrahedron, from its corners' distances, in any unit. A tetrahedron that the plane only

@@ -68,9 +68,35 @@ Result<GLuint> framebuffer(const Gl& gl, const std::array<int, 2>& size, bool is
   }
 }
 
+// The palette is the only texture.
+void use_palette(const Gl& gl, const Palette& palette) {
+  const Palette::Bytes bytes = palette.bytes();
+  GLuint texture = 0;
+  gl.GenTextures(1, &texture);
+  gl.BindTexture(GL_TEXTURE_2D, texture);
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, GLsizei(bytes.size()), 1, 0, GL_RGB, GL_UNSIGNED_BYTE, bytes.data());
+  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) gl.TexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
+  for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T}) gl.TexParameteri(GL_TEXTURE_2D, wrap, GL_CLAMP_TO_EDGE);
+}
+
+// A buffer, bound, for corners.
+void describe_corners(const Gl& gl) {
+  GLuint array = 0, buffer = 0;
+  gl.GenVertexArrays(1, &array);
+  gl.BindVertexArray(array);
+  gl.GenBuffers(1, &buffer);
+  gl.BindBuffer(GL_ARRAY_BUFFER, buffer);
+  const auto offset = [](std::size_t bytes) { return reinterpret_cast<const void*>(bytes); };
+  gl.VertexAttribPointer(kPositionAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, position)));
+  gl.VertexAttribPointer(kNormalAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, normal)));
+  gl.VertexAttribIPointer(kLookAttribute, 1, GL_UNSIGNED_INT, sizeof(Corner), offset(offsetof(Corner, look)));
+  gl.VertexAttribPointer(kValueAttribute, 1, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, value)));
+  for (const GLenum attribute : {kPositionAttribute, kNormalAttribute, kLookAttribute, kValueAttribute}) gl.EnableVertexAttribArray(attribute);
+}
+
 }  // namespace
 
-Result<void> Canvas::begin(const Viewpoint& viewpoint) {
+Result<void> Canvas::begin(const Viewpoint& viewpoint, const std::optional<Palette>& palette) {
   const Gl& gl = context_.gl();
   GLint longest = 0;
   gl.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &longest);
@@ -82,7 +108,7 @@ Result<void> Canvas::begin(const Viewpoint& viewpoint) {
   gl.Viewport(0, 0, size_[0], size_[1]);
   gl.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   if (auto done = draw_background(); !done) return done;
-  return prepare(viewpoint);
+  return prepare(viewpoint, palette);
 }
 
 Result<void> Canvas::draw_background() const {
@@ -98,7 +124,7 @@ Result<void> Canvas::draw_background() const {
   return {};
 }
 
-Result<void> Canvas::prepare(const Viewpoint& viewpoint) const {
+Result<void> Canvas::prepare(const Viewpoint& viewpoint, const std::optional<Palette>& palette) const {
   const Gl& gl = context_.gl();
   const auto program = linked(gl, kMeshVertexShader, kMeshFragmentShader);
   if (!program) return tl::unexpected(program.error());
@@ -109,27 +135,20 @@ Result<void> Canvas::prepare(const Viewpoint& viewpoint) const {
   gl.Uniform3fv(at("eye"), 1, viewpoint.eye.data());
   gl.Uniform2fv(at("nearest_to_far"), 1, viewpoint.nearest_to_far.data());
   gl.Uniform1f(at("height"), GLfloat(size_[1]));
-  GLuint array = 0, buffer = 0;
-  gl.GenVertexArrays(1, &array);
-  gl.BindVertexArray(array);
-  gl.GenBuffers(1, &buffer);
-  gl.BindBuffer(GL_ARRAY_BUFFER, buffer);
-  const auto offset = [](std::size_t bytes) { return reinterpret_cast<const void*>(bytes); };
-  gl.VertexAttribPointer(kPositionAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, position)));
-  gl.VertexAttribPointer(kNormalAttribute, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), offset(offsetof(Corner, normal)));
-  gl.VertexAttribIPointer(kLookAttribute, 1, GL_UNSIGNED_INT, sizeof(Corner), offset(offsetof(Corner, look)));
-  for (const GLenum attribute : {kPositionAttribute, kNormalAttribute, kLookAttribute}) gl.EnableVertexAttribArray(attribute);
+  gl.Uniform1i(at("by_value"), palette ? 1 : 0);
+  if (palette) use_palette(gl, *palette);
+  describe_corners(gl);
   gl.Enable(GL_DEPTH_TEST);
   gl.Enable(GL_CULL_FACE);
   gl.PolygonOffset(kBackFaceOffset, kBackFaceOffset);
   return {};
 }
 
-Result<Canvas> Canvas::create(const std::array<int, 2>& size, const Viewpoint& viewpoint) {
+Result<Canvas> Canvas::create(const std::array<int, 2>& size, const Viewpoint& viewpoint, const std::optional<Palette>& palette) {
   auto context = GlContext::create();
   if (!context) return tl::unexpected(context.error());
   Canvas canvas(std::move(*context), size);
-  if (auto begun = canvas.begin(viewpoint); !begun) return tl::unexpected(begun.error());
+  if (auto begun = canvas.begin(viewpoint, palette); !begun) return tl::unexpected(begun.error());
   return canvas;
 }
 

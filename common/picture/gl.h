@@ -13,14 +13,14 @@ namespace intervale {
 // clang-format 14 does not agree with its own output here.
 // clang-format off
 #define INTERVALE_GL_FUNCTIONS(F) \
-  F(AttachShader) F(BindBuffer) F(BindFramebuffer) F(BindRenderbuffer) F(BindVertexArray) F(BlitFramebuffer) \
+  F(AttachShader) F(BindBuffer) F(BindFramebuffer) F(BindRenderbuffer) F(BindTexture) F(BindVertexArray) F(BlitFramebuffer) \
   F(BufferData) F(CheckFramebufferStatus) F(Clear) F(CompileShader) F(CreateProgram) F(CreateShader) F(CullFace) \
   F(Disable) F(DrawArrays) F(Enable) F(EnableVertexAttribArray) F(FramebufferRenderbuffer) \
-  F(GenBuffers) F(GenFramebuffers) F(GenRenderbuffers) F(GenVertexArrays) F(GetError) F(GetIntegerv) \
+  F(GenBuffers) F(GenFramebuffers) F(GenRenderbuffers) F(GenTextures) F(GenVertexArrays) F(GetError) F(GetIntegerv) \
   F(GetProgramiv) F(GetShaderInfoLog) F(GetShaderiv) F(GetUniformLocation) F(LinkProgram) F(PolygonOffset) \
   F(ReadPixels) F(RenderbufferStorageMultisample) F(ShaderSource) F(Uniform1f) F(Uniform2fv) F(Uniform3fv) \
   F(UniformMatrix3fv) F(UniformMatrix4fv) F(UseProgram) F(VertexAttribIPointer) F(VertexAttribPointer) \
-  F(Viewport)
+  F(TexImage2D) F(TexParameteri) F(Uniform1i) F(Viewport)
 // clang-format on
 
 struct Gl {

@@ -3,14 +3,17 @@
 #include <fmt/core.h>
 #include <png.h>
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "common/picture/canvas.h"
+#include "common/picture/colour_bar.h"
 #include "common/picture/triangles.h"
 #include "common/picture/viewpoint.h"
 #include "common/util/atomic_file.h"
+#include "common/view/palette.h"
 
 namespace intervale {
 namespace {
@@ -34,6 +37,20 @@ Result<void> write_png(const std::filesystem::path& path, const Pixels& pixels) 
   return file->commit();
 }
 
+Result<void> check_colours(const PictureOptions& options) {
+  const auto& span = options.colour_span;
+  if (options.colour_by != ColourBy::value) {
+    if (options.palette) return misuse("--palette needs --color-by value");
+    if (span) return misuse("--color-span needs --color-by value");
+    return {};
+  }
+  if (options.palette && !find_palette(*options.palette))
+    return misuse("--palette: there is no palette '" + *options.palette + "'; choose " + palette_list());
+  if (span && !(std::isfinite(span->low) && std::isfinite(span->high) && span->low < span->high))
+    return misuse("--color-span: LO and HI must be finite numbers, and LO less than HI");
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera) {
@@ -43,6 +60,7 @@ Result<void> check_picture(const PictureOptions& options, const std::optional<Ca
   if (options.clip) {
     if (auto checked = check_plane(*options.clip); !checked) return checked;
   }
+  if (auto checked = check_colours(options); !checked) return checked;
   if (!camera) return {};
   const auto [width, height] = camera->viewport;
   if (std::int64_t{width} * height > kMostPixels)
@@ -50,14 +68,22 @@ Result<void> check_picture(const PictureOptions& options, const std::optional<Ca
   return {};
 }
 
-Result<void> write_picture(const PictureOptions& options, const Mesh& mesh, const Box& box, const std::optional<Camera>& camera) {
+Result<void> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera) {
+  const Box box = box_of(subject.description.grid);
   const Camera seen_from = camera ? *camera : three_quarter_view(box, options.clip);
   const Viewpoint viewpoint(seen_from, box);
-  auto canvas = Canvas::create(seen_from.viewport, viewpoint);
+  TriangleOptions triangles{options.clip, options.edges, {}};
+  std::optional<Palette> palette;
+  if (options.colour_by == ColourBy::value) {
+    palette = find_palette(options.palette ? *options.palette : kPaletteNames[0]);
+    triangles.span = options.colour_span ? *options.colour_span : span_of(subject.description, subject.range);
+  }
+  auto canvas = Canvas::create(seen_from.viewport, viewpoint, palette);
   if (!canvas) return tl::unexpected(canvas.error());
-  for_each_triangle(mesh, {options.clip, options.edges}, viewpoint, [&canvas](std::span<const Corner> corners) { canvas->draw(corners); });
-  const auto pixels = canvas->finish();
+  for_each_triangle(subject.mesh, triangles, viewpoint, [&canvas](std::span<const Corner> corners) { canvas->draw(corners); });
+  auto pixels = canvas->finish();
   if (!pixels) return tl::unexpected(pixels.error());
+  if (palette) draw_colour_bar(*pixels, *palette, *triangles.span, title_of(subject.description.labels));
   return write_png(options.file, *pixels);
 }
 

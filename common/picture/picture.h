@@ -1,33 +1,51 @@
 // A picture of a mesh, drawn without a display and written as PNG.
 //
-// The alpha surface is blue, the beta surface orange; the sides of the box and cuts through the inside are sand.
+// The alpha surface is blue, the beta surface orange; the sides of the box and cuts through the inside are sand. Or
+// everything has the colour of the field's value there, and the picture a colour bar.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "common/mesh/mesh.h"
 #include "common/mesh/plane_cut.h"
+#include "common/patch/description.h"
+#include "common/picture/value_span.h"
 #include "common/util/result.h"
 #include "common/view/lod.h"
 
 namespace intervale {
 
+enum class ColourBy : std::uint8_t { surface, value };
+
 struct PictureOptions {
   std::filesystem::path file;
   std::optional<Plane> clip;  // cuts away what lies on its normal's side, and shows the tetrahedra behind it cut (plane_cut.h)
   bool edges = false;         // whether the mesh's edges are drawn on its boundary too
+  ColourBy colour_by = ColourBy::surface;
+  // By value only:
+  std::optional<std::string> palette;    // a name of kPaletteNames; or the first
+  std::optional<ValueSpan> colour_span;  // what lies beyond has the colours of the palette's ends; or span_of()
 };
 
 // Misuse if the options are invalid for every mesh: call this before long work. camera: valid by check_lod; see
 // write_picture.
 [[nodiscard]] Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera);
 
+// What a picture is of. By value, the mesh has values.
+struct PictureSubject {
+  const Mesh& mesh;
+  const Description& description;
+  Range range;  // that the mesh is made for
+};
+
 // Draws what the camera sees, in the size of its viewport, and writes it to a temporary file that is renamed. Without a
 // camera: the whole box in a three-quarter view, 1280 x 960 pixels. An empty mesh gives the background. Equal meshes
 // give equal pictures on one machine, whatever the order of their points and tetrahedra. The options are valid by
 // check_picture. Takes some 0.3 s, and a second for a million triangles; fails where there is no EGL, with what to
 // install. One thread at a time.
-[[nodiscard]] Result<void> write_picture(const PictureOptions& options, const Mesh& mesh, const Box& box, const std::optional<Camera>& camera);
+[[nodiscard]] Result<void> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera);
 
 }  // namespace intervale

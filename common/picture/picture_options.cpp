@@ -3,6 +3,8 @@
 #include <array>
 #include <string>
 
+#include "common/view/palette.h"
+
 namespace intervale {
 
 void add_picture_options(CLI::App& app, std::optional<PictureOptions>& picture) {
@@ -22,6 +24,26 @@ void add_picture_options(CLI::App& app, std::optional<PictureOptions>& picture) 
       ->needs(image);
   app.add_flag_function(
          "--edges", [given](std::int64_t count) { given().edges = count > 0; }, "Draw the edges of the mesh on its surfaces too")
+      ->group(group)
+      ->needs(image);
+  const auto set_colour_by = [given](const std::string& what) { given().colour_by = what == "value" ? ColourBy::value : ColourBy::surface; };
+  app.add_option_function<std::string>("--color-by", set_colour_by, "Colours: of the surface (default), or of the field's value, with a colour bar")
+      ->check(CLI::IsMember({"surface", "value"}))
+      ->group(group)
+      ->needs(image);
+  app.add_option_function<std::string>(
+         "--palette", [given](const std::string& name) { given().palette = name; },
+         "With --color-by value: " + palette_list() + " (default " + std::string(kPaletteNames[0]) + ")")
+      ->type_name("NAME")
+      ->group(group)
+      ->needs(image);
+  app.add_option_function<std::array<double, 2>>(
+         "--color-span",
+         [given](const std::array<double, 2>& v) {
+           given().colour_span = ValueSpan{v[0], v[1]};
+         },
+         "With --color-by value: the values at the palette's ends (default: the part of the range that the data set has)")
+      ->type_name("LO HI")
       ->group(group)
       ->needs(image);
 }

@@ -51,11 +51,13 @@ std::vector<NormalSum> smooth_normals(const Mesh& mesh, const std::vector<Triang
 struct Polygon {
   unsigned count = 0;
   std::array<Vec3, 4> corners{}, normals{};
+  std::array<double, 4> values{};  // within the span
   std::array<bool, 4> drawn{};
 
-  void add(const Vec3& corner, const Vec3& normal, bool side_drawn) {
+  void add(const Vec3& corner, const Vec3& normal, double value, bool side_drawn) {
     corners[count] = corner;
     normals[count] = normal;
+    values[count] = value;
     drawn[count++] = side_drawn;
   }
 };
@@ -66,13 +68,14 @@ Polygon clipped(const Polygon& triangle, const std::array<double, 3>& distances)
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t j = (i + 1) % 3;
     const double here = distances[i], there = distances[j];
-    if (here < 0) kept.add(triangle.corners[i], triangle.normals[i], triangle.drawn[i]);
+    if (here < 0) kept.add(triangle.corners[i], triangle.normals[i], triangle.values[i], triangle.drawn[i]);
     if ((here < 0) == (there < 0)) continue;
     const bool leaves = here < 0;
     const std::size_t in = leaves ? i : j, out = leaves ? j : i;
     const Vec3 point = crossing(triangle.corners[in], distances[in], triangle.corners[out], distances[out]);
     const double t = distances[in] / (distances[in] - distances[out]);
-    kept.add(point, normalized(lerp(triangle.normals[in], triangle.normals[out], t)), !leaves && triangle.drawn[i]);
+    const double value = triangle.values[in] + t * (triangle.values[out] - triangle.values[in]);
+    kept.add(point, normalized(lerp(triangle.normals[in], triangle.normals[out], t)), value, !leaves && triangle.drawn[i]);
   }
   return kept;
 }
@@ -90,7 +93,8 @@ class Batch {
       const std::uint32_t look = std::uint32_t(part) | unsigned(opposite_0) << 2 | unsigned(opposite_1) << 3 | unsigned(opposite_2) << 4;
       for (const unsigned corner : {0u, i, i + 1}) {
         const Vec3& n = polygon.normals[corner];
-        corners_.push_back({viewpoint_.in_scene(polygon.corners[corner]), {float(n[0]), float(n[1]), float(n[2])}, look});
+        corners_.push_back(
+            {viewpoint_.in_scene(polygon.corners[corner]), {float(n[0]), float(n[1]), float(n[2])}, look, float(polygon.values[corner])});
       }
       if (corners_.size() == kAtOnce) flush();
     }
@@ -107,9 +111,26 @@ class Batch {
   std::vector<Corner> corners_;
 };
 
+// Where the values of points lie within the span; 0 without one.
+class Values {
+ public:
+  Values(const Mesh& mesh, const std::optional<ValueSpan>& span) : mesh_(mesh), span_(span) {}
+  [[nodiscard]] double at(std::uint32_t point) const { return span_ ? span_->at(mesh_.value[point]) : 0; }
+  // Between two points.
+  [[nodiscard]] double at(const CutEdge& on) const {
+    const double kept = at(on.kept);
+    return kept + on.fraction * (at(on.away) - kept);
+  }
+
+ private:
+  const Mesh& mesh_;
+  const std::optional<ValueSpan>& span_;
+};
+
 void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch) {
   const std::vector<Triangle> triangles = ordered_boundary(mesh);
   const auto smooth = smooth_normals(mesh, triangles);
+  const Values values(mesh, options.span);
   const std::vector<double> distances = options.clip ? plane_distances(mesh, *options.clip) : std::vector<double>{};
   for (const Triangle& t : triangles) {
     const Part part = part_of(mesh, t);
@@ -118,20 +139,23 @@ void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch
     Polygon polygon;
     for (const std::uint32_t point : t) {
       const Vec3 normal = part == Part::box ? Vec3{} : normalized({double(smooth[point][0]), double(smooth[point][1]), double(smooth[point][2])});
-      polygon.add(mesh.points[point], normal == Vec3{} ? flat : normal, options.edges);
+      polygon.add(mesh.points[point], normal == Vec3{} ? flat : normal, values.at(point), options.edges);
     }
     if (options.clip) polygon = clipped(polygon, {distances[t[0]], distances[t[1]], distances[t[2]]});
     batch.add(polygon, part);
   }
 }
 
-void add_cut(const Mesh& mesh, const Plane& plane, Batch& batch) {
+void add_cut(const Mesh& mesh, const Plane& plane, const Values& values, Batch& batch) {
   const Vec3 normal = normalized(plane.normal);
   for (const TetCut& cut : plane_cut(mesh, plane)) {
     Polygon polygon;
     const auto corners = std::span(cut.corners).first(cut.count);
     const auto least = std::size_t(std::min_element(corners.begin(), corners.end()) - corners.begin());
-    for (std::size_t i = 0; i < cut.count; ++i) polygon.add(corners[(least + i) % cut.count], normal, true);
+    for (std::size_t i = 0; i < cut.count; ++i) {
+      const std::size_t corner = (least + i) % cut.count;
+      polygon.add(corners[corner], normal, values.at(cut.on[corner]), true);
+    }
     batch.add(polygon, Part::cut);
   }
 }
@@ -142,7 +166,7 @@ void for_each_triangle(const Mesh& mesh, const TriangleOptions& options, const V
                        const std::function<void(std::span<const Corner>)>& take) {
   Batch batch(viewpoint, take);
   add_boundary(mesh, options, batch);
-  if (options.clip) add_cut(mesh, *options.clip, batch);
+  if (options.clip) add_cut(mesh, *options.clip, Values(mesh, options.span), batch);
   batch.flush();
 }
 

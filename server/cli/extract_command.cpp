@@ -93,7 +93,7 @@ Result<void> run(const ExtractCommand& options) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
   }
   if (options.picture) {
-    if (auto drawn = write_picture(*options.picture, mesh, box_of(description.grid), options.lod.camera); !drawn) return drawn;
+    if (auto drawn = write_picture(*options.picture, {mesh, description, shown->range}, options.lod.camera); !drawn) return drawn;
   }
   const double enclosed = volume_of(mesh);
   if (options.json) {

@@ -133,11 +133,67 @@ TEST(Pictures, FromWithinShowTheInsideOfABall) {
   EXPECT_GT(share(image, Hue::orange), 0.9);
 }
 
+// A column of the picture that has a colour bar: from its first pixel of one colour down to its last of another, green
+// never rises, as in all palettes. -1: there is none.
+int column_of_bar(const Image& image, const Colour& top, const Colour& bottom) {
+  for (int x = 0; x < image.width; ++x) {
+    int first = 0;
+    while (first < image.height && image.at(x, first) != top) ++first;
+    int last = image.height - 1;
+    while (last > first && image.at(x, last) != bottom) --last;
+    if (last - first < image.height / 4) continue;
+    int falls = 0, rises = 0;
+    for (int y = first; y < last; ++y) {
+      falls += image.at(x, y)[1] > image.at(x, y + 1)[1] ? 1 : 0;
+      rises += image.at(x, y)[1] < image.at(x, y + 1)[1] ? 1 : 0;
+    }
+    if (rises == 0 && falls > 50) return x;
+  }
+  return -1;
+}
+
+TEST(Pictures, ByValueHaveColoursOfThePaletteAndABar) {
+  const std::string view = "--error 0 --clip 16 16 16 0 0 1 --eye 16 16 916 --look-at 16 16 16 --fov 2.037 --viewport 800 640 --pixel-error 0.1 ";
+  const Image by_surface = drawn(ball(), view), same = drawn(ball(), view + "--color-by surface");
+  EXPECT_EQ(by_surface.rgb, same.rgb);
+  EXPECT_EQ(column_of_bar(by_surface, {253, 231, 37}, {68, 1, 84}), -1);
+  const Image viridis = drawn(ball(), view + "--color-by value");
+  EXPECT_GT(column_of_bar(viridis, {253, 231, 37}, {68, 1, 84}), 600);
+  EXPECT_GT(share(by_surface, Hue::orange), 0.1);
+  EXPECT_EQ(share(viridis, Hue::orange), 0);
+  const Image grey = drawn(ball(), view + "--color-by value --palette grey --color-span 143 191");
+  EXPECT_GT(column_of_bar(grey, {255, 255, 255}, {0, 0, 0}), 600);
+  // The cut becomes lighter from alpha, at a radius of 14, to beta at 8: 20 pixels a unit.
+  const auto light = [&](double radius) {
+    int sum = 0;
+    for (const int sign : {-1, 1}) sum += grey.at(400 + int(sign * radius * 20 * 0.8), 320 + int(sign * radius * 20 * 0.6))[1];
+    return sum / 2;
+  };
+  EXPECT_LT(light(13) + 30, light(11));
+  EXPECT_LT(light(11) + 30, light(9));
+  EXPECT_NEAR(light(11), 128, 45);  // lines of the mesh, and light, change it a little
+}
+
+// What lies beyond a span has the colours of its ends.
+TEST(Pictures, ByValueShowASpanOfTheValues) {
+  const std::string view = "--clip 16 16 16 0 0 1 --color-by value --palette grey ";
+  const auto bright = [](const Image& image) {
+    int count = 0;
+    for (int y = 300; y < 660; ++y)
+      for (int x = 400; x < 880; ++x) count += image.at(x, y)[0] > 150 ? 1 : 0;
+    return count;
+  };
+  const int low = bright(drawn(ball(), view + "--color-span 0 100")), all = bright(drawn(ball(), view)),
+            high = bright(drawn(ball(), view + "--color-span 250 300"));
+  EXPECT_GT(low, all + 1000);
+  EXPECT_GT(all, high + 1000);
+}
+
 TEST(Pictures, FetchDrawsWhatExtractDraws) {
   ServerProgram server;
   const TempDir folder;
   for (const std::string& options :
-       {std::string("--error-percent 20"), std::string(),
+       {std::string("--error-percent 20"), std::string(), std::string("--color-by value --palette cividis --clip 0 0 0 0 0 1"),
         std::string("--eye 1.2 0.1 -2.5 --look-at 0 0 0 --viewport 640 480 --pixel-error 2 --clip 0 0 0 0 0 -1 --edges")}) {
     SCOPED_TRACE(options);
     const Image expected = drawn(buckyball(), options);
@@ -148,7 +204,7 @@ TEST(Pictures, FetchDrawsWhatExtractDraws) {
     ASSERT_EQ(fetched.status, 0) << fetched.err;
     const Image got = read_png(folder / "fetch.png");
     ASSERT_EQ(got.rgb.size(), expected.rgb.size());
-    EXPECT_GT(share(got, Hue::blue), 0.02);
+    EXPECT_LT(share(got, Hue::background), 0.98);
     std::size_t differ = 0;
     for (std::size_t i = 0; i < got.rgb.size(); ++i) differ += got.rgb[i] != expected.rgb[i] ? 1 : 0;
     EXPECT_EQ(differ, 0u);
@@ -191,6 +247,13 @@ TEST(Pictures, WhatCannotBeDrawnIsOneLine) {
   complaint("", "none/x.png", 1, "does not exist");
   complaint("--eye 0 0 99 --look-at 0 0 0 --viewport 65535 65535", "x.png", 2, "smaller viewport");
   complaint("--eye 0 0 99 --look-at 0 0 0 --viewport 65535 64", "x.png", 2, "each way");
+  complaint("--color-by density", "x.png", 2, "surface,value");
+  complaint("--color-by value --palette jet", "x.png", 2, "viridis, cividis, inferno, ice or grey");
+  complaint("--palette ice", "x.png", 2, "--color-by value");
+  complaint("--color-span 1 2", "x.png", 2, "--color-by value");
+  complaint("--color-by value --color-span 2 1", "x.png", 2, "--color-span");
+  complaint("--color-by value --color-span 0 nan", "x.png", 2, "--color-span");
+  complaint("--color-by value --color-span 0", "x.png", 2, "--color-span");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   const Finished without = extract(ball(), "--clip 0 0 0 0 0 1", {});
   EXPECT_EQ(without.status, 2);

@@ -43,6 +43,7 @@ struct Face {
   Part part{};
   unsigned drawn = 0;  // sides
   std::array<Vector, 3> corners{}, normals{};
+  std::array<float, 3> values{};
   [[nodiscard]] Vector area() const {
     Vector a = cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]));
     for (double& c : a) c /= 2;
@@ -65,6 +66,7 @@ std::vector<Face> faces_of(const Mesh& mesh, const TriangleOptions& options) {
         EXPECT_EQ(corners[i + j].look, corners[i].look);
         face.corners[j] = testing::along(viewpoint.centre, viewpoint.unit, widened(corners[i + j].position));
         face.normals[j] = widened(corners[i + j].normal);
+        face.values[j] = corners[i + j].value;
         EXPECT_NEAR(length(face.normals[j]), 1, 1e-5);
       }
     }
@@ -151,6 +153,28 @@ TEST(PictureTriangles, ASheetWithoutThicknessHasTwoSides) {
   EXPECT_GT(alpha, 500);
   EXPECT_NEAR(alpha, beta, 1e-3 * alpha);
   EXPECT_LT(openness(faces), 1e-3);
+}
+
+// The field is 100 less the distance to the middle. Inside it is linear between samples far apart.
+TEST(PictureTriangles, HaveTheFieldsValues) {
+  const Plane through_middle{{kMiddle, kMiddle, kMiddle}, {0.3, 0.5, -0.8}};
+  const ValueSpan span{90, 94};  // alpha is 91, beta 95
+  int cut = 0, whole = 0;
+  for (const Face& face : faces_of(shell(9, 5), {.clip = through_middle, .span = span})) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double value = 90 + 4 * double(face.values[i]), distance = length(minus(face.corners[i], {kMiddle, kMiddle, kMiddle}));
+      if (face.part != Part::cut) {
+        EXPECT_EQ(face.values[i], face.part == Part::alpha ? 0.25F : 1.25F);
+        continue;
+      }
+      ++cut;
+      whole += std::abs(value - (100 - distance)) < 0.1 ? 1 : 0;
+      EXPECT_NEAR(value, 100 - distance, 0.5);
+    }
+  }
+  EXPECT_GT(cut, 3000);
+  EXPECT_GT(whole, 0.9 * cut);
+  for (const Face& face : faces_of(shell(9, 5), {})) EXPECT_EQ(face.values[0], 0);
 }
 
 TEST(PictureTriangles, AnEmptyMeshHasNone) {

@@ -142,6 +142,22 @@ TEST(PlaneCut, SharesPointsBetweenNeighbours) {
   }
 }
 
+TEST(PlaneCut, NamesTheEdgeOfEachCorner) {
+  const Mesh mesh = block(3);
+  const Plane plane{{1.37, 1.1, 1.6}, {0.3, -0.7, 0.5}}, through_points{{1, 1, 1}, {1, -1, 0}};
+  for (const Plane& p : {plane, through_points}) {
+    const std::vector<double> distances = plane_distances(mesh, p);
+    for (const TetCut& cut : plane_cut(mesh, p)) {
+      for (std::size_t i = 0; i < cut.count; ++i) {
+        const CutEdge& on = cut.on[i];
+        EXPECT_LT(distances[on.kept], 0);
+        EXPECT_GE(distances[on.away], 0);
+        EXPECT_LT(length(minus(lerp(mesh.points[on.kept], mesh.points[on.away], on.fraction), cut.corners[i])), 1e-12);
+      }
+    }
+  }
+}
+
 TEST(PlaneCut, WantsANormal) {
   EXPECT_TRUE(check_plane({{1, 2, 3}, {0, 0, -1e-9}}));
   for (const Plane& plane : {Plane{{0, 0, 0}, {0, 0, 0}}, Plane{{NAN, 0, 0}, {1, 0, 0}}, Plane{{0, 0, 0}, {0, INFINITY, 0}}}) {
