@@ -291,6 +291,7 @@ SurfacePiece BoundarySurface::piece(std::uint32_t id, bool edges) {
     piece.triangles[group] += std::uint32_t(by_kind[kind].size());
     if (edges) piece.edge_counts[group] += std::uint32_t(add_edges(std::span(piece.indices).subspan(first), piece.edges));
   }
+  piece.points = std::move(points);
   if (piece.vertices.empty()) return piece;
   piece.min = piece.max = {piece.vertices[0].x, piece.vertices[0].y, piece.vertices[0].z};
   for (const SurfaceVertex& v : piece.vertices) {

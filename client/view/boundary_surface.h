@@ -30,6 +30,7 @@ inline constexpr int kSurfaceGroups = 3;
 struct SurfacePiece {
   std::uint32_t id = 0;
   std::vector<SurfaceVertex> vertices;
+  std::vector<PointId> points;         // of the mesh, one for each vertex
   std::vector<std::uint32_t> indices;  // three a triangle, counterclockwise from outside in the world; by group
   std::vector<std::uint32_t> edges;    // two an edge, each once in its group; by group
   std::array<std::uint32_t, kSurfaceGroups> triangles{}, edge_counts{};

@@ -11,7 +11,8 @@ using Tet = FrontMesher::Tet;
 
 class Cutter {
  public:
-  Cutter(const BoundarySurface& surface, const CutPlane& plane) : surface_(surface) {
+  Cutter(const BoundarySurface& surface, const CutPlane& plane, std::span<const float> point_values)
+      : surface_(surface), point_values_(point_values) {
     const Affine& affine = surface.mesher().state().grid.affine;
     normal_ = affine.transposed(plane.normal);
     offset_ = plane.offset;
@@ -19,7 +20,7 @@ class Cutter {
     is_mirrored_ = affine.is_mirrored();
   }
 
-  std::vector<SectionVertex> run() {
+  CrossSection run() {
     FrontMesher::Tets tets;
     for (std::size_t number = 0; number < surface_.mesher().state().blocks.size(); ++number) {
       const FrontState::Block& block = surface_.mesher().block(number);
@@ -67,21 +68,30 @@ class Cutter {
         const Vec3& p = polygon.corners[corner[k]];
         SectionVertex v{float(p[0]), float(p[1]), float(p[2]), {}, lod_};
         for (std::size_t side = 0; side < 3; ++side) v.side[side] = side == k || !is_side[side] ? 255 : 0;
-        out_.push_back(v);
+        out_.vertices.push_back(v);
+        if (!point_values_.empty()) out_.values.push_back(value_at(tet, polygon.on[corner[k]]));
       }
     }
   }
 
+  [[nodiscard]] float value_at(const Tet& tet, const CutEdge& on) const {
+    const double kept = point_values_[tet[on.kept]], away = point_values_[tet[on.away]];
+    return float(kept + on.fraction * (away - kept));
+  }
+
   const BoundarySurface& surface_;
+  std::span<const float> point_values_;
   Vec3 normal_;  // so that its product with a place in samples is the distance in world units
   double offset_ = 0;
   bool is_mirrored_ = false;  // what is counterclockwise in samples is not in the world
   std::uint8_t lod_ = 0;
-  std::vector<SectionVertex> out_;
+  CrossSection out_;
 };
 
 }  // namespace
 
-std::vector<SectionVertex> cross_section(const BoundarySurface& surface, const CutPlane& plane) { return Cutter(surface, plane).run(); }
+CrossSection cross_section(const BoundarySurface& surface, const CutPlane& plane, std::span<const float> point_values) {
+  return Cutter(surface, plane, point_values).run();
+}
 
 }  // namespace intervale

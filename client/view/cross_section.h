@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "client/view/boundary_surface.h"
@@ -26,7 +27,12 @@ struct SectionVertex {
 };
 static_assert(sizeof(SectionVertex) == 16);
 
-// Triangles, three vertices each, that face the normal's side. By the surface's last update.
-[[nodiscard]] std::vector<SectionVertex> cross_section(const BoundarySurface& surface, const CutPlane& plane);
+struct CrossSection {
+  std::vector<SectionVertex> vertices;  // three a triangle; triangles face the normal's side
+  std::vector<float> values;            // of the field, one for each vertex
+};
+
+// By the surface's last update. point_values: by PointId (point_values.h); without them, the section has no values.
+[[nodiscard]] CrossSection cross_section(const BoundarySurface& surface, const CutPlane& plane, std::span<const float> point_values = {});
 
 }  // namespace intervale

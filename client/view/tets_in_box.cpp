@@ -27,6 +27,7 @@ TetsInBox tets_in_box(const BoundarySurface& surface, const Box& box, std::uint6
         for (int i = 0; i < 3; ++i) middle[i] += surface.position(id)[i] * (0.25 / FrontMesher::kSteps);
       }
       if (!seen.contains(middle) || ++found.out_of > most) continue;
+      found.points.insert(found.points.end(), tet.begin(), tet.end());
       for (const PointId id : tet) {
         const auto& at = surface.position(id);
         found.vertices.push_back({float(at[0]) / FrontMesher::kSteps, float(at[1]) / FrontMesher::kSteps, float(at[2]) / FrontMesher::kSteps,

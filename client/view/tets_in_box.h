@@ -22,6 +22,7 @@ static_assert(sizeof(TetVertex) == 28);
 
 struct TetsInBox {
   std::vector<TetVertex> vertices;  // four a tetrahedron, positive in the world
+  std::vector<PointId> points;      // of the mesh, one for each vertex
   std::uint64_t count = 0;
   std::uint64_t out_of = 0;  // that lie there
 };

@@ -213,7 +213,7 @@ TEST_P(BoundarySurfaceOf, CutsAddUpToTheVolume) {
     const double step = (high - low) / kCuts;
     double sum = 0;
     for (int n = 0; n < kCuts; ++n) {
-      const auto cut = cross_section(surface, {direction, low + (n + 0.5) * step});
+      const auto cut = cross_section(surface, {direction, low + (n + 0.5) * step}).vertices;
       ASSERT_EQ(cut.size() % 3, 0u);
       for (std::size_t i = 0; i < cut.size(); i += 3) {
         const auto from = [&](std::size_t k) {
@@ -245,7 +245,7 @@ TEST_P(BoundarySurfaceOf, CutsDrawTheSidesOfTheirPolygons) {
   double offset = 0.0123;  // beside the samples
   for (int i = 0; i < 3; ++i)
     offset += (grid.affine.origin()[i] + grid.affine.spacing()[i] * (grid.dims[i] - 1) / 2) * std::array{0.6, 0.64, 0.48}[i];
-  const auto cut = cross_section(surface, {{0.6, 0.64, 0.48}, offset});
+  const auto cut = cross_section(surface, {{0.6, 0.64, 0.48}, offset}).vertices;
   ASSERT_FALSE(cut.empty());
   std::multiset<std::array<std::array<float, 3>, 2>> drawn, diagonals;
   for (std::size_t first = 0; first < cut.size(); first += 3) {

@@ -171,7 +171,7 @@ TEST_P(ObliqueGrid, ACrossSectionIsThatOfTheMesh) {
         for (std::size_t c = 0; c < 3; ++c) expected[c] += area[c] / 2;
       }
     }
-    const auto section = cross_section(surface, {plane.normal, dot(plane.normal, plane.point)});
+    const auto section = cross_section(surface, {plane.normal, dot(plane.normal, plane.point)}).vertices;
     for (std::size_t i = 0; i < section.size(); i += 3) {
       std::array<Vec3, 3> p;
       for (std::size_t c = 0; c < 3; ++c) p[c] = map_.point({section[i + c].x, section[i + c].y, section[i + c].z});

@@ -13,10 +13,12 @@
 
 #include "client/view/boundary_surface.h"
 #include "client/view/cross_section.h"
+#include "client/view/point_values.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/mesh_digest.h"
+#include "common/view/palette.h"
 
 namespace intervale {
 namespace {
@@ -49,6 +51,20 @@ Box box_of(const val& box) { return {three(box["min"]), three(box["max"])}; }
 // null: as much as there is.
 std::uint64_t limit_of(const val& number) {
   return number.isNull() || number.isUndefined() ? UINT64_MAX : std::uint64_t(std::max(0.0, number.as<double>()));
+}
+
+// All palettes, the default first: {name, colours}; colours: 256 of them, red, green and blue, a byte each, sRGB. The
+// first is that of the least value.
+val palettes() {
+  val palettes = val::array();
+  for (const auto name : kPaletteNames) {
+    const Palette::Bytes colours = find_palette(name)->bytes();
+    val palette = val::object();
+    palette.set("name", std::string(name));
+    palette.set("colours", buffer_of(std::vector(colours.begin(), colours.end())));
+    palettes.call<void>("push", palette);
+  }
+  return palettes;
 }
 
 class Viewer {
@@ -132,16 +148,22 @@ class Viewer {
     return progress;
   }
 
+  // Whether pieces, caps and tetrahedra have `values`, from the next update_surface() on: the field's at each vertex, as
+  // floats in its units; otherwise null. Pieces that have not changed since then come with update_surface() of all.
+  void want_values(bool wanted) { wants_values_ = wanted; }
+
   // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything.
   val update_surface(bool edges, bool all) {
     stale_ = false;
     const BoundarySurface::Change change = all ? surface_->all() : surface_->update();
+    values_ = wants_values_ ? point_values(*surface_) : std::vector<float>();
     val pieces = val::array();
     for (const std::uint32_t id : change.pieces) {
       const SurfacePiece p = surface_->piece(id, edges);
       val piece = val::object();
       piece.set("id", p.id);
       piece.set("vertices", buffer_of(p.vertices));
+      piece.set("values", values_at(p.points));
       piece.set("indices", buffer_of(p.indices));
       piece.set("edges", edges ? buffer_of(p.edges) : val::null());
       piece.set("triangles", array_of(p.triangles));
@@ -161,16 +183,18 @@ class Viewer {
   [[nodiscard]] bool is_stale() const { return stale_ || !surface_; }
   // Of a Cap, and of Tets, in messages.ts.
   val cap(const val& plane) const {
-    const auto vertices = cross_section(*surface_, {three(plane["normal"]), plane["offset"].as<double>()});
+    const CrossSection section = cross_section(*surface_, {three(plane["normal"]), plane["offset"].as<double>()}, values_);
     val cap = val::object();
-    cap.set("vertices", buffer_of(vertices));
-    cap.set("triangles", double(vertices.size() / 3));
+    cap.set("vertices", buffer_of(section.vertices));
+    cap.set("values", !values_.empty() ? buffer_of(section.values) : val::null());
+    cap.set("triangles", double(section.vertices.size() / 3));
     return cap;
   }
   val tets(const val& box) const {
     const TetsInBox found = tets_in_box(*surface_, box_of(box), kMostTets);
     val tets = val::object();
     tets.set("vertices", buffer_of(found.vertices));
+    tets.set("values", values_at(found.points));
     tets.set("count", double(found.count));
     tets.set("outOf", double(found.out_of));
     return tets;
@@ -193,16 +217,23 @@ class Viewer {
     return result ? std::string() : result.error().message;
   }
 
+  [[nodiscard]] val values_at(const std::vector<PointId>& points) const {
+    return !values_.empty() ? buffer_of(values_of(points, values_)) : val::null();
+  }
+
   ViewingSession session_;
   std::optional<BoundarySurface> surface_;
   std::vector<std::uint8_t> inbox_;
   ClientSession::Event event_;  // of the last message
-  bool stale_ = true;           // the mesh may have changed since the last surface
+  bool wants_values_ = false;
+  std::vector<float> values_;  // by PointId, of the last surface, if they were wanted
+  bool stale_ = true;          // the mesh may have changed since the last surface
 };
 
 }  // namespace
 
 EMSCRIPTEN_BINDINGS(intervale) {
+  emscripten::function("palettes", &palettes);
   emscripten::class_<Viewer>("Viewer")
       .constructor<const std::string&>()
       .function("look", &Viewer::look)
@@ -219,6 +250,7 @@ EMSCRIPTEN_BINDINGS(intervale) {
       .function("isStale", &Viewer::is_stale)
       .function("faultCode", &Viewer::fault_code)
       .function("progress", &Viewer::progress)
+      .function("wantValues", &Viewer::want_values)
       .function("updateSurface", &Viewer::update_surface)
       .function("cap", &Viewer::cap)
       .function("tets", &Viewer::tets)
