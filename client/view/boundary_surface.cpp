@@ -23,10 +23,11 @@ constexpr double kStepsCubed = double(FrontMesher::kSteps) * FrontMesher::kSteps
 constexpr int kCellsAcross = 8;  // pieces along the virtual grid's side, at most
 constexpr int kLeastCell = 16;   // samples
 
-// To 1e-4 (Abramowitz and Stegun 4.4.45), several times faster than std::acos.
-double arc_cosine(double x) {
-  const double a = std::min(1.0, std::abs(x));
-  const double angle = std::sqrt(1 - a) * (1.5707288 + a * (-0.2121144 + a * (0.0742610 - 0.0187293 * a)));
+// To 1e-5 (Abramowitz and Stegun 4.4.47), several times faster than std::atan2. y: above 0.
+double arc_tangent(double y, double x) {
+  const double along = std::abs(x), t = std::min(y, along) / std::max(y, along), s = t * t;
+  const double part = t * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))));
+  const double angle = y > along ? std::numbers::pi / 2 - part : part;
   return x < 0 ? std::numbers::pi - angle : angle;
 }
 
@@ -60,14 +61,16 @@ BoundarySurface::BoundarySurface(const Front& front) : mesher_(front.state()), i
   }
 }
 
+// The room that everything has stays: what follows takes about as much.
 void BoundarySurface::forget_all() {
-  position_.clear();
-  surface_.clear();
-  normal_.clear();
-  vertex_of_.clear();
-  parts_.clear();
-  members_.clear();
-  drawn_.clear();
+  for (Part& part : parts_) {
+    part.shown = 0;
+    part.triangles.clear();
+  }
+  for (auto& members : members_) members.clear();
+  std::fill(normal_.begin(), normal_.end(), NormalSum{});
+  std::fill(drawn_.begin(), drawn_.end(), std::uint8_t(0));
+  known_ = 0;
   triangles_ = 0;
   point_generation_ = mesher_.state().point_generation;
 }
@@ -105,7 +108,7 @@ void BoundarySurface::mark_parents(std::size_t number, std::uint64_t slots, std:
 
 // By number of the supercube: whether what it left is to be made again.
 std::vector<std::uint8_t> BoundarySurface::find_changes() {
-  const std::size_t count = mesher_.state().blocks.size(), before = parts_.size();
+  const std::size_t count = mesher_.state().blocks.size(), before = std::exchange(known_, count);
   std::vector<std::uint8_t> dirty(count);
   const auto grow = [points = mesher_.state().points](auto& items) {  // by less than doubling, for these are most of a viewer's memory
     if (items.capacity() < points) items.reserve(points + points / 8);
@@ -118,9 +121,10 @@ std::vector<std::uint8_t> BoundarySurface::find_changes() {
   parts_.resize(count);
   for (std::size_t i = before; i < count; ++i) {
     parts_[i].piece = piece_of(i);
-    const std::size_t pieces = std::max<std::size_t>(members_.size(), parts_[i].piece + 1);
-    members_.resize(pieces);
-    drawn_.resize(pieces);
+    if (parts_[i].piece >= members_.size()) {
+      members_.resize(parts_[i].piece + 1);
+      drawn_.resize(parts_[i].piece + 1);
+    }
     members_[parts_[i].piece].push_back(std::uint32_t(i));
     dirty[i] = 1;
   }
@@ -146,28 +150,38 @@ double BoundarySurface::volume_of(const Tet& tet) const {
   return triple_product(from(a), from(b), from(c)) / 6;
 }
 
-int BoundarySurface::kind_of(const std::array<PointId, 3>& points, bool at_border) const {
-  const Surface s = surface_[points[0]];
-  if (s != Surface::inside && surface_[points[1]] == s && surface_[points[2]] == s) return s == Surface::alpha ? kAlpha : kBeta;
-  if (!at_border) return kNone;
+// Six times the volume under each triangle as seen from the middle of the box, with its sign: over a closed surface this
+// sums up to what it encloses.
+double BoundarySurface::volume_under(const std::vector<Triangle>& triangles) const {
   const Vertex last = mesher_.state().domain.last();
-  const std::array<std::int32_t, 3> far{last.x * FrontMesher::kSteps, last.y * FrontMesher::kSteps, last.z * FrontMesher::kSteps};
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::int32_t at = position_[points[0]][axis];
-    if (position_[points[1]][axis] != at || position_[points[2]][axis] != at) continue;
-    if (at == 0) return kBox + 2 * axis;
-    if (at == far[axis]) return kBox + 2 * axis + 1;
-  }
-  return kNone;
+  const Position middle{last.x * (FrontMesher::kSteps / 2), last.y * (FrontMesher::kSteps / 2), last.z * (FrontMesher::kSteps / 2)};
+  const auto from_middle = [&](PointId point) {
+    const Position& p = position_[point];
+    return Vec3{double(p[0] - middle[0]), double(p[1] - middle[1]), double(p[2] - middle[2])};
+  };
+  double sum = 0;
+  for (const Triangle& t : triangles) sum += triple_product(from_middle(t.points[0]), from_middle(t.points[1]), from_middle(t.points[2]));
+  return sum / 6;
 }
 
-bool BoundarySurface::has_face_on_surface(const Tet& tet) const {
-  int alpha = 0, beta = 0;
-  for (const PointId point : tet) {
-    alpha += int(surface_[point] == Surface::alpha);
-    beta += int(surface_[point] == Surface::beta);
+// A bit for each kind of what the point lies on.
+unsigned BoundarySurface::kinds_of(PointId point) const {
+  const Vertex last = mesher_.state().domain.last();
+  const std::array<std::int32_t, 3> far{last.x * FrontMesher::kSteps, last.y * FrontMesher::kSteps, last.z * FrontMesher::kSteps};
+  unsigned kinds = surface_[point] == Surface::alpha ? 1u << kAlpha : surface_[point] == Surface::beta ? 1u << kBeta : 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t at = position_[point][axis];
+    kinds |= unsigned(at == 0) << (kBox + 2 * axis) | unsigned(at == far[axis]) << (kBox + 2 * axis + 1);
   }
-  return alpha >= 3 || beta >= 3;
+  return kinds;
+}
+
+bool BoundarySurface::is_at_border(std::size_t number) const {
+  const Vertex p = mesher_.block(number).position, last = mesher_.state().domain.last();
+  const auto reaches = [up = mesher_.block(number).scale + 2](std::int32_t at, std::int32_t end) {
+    return at == 0 || std::int64_t(at + 1) << up >= end;
+  };
+  return reaches(p.x, last.x) || reaches(p.y, last.y) || reaches(p.z, last.z);
 }
 
 void BoundarySurface::add_normals(const std::vector<Triangle>& triangles, int sign) {
@@ -179,7 +193,7 @@ void BoundarySurface::add_normals(const std::vector<Triangle>& triangles, int si
       const Position& p = position_[t.points[k]];
       corners[k] = affine.direction({double(p[0]), double(p[1]), double(p[2])});
     }
-    const auto added = angle_weighted_normals(corners, arc_cosine);
+    const auto added = angle_weighted_normals(corners, arc_tangent);
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t i = 0; i < 3; ++i) normal_[t.points[k]][i] += sign * added[k][i];
   }
@@ -189,15 +203,19 @@ void BoundarySurface::remake(std::size_t number) {
   Part& part = parts_[number];
   add_normals(part.triangles, -1);
   triangles_ -= part.triangles.size();
-  cut_tets(number, part);
-  find_triangles(number, part.triangles);
+  find_triangles(number);
+  // Exactly as much room as they need, if less than half of it is needed.
+  if (part.triangles.capacity() > 2 * triangles_made_.size()) part.triangles = std::vector<Triangle>();
+  part.triangles.assign(triangles_made_.begin(), triangles_made_.end());
+  part.volume = volume_under(part.triangles);
+  part.has_bound = false;
   add_normals(part.triangles, 1);
   triangles_ += part.triangles.size();
 }
 
-// Makes a supercube's tetrahedra, in tets_, and sums up their volumes.
-void BoundarySurface::cut_tets(std::size_t number, Part& part) {
-  part.volume = part.bound = 0;
+void BoundarySurface::find_bound(std::size_t number, Part& part) {
+  part.has_bound = true;
+  part.bound = 0;
   tets_.clear();
   halves_.clear();
   mesher_.append_halves(number, tets_, halves_);
@@ -205,33 +223,40 @@ void BoundarySurface::cut_tets(std::size_t number, Part& part) {
   for (const FrontMesher::Half& half : halves_) {
     double inside = 0;  // volumes in samples / kSteps, cubed
     for (; first < half.end; ++first) inside += volume_of(tets_[first]);
-    part.volume += inside;
-    if (!half.can_change) continue;
     const auto from = [&c = half.corners](int k) { return Vec3{double(c[k].x - c[0].x), double(c[k].y - c[0].y), double(c[k].z - c[0].z)}; };
     const double whole = std::abs(triple_product(from(1), from(2), from(3))) / 6 * kStepsCubed;
     part.bound += std::max(inside, whole - inside);
   }
 }
 
-// The faces of tets_ that lie on a surface or on the box.
-void BoundarySurface::find_triangles(std::size_t number, std::vector<Triangle>& triangles) const {
-  const Vertex p = mesher_.block(number).position, last = mesher_.state().domain.last();
-  const auto reaches = [up = mesher_.block(number).scale + 2](std::int32_t at, std::int32_t end) {
-    return at == 0 || std::int64_t(at + 1) << up >= end;
-  };
-  const bool at_border = reaches(p.x, last.x) || reaches(p.y, last.y) || reaches(p.z, last.z);
+// Makes in triangles_made_ what a supercube left of the boundary.
+void BoundarySurface::find_triangles(std::size_t number) {
+  triangles_made_.clear();
+  faces_.clear();
+  mesher_.append_faces(number, faces_);
   const auto lod = std::uint8_t(mesher_.block(number).scale);
-  triangles.clear();
+  for (auto& [points, surface] : faces_) {
+    if (is_mirrored_) std::swap(points[1], points[2]);
+    triangles_made_.push_back({points, std::uint8_t(surface == Surface::alpha ? kAlpha : kBeta), lod});
+  }
+  if (is_at_border(number)) add_box_faces(number);
+}
+
+void BoundarySurface::add_box_faces(std::size_t number) {
+  const auto lod = std::uint8_t(mesher_.block(number).scale);
+  tets_.clear();
+  mesher_.append_tets(number, tets_);
   for (const Tet& tet : tets_) {
-    if (!at_border && !has_face_on_surface(tet)) continue;
+    std::array<unsigned, 4> kinds;
+    for (std::size_t k = 0; k < 4; ++k) kinds[k] = kinds_of(tet[k]);
     for (const auto& face : kTetFaces) {
+      const unsigned common = kinds[face[0]] & kinds[face[1]] & kinds[face[2]];
+      if (common < 1u << kBox || (common & (1u << kAlpha | 1u << kBeta)) != 0) continue;
       std::array<PointId, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
       if (is_mirrored_) std::swap(points[1], points[2]);
-      const int kind = kind_of(points, at_border);
-      if (kind != kNone) triangles.push_back({points, std::uint8_t(kind), lod});
+      triangles_made_.push_back({points, std::uint8_t(std::countr_zero(common)), lod});
     }
   }
-  triangles.shrink_to_fit();
 }
 
 bool BoundarySurface::is_empty(std::uint32_t piece) const {
@@ -246,9 +271,11 @@ SurfaceVertex BoundarySurface::vertex(PointId point, const Triangle& t) const {
     normal = scaled((t.kind - kBox) % 2 == 0 ? -1 : 1, box_normals_[std::size_t(t.kind - kBox) / 2]);
   } else {
     const NormalSum& sum = normal_[point];
-    normal = normalized({double(sum[0]), double(sum[1]), double(sum[2])});
+    normal = {double(sum[0]), double(sum[1]), double(sum[2])};
+    const double squared = dot(normal, normal);
+    normal = scaled(squared > 0 ? 1 / std::sqrt(squared) : 0, normal);
   }
-  const auto coded = [](double c) { return std::int8_t(std::lrint(127 * c)); };
+  const auto coded = [](double c) { return std::int8_t(std::rint(127 * c)); };
   v.nx = coded(normal[0]);
   v.ny = coded(normal[1]);
   v.nz = coded(normal[2]);
@@ -306,7 +333,7 @@ SurfacePiece BoundarySurface::piece(std::uint32_t id, bool edges) {
 
 BoundarySurface::Change BoundarySurface::update() {
   Change change;
-  if (mesher_.state().point_generation != point_generation_ || parts_.empty()) {
+  if (mesher_.state().point_generation != point_generation_ || known_ == 0) {
     forget_all();
     change.reset = true;
   }
@@ -339,10 +366,21 @@ BoundarySurface::Change BoundarySurface::all() {
   return change;
 }
 
-double BoundarySurface::in_world(double Part::*volume) const {
+double BoundarySurface::samples_in_world() const { return mesher_.state().grid.affine.determinant() / kStepsCubed; }
+
+double BoundarySurface::volume() const {
   double sum = 0;
-  for (const Part& part : parts_) sum += part.*volume;
-  return sum * std::abs(mesher_.state().grid.affine.determinant()) / kStepsCubed;
+  for (const Part& part : parts_) sum += part.volume;
+  return sum * samples_in_world();
+}
+
+double BoundarySurface::volume_bound() {
+  double sum = 0;
+  for (std::size_t number = 0; number < known_; ++number) {
+    if (!parts_[number].has_bound) find_bound(number, parts_[number]);
+    sum += parts_[number].bound;
+  }
+  return sum * std::abs(samples_in_world());
 }
 
 }  // namespace intervale

@@ -46,7 +46,8 @@ class BoundarySurface {
     std::vector<std::uint32_t> pieces;   // ids of pieces that exist and changed
     std::vector<std::uint32_t> removed;  // ids of pieces that have become empty
   };
-  // What changed since the last update. O(changes), and a little for each supercube.
+  // What changed since the last update. O(changes), and a little for each supercube. Only the faces on surfaces are
+  // visited, not the tetrahedra.
   [[nodiscard]] Change update();
   // Updates, and reports every piece as changed.
   [[nodiscard]] Change all();
@@ -55,11 +56,12 @@ class BoundarySurface {
 
   // As of the last update.
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
-  [[nodiscard]] double volume() const { return in_world(&Part::volume); }  // of the mesh, world units cubed
+  [[nodiscard]] double volume() const;  // of the mesh, world units cubed
   // How much splits can change that volume: for each tetrahedron of a diamond that can be split and whose vertices lie
   // on different sides, the larger of its part in the mesh and the rest. Surfaces inside diamonds whose vertices all
-  // lie on one side are not known and not counted. 0 when everything is split.
-  [[nodiscard]] double volume_bound() const { return in_world(&Part::bound); }
+  // lie on one side are not known and not counted. 0 when everything is split. Visits what was updated since it was
+  // last called, for about as long as an update does.
+  [[nodiscard]] double volume_bound();
 
   // What the mesh is made of, and its points.
   [[nodiscard]] const FrontMesher& mesher() const { return mesher_; }
@@ -68,7 +70,7 @@ class BoundarySurface {
 
  private:
   // What a triangle lies on: alpha, beta, or a side of the box: kBox + 2 * axis + (1 at the far side).
-  static constexpr int kAlpha = 0, kBeta = 1, kBox = 2, kKinds = 8, kNone = -1;
+  static constexpr int kAlpha = 0, kBeta = 1, kBox = 2, kKinds = 8;
   struct Triangle {
     std::array<PointId, 3> points;
     std::uint8_t kind = 0, lod = 0;
@@ -76,20 +78,23 @@ class BoundarySurface {
   struct Part {  // what a supercube left
     std::uint64_t shown = 0;
     std::uint32_t piece = 0;
+    bool has_bound = false;
     double volume = 0, bound = 0;
     std::vector<Triangle> triangles;
   };
 
-  [[nodiscard]] double in_world(double Part::*volume) const;  // the sum of all parts
+  [[nodiscard]] double samples_in_world() const;  // the volume of a cube of samples / kSteps, less than 0 if mirrored
   void forget_all();
   std::vector<std::uint8_t> find_changes();
   void mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const;
   [[nodiscard]] std::uint32_t piece_of(std::size_t number) const;
   void remake(std::size_t number);
-  void cut_tets(std::size_t number, Part& part);
-  void find_triangles(std::size_t number, std::vector<Triangle>& triangles) const;
-  [[nodiscard]] int kind_of(const std::array<PointId, 3>& points, bool at_border) const;
-  [[nodiscard]] bool has_face_on_surface(const FrontMesher::Tet& tet) const;
+  void find_bound(std::size_t number, Part& part);
+  void find_triangles(std::size_t number);
+  void add_box_faces(std::size_t number);
+  [[nodiscard]] double volume_under(const std::vector<Triangle>& triangles) const;
+  [[nodiscard]] unsigned kinds_of(PointId point) const;
+  [[nodiscard]] bool is_at_border(std::size_t number) const;
   void add_normals(const std::vector<Triangle>& triangles, int sign);
   [[nodiscard]] bool is_empty(std::uint32_t piece) const;
   [[nodiscard]] double volume_of(const FrontMesher::Tet& tet) const;
@@ -105,6 +110,7 @@ class BoundarySurface {
   std::vector<NormalSum> normal_;                    // by PointId: of the triangles of the point's own surface
   std::vector<std::uint32_t> vertex_of_;             // by PointId: its vertex in the piece being assembled, if that vertex has this id
   std::vector<Part> parts_;                          // by number of the supercube
+  std::size_t known_ = 0;                            // how many of them the last update saw
   std::vector<std::vector<std::uint32_t>> members_;  // of a piece, by id
   std::vector<std::uint8_t> drawn_;                  // whether a piece had triangles, by id
   std::uint64_t triangles_ = 0;
@@ -112,6 +118,8 @@ class BoundarySurface {
   std::vector<FrontMesher::Point> points_;
   FrontMesher::Tets tets_;
   std::vector<FrontMesher::Half> halves_;
+  std::vector<FrontMesher::Face> faces_;
+  std::vector<Triangle> triangles_made_;
 };
 
 }  // namespace intervale

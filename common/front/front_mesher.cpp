@@ -136,6 +136,15 @@ inline FrontMesher::Tet* FrontMesher::place_patch(Tet* to, const TetShape& shape
   return to;
 }
 
+inline void FrontMesher::append_patch_faces(const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points,
+                                            std::vector<Face>& faces) const {
+  const int second = shape.flip ? 2 : 1, third = shape.flip ? 1 : 2;
+  for (const auto& face : cases_.faces(shape.order, shape_sides(shape, sides))) {
+    const Surface surface = face[0] % 2 == 0 ? Surface::alpha : Surface::beta;
+    faces.push_back({{points[corners[face[0]]], points[corners[face[second]]], points[corners[face[third]]]}, surface});
+  }
+}
+
 // Lengthens tets by as many as the patches of one diamond may have; returns the first.
 FrontMesher::Tet* FrontMesher::make_room(Tets& tets) const {
   const std::size_t before = tets.size();
@@ -155,40 +164,28 @@ unsigned FrontMesher::children_not_shown(FrontCursor& cursor, Slot slot) {
   return some;
 }
 
-template <class Numbers>
-void FrontMesher::append(const Output<Numbers>& out, std::size_t number) const {
-  if (state_.is_root_block(block(number))) {
-    append_root(out);
-    return;
-  }
-  if (block(number).shown == 0) return;
+// Calls visit(cursor, children): for the splits of these slots that leave tetrahedra to some children, with those as bits.
+template <class Visit>
+void FrontMesher::visit_splits(std::size_t number, std::uint64_t slots, const Visit& visit) const {
+  if (slots == 0) return;
   FrontCursor cursor(state_);
   cursor.move_to(block(number).scale, block(number).position);
-  for (const Slot slot : set_bits<Slot>(block(number).shown)) {
+  for (const Slot slot : set_bits<Slot>(slots)) {
     const unsigned unsplit = children_not_shown(cursor, slot);
     if (unsplit == 0) continue;
     cursor.gather_own(slot);
-    append_children(out, cursor, unsplit);
+    visit(cursor, unsplit);
   }
 }
 
-template <class Numbers>
-void FrontMesher::append_root(const Output<Numbers>& out) const {
+// Calls visit(cursor, shape, t) for each tetrahedron of the root, if that is not split.
+template <class Visit>
+void FrontMesher::visit_root(const Visit& visit) const {
   const Diamond root(state_.domain.root());
   FrontCursor cursor(state_);
   cursor.move_to(root);
   if (!cursor.gather_sides(kSlotOfType[root.type]) || cursor.is_shown()) return;
-  PointsAround points;
-  gather_points(cursor, out.numbers, points);
-  Tet* to = make_room(out.tets);
-  for (const int t : set_bits(cursor.parts().tets)) {
-    const TetShape shape = tet_shape(state_.domain, root, cursor.parts(), t);
-    to = place_patch(to, shape, corners_of(shape), cursor.context().sides, points);
-    if (out.halves != nullptr) {
-      out.halves->push_back({cursor.context().is_mixed(), state_.domain.positions(root, root.row->tet(t)), std::size_t(to - out.tets.data())});
-    }
-  }
-  out.tets.resize(std::size_t(to - out.tets.data()));
+  for (const int t : set_bits(cursor.parts().tets)) visit(cursor, tet_shape(state_.domain, root, cursor.parts(), t), t);
 }
 
 template <class Numbers>
@@ -215,45 +212,38 @@ void FrontMesher::gather_points(FrontCursor& cursor, const Numbers& numbers, Poi
   }
 }
 
-// Of the split diamond that the cursor found last, the halves that it left to some of its children, a bit each.
+// Of the split diamond that the cursor found last, with the points that its split brought.
 template <class Numbers>
-void FrontMesher::append_children(const Output<Numbers>& out, FrontCursor& cursor, unsigned children) const {
+void FrontMesher::gather_points_with_centre(FrontCursor& cursor, const Numbers& numbers, PointsAround& points) {
+  gather_points(cursor, numbers, points);
   const FrontState::Split split = cursor.here().split_at(cursor.slot());
-  const bool is_empty = split.cut_bits() == 0 && split.side() != Side::inside;  // all on one side, and not inside
-  if (is_empty && out.halves == nullptr) return;
+  PointId id = split.first;
+  for (const int bit : set_bits(split.cut_bits())) points[kCutsFrom + 2 * kSubdivision + bit] = numbers[id++];
+  if (split.side() == Side::inside) points[kCentre] = numbers[id];
+}
+
+// Of the split diamond that the cursor found last, the halves that it left to some of its children, a bit each. Calls
+// visit(half, shape, corners, sides, has_patch).
+template <class Visit>
+void FrontMesher::visit_halves(FrontCursor& cursor, unsigned children, const Visit& visit) const {
+  const FrontState::Split split = cursor.here().split_at(cursor.slot());
   const Diamond d = cursor.diamond();
   const DiamondParts& parts = cursor.parts();
   const std::uint32_t sides = cursor.context().sides | std::uint32_t(split.side()) << (2 * kCentre);
-  PointsAround points;
-  gather_points(cursor, out.numbers, points);
-  PointId id = split.first;
-  for (const int bit : set_bits(split.cut_bits())) points[kCutsFrom + 2 * kSubdivision + bit] = out.numbers[id++];
-  if (split.side() == Side::inside) points[kCentre] = out.numbers[id];
   const auto& corners = half_corners_[cursor.slot()];
   const Ring ring(sides, d.row->belt);
-  Tet* to = make_room(out.tets);
   for (const int k : set_bits(children)) {
-    const bool child_can_change = out.halves != nullptr && d.has_children() && can_change(*out.at_child, d.child(k));
     for (const Duet::Half& half : d.row->child[k].half) {
       if (!(parts.tets >> half.tet & 1)) continue;
       const bool has_patch = cases_.count(ring.half(half.tet, half.end)) != 0;
-      if (!has_patch && !child_can_change) continue;
-      if (parts.straddles && !half_exists(state_.domain, d, half.tet, half.end)) continue;
-      if (has_patch && !parts.straddles) {
-        to = place_patch(to, d.row->half_shape[half.tet][half.end], corners[half.tet][half.end], sides, points);
-      } else if (has_patch) {
+      if (!parts.straddles) {
+        visit(half, d.row->half_shape[half.tet][half.end], corners[half.tet][half.end], sides, has_patch);
+      } else if (half_exists(state_.domain, d, half.tet, half.end)) {
         const TetShape shape = half_shape(state_.domain, d, parts, half.tet, half.end);
-        to = place_patch(to, shape, corners_of(shape), sides, points);
+        visit(half, shape, corners_of(shape), sides, has_patch);
       }
-      if (out.halves == nullptr) continue;
-      out.halves->push_back({child_can_change, {}, std::size_t(to - out.tets.data())});
-      if (!child_can_change) continue;
-      auto local = d.row->tet(half.tet);
-      local[1 - half.end] = kCentre;
-      out.halves->back().corners = state_.domain.positions(d, local);
     }
   }
-  out.tets.resize(std::size_t(to - out.tets.data()));
 }
 
 bool FrontMesher::can_change(FrontCursor& cursor, Vertex centre) {
@@ -264,18 +254,86 @@ bool FrontMesher::can_change(FrontCursor& cursor, Vertex centre) {
   return cursor.gather_sides(kSlotOfType[d.type]) && !cursor.is_noop() && cursor.context().is_mixed();
 }
 
+template <class Numbers>
+void FrontMesher::append_tets_by(std::size_t number, Tets& tets, const Numbers& numbers) const {
+  PointsAround points;
+  const auto end_at = [&tets](const Tet* to) { tets.resize(std::size_t(to - tets.data())); };
+  if (state_.is_root_block(block(number))) {
+    visit_root([&](FrontCursor& cursor, const TetShape& shape, int) {
+      gather_points(cursor, numbers, points);
+      end_at(place_patch(make_room(tets), shape, corners_of(shape), cursor.context().sides, points));
+    });
+    return;
+  }
+  visit_splits(number, block(number).shown, [&](FrontCursor& cursor, unsigned children) {
+    const FrontState::Split split = cursor.here().split_at(cursor.slot());
+    if (split.cut_bits() == 0 && split.side() != Side::inside) return;  // all on one side, and not inside
+    gather_points_with_centre(cursor, numbers, points);
+    Tet* to = make_room(tets);
+    visit_halves(cursor, children, [&](Duet::Half, const TetShape& shape, const Corners& corners, std::uint32_t sides, bool has_patch) {
+      if (has_patch) to = place_patch(to, shape, corners, sides, points);
+    });
+    end_at(to);
+  });
+}
+
 void FrontMesher::append_tets(std::size_t number, Tets& tets, std::span<const std::uint32_t> numbers) const {
   if (numbers.empty()) {
-    append(Output<OwnIds>{tets, nullptr, nullptr, {}}, number);
+    append_tets_by(number, tets, OwnIds());
   } else {
-    append(Output<std::span<const std::uint32_t>>{tets, nullptr, nullptr, numbers}, number);
+    append_tets_by(number, tets, numbers);
   }
 }
 
+void FrontMesher::append_faces(std::size_t number, std::vector<Face>& faces) const {
+  PointsAround points;
+  if (state_.is_root_block(block(number))) {
+    visit_root([&](FrontCursor& cursor, const TetShape& shape, int) {
+      gather_points(cursor, OwnIds(), points);
+      append_patch_faces(shape, corners_of(shape), cursor.context().sides, points, faces);
+    });
+    return;
+  }
+  // What does not count lies on one side.
+  visit_splits(number, block(number).shown & block(number).counts, [&](FrontCursor& cursor, unsigned children) {
+    gather_points_with_centre(cursor, OwnIds(), points);
+    visit_halves(cursor, children, [&](Duet::Half, const TetShape& shape, const Corners& corners, std::uint32_t sides, bool has_patch) {
+      if (has_patch) append_patch_faces(shape, corners, sides, points, faces);
+    });
+  });
+}
+
 void FrontMesher::append_halves(std::size_t number, Tets& tets, std::vector<Half>& halves) const {
+  PointsAround points;
+  const auto add = [&](const TetShape& shape, const Corners& corners, std::uint32_t sides, const std::array<Vertex, 4>& of_half) {
+    const Tet* const end = place_patch(make_room(tets), shape, corners, sides, points);
+    tets.resize(std::size_t(end - tets.data()));
+    halves.push_back({of_half, tets.size()});
+  };
+  if (state_.is_root_block(block(number))) {
+    visit_root([&](FrontCursor& cursor, const TetShape& shape, int t) {
+      if (!cursor.context().is_mixed()) return;
+      gather_points(cursor, OwnIds(), points);
+      const Diamond root = cursor.diamond();
+      add(shape, corners_of(shape), cursor.context().sides, state_.domain.positions(root, root.row->tet(t)));
+    });
+    return;
+  }
   FrontCursor at_child(state_);
   at_child.move_to(block(number).scale, block(number).position);
-  append(Output<OwnIds>{tets, &halves, &at_child, {}}, number);
+  visit_splits(number, block(number).shown, [&](FrontCursor& cursor, unsigned children) {
+    const Diamond d = cursor.diamond();
+    if (!d.has_children()) return;
+    unsigned changing = 0;
+    for (const int k : set_bits(children)) changing |= unsigned(can_change(at_child, d.child(k))) << k;
+    if (changing == 0) return;
+    gather_points_with_centre(cursor, OwnIds(), points);
+    visit_halves(cursor, changing, [&](Duet::Half half, const TetShape& shape, const Corners& corners, std::uint32_t sides, bool) {
+      auto local = d.row->tet(half.tet);
+      local[1 - half.end] = kCentre;
+      add(shape, corners, sides, state_.domain.positions(d, local));
+    });
+  });
 }
 
 }  // namespace intervale

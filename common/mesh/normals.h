@@ -18,26 +18,24 @@ namespace intervale {
 using NormalSum = std::array<std::int32_t, 3>;
 
 // What a triangle, counterclockwise seen from outside, adds at each of its corners; 0 if it has no area. Directions are
-// those of the space of the corners: apply the grid's affine to samples first. arc_cosine: of a number that rounding
-// may bring slightly beyond -1 or 1. Its precision is the caller's choice, since it takes much of the time.
-template <class ArcCosine>
-[[nodiscard]] std::array<NormalSum, 3> angle_weighted_normals(const std::array<Vec3, 3>& corners, const ArcCosine& arc_cosine) {
-  constexpr double kSteps = 1 << 20;
+// those of the space of the corners: apply the grid's affine to samples first. arc_tangent: as std::atan2, of a y above
+// 0. Its precision is the caller's choice, since it takes much of the time.
+template <class ArcTangent>
+[[nodiscard]] std::array<NormalSum, 3> angle_weighted_normals(const std::array<Vec3, 3>& corners, const ArcTangent& arc_tangent) {
+  constexpr double kSteps = 1 << 20, kPi = 3.14159265358979323846;
   std::array<NormalSum, 3> added{};
-  std::array<Vec3, 3> side;  // from corner k to the next
-  std::array<double, 3> side_length;
-  for (std::size_t k = 0; k < 3; ++k) {
-    side[k] = subtract(corners[(k + 1) % 3], corners[k]);
-    side_length[k] = std::sqrt(dot(side[k], side[k]));
-  }
-  const Vec3 normal = cross(side[0], side[1]);
+  const Vec3 first = subtract(corners[1], corners[0]), second = subtract(corners[2], corners[1]), third = subtract(corners[0], corners[2]);
+  const Vec3 normal = cross(first, second);
   const double twice_area = std::sqrt(dot(normal, normal));
   if (!(twice_area > 0)) return added;
+  // Of two sides of a triangle, |cross product| and dot product are the sine and the cosine of their angle, times the
+  // same number.
+  const double a = arc_tangent(twice_area, -dot(third, first)), b = arc_tangent(twice_area, -dot(first, second));
+  const std::array<double, 3> angle{a, b, kPi - a - b};
+  const double steps = kSteps / twice_area;
   for (std::size_t k = 0; k < 3; ++k) {
-    const std::size_t before = (k + 2) % 3;
-    const double angle = arc_cosine(-dot(side[k], side[before]) / (side_length[k] * side_length[before]));
-    const double weight = angle * kSteps / twice_area;
-    for (std::size_t i = 0; i < 3; ++i) added[k][i] = std::int32_t(std::lrint(weight * normal[i]));
+    // rint() is an instruction, where lrint() may be a call.
+    for (std::size_t i = 0; i < 3; ++i) added[k][i] = std::int32_t(std::rint(angle[k] * steps * normal[i]));
   }
   return added;
 }

@@ -101,6 +101,20 @@ std::vector<std::array<PatchCorner, 4>> tetrahedra(int order, const std::array<S
   return result;
 }
 
+// Faces of tetrahedra whose corners are all on one surface. No two tetrahedra share such a face.
+std::vector<std::array<PatchCorner, 3>> faces_on_surfaces(const std::vector<std::array<PatchCorner, 4>>& tets) {
+  std::vector<std::array<PatchCorner, 3>> result;
+  result.reserve(4 * tets.size());
+  for (const auto& tet : tets) {
+    for (const auto& face : kTetFaces) {
+      const std::array<PatchCorner, 3> corners{tet[face[0]], tet[face[1]], tet[face[2]]};
+      const auto is_on = [first = corners[0]](PatchCorner c) { return c >= 4 && c % 2 == first % 2; };
+      if (std::all_of(corners.begin(), corners.end(), is_on)) result.push_back(corners);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 TetCases::TetCases() : entries_(kTetOrders * 256) {
@@ -114,8 +128,11 @@ TetCases::TetCases() : entries_(kTetOrders * 256) {
       }
       if (!valid) continue;
       const auto tets = tetrahedra(order, side);
-      entries_[order * 256 + sides] = {std::uint16_t(tets_.size()), std::uint16_t(tets.size())};
+      const auto faces = faces_on_surfaces(tets);
+      entries_[order * 256 + sides] = {std::uint16_t(tets_.size()), std::uint16_t(faces_.size()), std::uint8_t(tets.size()),
+                                       std::uint8_t(faces.size())};
       tets_.insert(tets_.end(), tets.begin(), tets.end());
+      faces_.insert(faces_.end(), faces.begin(), faces.end());
       most_ = std::max(most_, unsigned(tets.size()));
     }
   }

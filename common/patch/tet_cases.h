@@ -72,6 +72,12 @@ class TetCases {
     return {tets_.data() + e.first, e.count};
   }
   [[nodiscard]] unsigned count(int order, unsigned sides) const { return entries_[order * 256 + sides].count; }
+  // Their faces that lie on a surface, counterclockwise from outside if the tetrahedra are positive: three alpha cuts or
+  // three beta cuts each.
+  [[nodiscard]] std::span<const std::array<PatchCorner, 3>> faces(int order, unsigned sides) const {
+    const Entry e = entries_[order * 256 + sides];
+    return {faces_.data() + e.first_face, e.faces};
+  }
   // The most tetrahedra that a patch has.
   [[nodiscard]] unsigned most() const { return most_; }
 
@@ -82,10 +88,12 @@ class TetCases {
 
  private:
   struct Entry {
-    std::uint16_t first = 0, count = 0;
+    std::uint16_t first = 0, first_face = 0;
+    std::uint8_t count = 0, faces = 0;
   };
   std::vector<Entry> entries_;
   std::vector<std::array<PatchCorner, 4>> tets_;
+  std::vector<std::array<PatchCorner, 3>> faces_;
   std::array<std::uint8_t, 256> counts_{};
   unsigned most_ = 0;
 };

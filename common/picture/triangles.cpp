@@ -37,10 +37,10 @@ std::vector<Triangle> ordered_boundary(const Mesh& mesh) {
 
 std::vector<NormalSum> smooth_normals(const Mesh& mesh, const std::vector<Triangle>& triangles) {
   std::vector<NormalSum> normals(mesh.points.size());
-  const auto arc_cosine = [](double x) { return std::acos(std::clamp(x, -1.0, 1.0)); };
+  const auto arc_tangent = [](double y, double x) { return std::atan2(y, x); };
   for (const Triangle& t : triangles) {
     if (part_of(mesh, t) == Part::box) continue;
-    const auto added = angle_weighted_normals({mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]}, arc_cosine);
+    const auto added = angle_weighted_normals({mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]}, arc_tangent);
     for (std::size_t corner = 0; corner < 3; ++corner)
       for (std::size_t axis = 0; axis < 3; ++axis) normals[t[corner]][axis] += added[corner][axis];
   }

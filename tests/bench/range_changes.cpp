@@ -1,5 +1,5 @@
-// How long a front that holds values takes to change its range: set_range and the mesh, against the same splits applied
-// again. One core.
+// How long a front that holds values takes to change its range: set_range, the mesh, and the boundary surface that the
+// viewer draws, against the same splits applied again. One core.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/view/boundary_surface.h"
 #include "common/front/front.h"
 #include "common/util/bits.h"
 #include "server/builder/border_shape.h"
@@ -94,12 +95,20 @@ struct Splits {
   }
 };
 
+// Of a surface that is made anew: its triangles as they are drawn.
+std::size_t triangles_made(BoundarySurface& surface) {
+  std::size_t triangles = 0;
+  for (const std::uint32_t id : surface.update().pieces) triangles += surface.piece(id, false).indices.size() / 3;
+  return triangles;
+}
+
 void measure(const Field& field, const std::string& held, const std::vector<SlotGroup>& groups, const Range& from, const Range& to) {
   Front front = field.front(from);
   Splits(field, groups).apply(front);
   const Splits needed(field, field.relevant({to}));
   double set = 0, mesh = 0, again = 0, mesh_again = 0;
-  std::vector<double> sets, meshes, agains, meshes_again;
+  std::vector<double> sets, meshes, surfaces, agains, meshes_again;
+  BoundarySurface surface(front);
   for (int run = 0; run < kRuns; ++run) {
     front.set_range(from, field.c.refine);
     sets.push_back(seconds([&] {
@@ -107,6 +116,7 @@ void measure(const Field& field, const std::string& held, const std::vector<Slot
       return 0;
     }));
     meshes.push_back(seconds([&] { return front.mesh(); }));
+    surfaces.push_back(seconds([&] { return triangles_made(surface); }));
     Front fresh = field.front(to);
     agains.push_back(seconds([&] {
       needed.apply(fresh);
@@ -117,8 +127,8 @@ void measure(const Field& field, const std::string& held, const std::vector<Slot
   }
   set = median(sets), mesh = median(meshes), again = median(agains), mesh_again = median(meshes_again);
   const double shown = double(front.shown_count()) / 1e5, ms = 1000 / shown;
-  fmt::print("| {} {} | {} | {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} |\n", field.c.name, range_text(to, field.c.refine), held,
-             front.split_count(), front.shown_count(), set * ms, mesh * ms, (set + mesh) * ms, again * ms, mesh_again * ms);
+  fmt::print("| {} {} | {} | {} | {} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} |\n", field.c.name, range_text(to, field.c.refine), held,
+             front.split_count(), front.shown_count(), set * ms, mesh * ms, (set + mesh) * ms, median(surfaces) * ms, again * ms, mesh_again * ms);
 }
 
 void measure_case(const Case& c) {
@@ -131,7 +141,9 @@ void measure_case(const Case& c) {
 
 int run(int argc, char** argv) {
   fmt::print("Milliseconds for 100,000 splits shown; medians of {} runs, one core. Alpha moves by 5 % of the field.\n\n", kRuns);
-  fmt::print("| range | held | splits held | shown | set_range | mesh | together | splits again | mesh |\n|---|---|--:|--:|--:|--:|--:|--:|--:|\n");
+  fmt::print(
+      "| range | held | splits held | shown | set_range | mesh | together | surface | splits again | mesh "
+      "|\n|---|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
   if (argc < 2) {
     for (const char* name : {"gyroid", "buckyball"}) measure_case(or_throw(sample_case(name, 97)));
   }

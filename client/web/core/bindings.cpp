@@ -8,10 +8,13 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/view/boundary_surface.h"
+#include "client/view/coarse_front.h"
 #include "client/view/cross_section.h"
 #include "client/view/point_values.h"
 #include "client/view/tets_in_box.h"
@@ -85,12 +88,24 @@ class Viewer {
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
     stale_ = true;  // a budget hides and shows at once
+    is_previewing_ = false;
+    coarse_.reset();
     return text_of(session_.look(wanted));
   }
-  // The range that is shown until the next look().
-  std::string preview(const val& range) {
-    stale_ = true;
-    return text_of(session_.preview({.range = Range{range[0].as<double>(), range[1].as<double>()}}));
+  // The range that is shown until the next look(). levels: how many of the finest ones are left out (coarse_front.h).
+  std::string preview(const val& range, int levels) {
+    if (!surface_) return {};
+    const RangeRequest request{.range = Range{range[0].as<double>(), range[1].as<double>()}};
+    stale_ = is_previewing_ = true;
+    if (levels == 0) {
+      coarse_.reset();
+      return text_of(session_.preview(request));
+    }
+    const ShownRange shown = resolve(session_.mesh()->description(), request);
+    if (auto held = check_held(session_.mesh()->description(), shown); !held) return text_of(held);
+    if (!coarse_ || coarse_->levels != levels) coarse_.emplace(*session_.mesh(), levels);
+    coarse_->front.set_range(shown.range, shown.refine);
+    return {};
   }
   void connected(double now) { session_.connected(time_of(now)); }
   void disconnected() { session_.disconnected(); }
@@ -104,7 +119,10 @@ class Viewer {
     stale_ = true;
     const auto event = session_.receive(inbox_, time_of(now));
     event_ = event ? *event : ClientSession::Event();
-    if (event_.is_new_mesh) surface_.emplace(session_.mesh()->front());
+    if (event_.is_new_mesh) {
+      coarse_.reset();
+      surface_.emplace(session_.mesh()->front());
+    }
     return text_of(event);
   }
   val take_messages() {
@@ -126,7 +144,7 @@ class Viewer {
   [[nodiscard]] bool done() const { return session_.is_done(); }
 
   // What a Progress of messages.ts has of the core.
-  [[nodiscard]] val progress() const {
+  [[nodiscard]] val progress() {
     const ClientSession::Stats& stats = session_.session().stats();
     const StreamClient* client = session_.mesh();
     val progress = val::object();
@@ -135,14 +153,15 @@ class Viewer {
     progress.set("updatesInMesh", client ? double(client->updates_in_mesh()) : 0.0);
     progress.set("updatesShown", client ? double(client->updates() - client->updates_left_out()) : 0.0);
     progress.set("tets", client ? double(client->tet_count()) : 0.0);
-    progress.set("triangles", surface_ ? double(surface_->triangles()) : 0.0);
+    progress.set("triangles", surface_ ? double(drawn().triangles()) : 0.0);
     progress.set("updatesToGo", double(stats.updates_to_go));
     progress.set("remainingError", stats.remaining_error);
     progress.set("remainingPixels", session_.remaining_pixels());
     progress.set("done", done());
     progress.set("full", stats.is_full);
-    progress.set("volume", surface_ ? surface_->volume() : 0.0);
-    progress.set("volumeBound", surface_ ? surface_->volume_bound() : 0.0);
+    progress.set("volume", surface_ ? drawn().volume() : 0.0);
+    const bool rests = surface_ && done() && !is_previewing_ && !stale_;  // the bound takes about as long as the surface
+    progress.set("volumeBound", rests ? val(surface_->volume_bound()) : val::null());
     progress.set("reconnects", double(stats.connections > 0 ? stats.connections - 1 : 0));
     progress.set("repeated", client && stats.updates > client->updates() ? double(stats.updates - client->updates()) : 0.0);
     return progress;
@@ -155,11 +174,13 @@ class Viewer {
   // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything.
   val update_surface(bool edges, bool all) {
     stale_ = false;
-    const BoundarySurface::Change change = all ? surface_->all() : surface_->update();
-    values_ = wants_values_ ? point_values(*surface_) : std::vector<float>();
+    const bool is_other = std::exchange(coarse_is_drawn_, coarse_.has_value()) != coarse_.has_value();
+    BoundarySurface& surface = coarse_ ? coarse_->surface : *surface_;
+    const BoundarySurface::Change change = all || is_other ? surface.all() : surface.update();
+    values_ = wants_values_ ? point_values(surface) : std::vector<float>();
     val pieces = val::array();
     for (const std::uint32_t id : change.pieces) {
-      const SurfacePiece p = surface_->piece(id, edges);
+      const SurfacePiece p = surface.piece(id, edges);
       val piece = val::object();
       piece.set("id", p.id);
       piece.set("vertices", buffer_of(p.vertices));
@@ -183,7 +204,7 @@ class Viewer {
   [[nodiscard]] bool is_stale() const { return stale_ || !surface_; }
   // Of a Cap, and of Tets, in messages.ts.
   val cap(const val& plane) const {
-    const CrossSection section = cross_section(*surface_, {three(plane["normal"]), plane["offset"].as<double>()}, values_);
+    const CrossSection section = cross_section(drawn(), {three(plane["normal"]), plane["offset"].as<double>()}, values_);
     val cap = val::object();
     cap.set("vertices", buffer_of(section.vertices));
     cap.set("values", !values_.empty() ? buffer_of(section.values) : val::null());
@@ -191,7 +212,7 @@ class Viewer {
     return cap;
   }
   val tets(const val& box) const {
-    const TetsInBox found = tets_in_box(*surface_, box_of(box), kMostTets);
+    const TetsInBox found = tets_in_box(drawn(), box_of(box), kMostTets);
     val tets = val::object();
     tets.set("vertices", buffer_of(found.vertices));
     tets.set("values", values_at(found.points));
@@ -221,13 +242,25 @@ class Viewer {
     return !values_.empty() ? buffer_of(values_of(points, values_)) : val::null();
   }
 
+  // The surface of the mesh, or of what stands in for it.
+  [[nodiscard]] const BoundarySurface& drawn() const { return coarse_ ? coarse_->surface : *surface_; }
+
+  struct Coarse {
+    Coarse(const StreamClient& client, int left_out) : levels(left_out), front(coarse_front(client, left_out)), surface(front) {}
+    int levels;
+    Front front;
+    BoundarySurface surface;
+  };
   ViewingSession session_;
   std::optional<BoundarySurface> surface_;
+  std::optional<Coarse> coarse_;  // in a preview of less than the mesh
+  bool coarse_is_drawn_ = false;
   std::vector<std::uint8_t> inbox_;
   ClientSession::Event event_;  // of the last message
   bool wants_values_ = false;
   std::vector<float> values_;  // by PointId, of the last surface, if they were wanted
   bool stale_ = true;          // the mesh may have changed since the last surface
+  bool is_previewing_ = false;
 };
 
 }  // namespace

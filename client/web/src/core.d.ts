@@ -5,7 +5,8 @@ import type { Box, Cap, Plane, Progress, SurfaceChange, Tets, View } from './mes
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
   look(view: View): string;
-  preview(range: [number, number]): string; // shown until the next look(), of the updates that are here
+  // Shown until the next look(), of the updates that are here, without this number of finest levels.
+  preview(range: [number, number], levels: number): string;
   connected(now: number): void; // the WebSocket was opened
   disconnected(): void; // ... or closed
   inbox(bytes: number): Uint8Array; // to be filled with one message; valid until the next call of any function

@@ -25,9 +25,9 @@ export function short(x: number): string {
 
 const signed = (text: string): string => text.replace(/^-/, '−');
 
-// A value and the bound of its error, with the digits that are significant: "123,400 ± 300". bound 0: the value only.
-export function bounded(value: number, bound: number): string {
-  if (!(bound > 0)) return digits(value, 6);
+// A value and the bound of its error, with the digits that are significant: "123,400 ± 300". bound 0, or not known (null): the value only.
+export function bounded(value: number, bound: number | null): string {
+  if (bound === null || !(bound > 0)) return digits(value, 6);
   const significant = value === 0 ? 1 : Math.ceil(Math.log10(Math.abs(value) / bound)) + 1;
   return `${digits(value, Math.min(7, Math.max(1, significant)))} ± ${digits(bound, 1)}`;
 }

@@ -31,7 +31,9 @@ export type Request =
   // The view that is wanted from now on. With a region: that at full detail. Without: everything, until the error is at
   // most pixelError on the camera's screen. Before the first 'open': the view that the session starts with.
   | { type: 'view'; view: View }
-  // Shown until the next 'view', of what was received; the server is not asked. Answered by a report of the same type.
+  // Shown until the next 'view', of what was received; the server is not asked. If all of it would take too long, it is
+  // coarser. Answered by a report of the same type once its surface was sent, which the page's showing of the last one
+  // precedes; or without one where there is no mesh, or a 'view' came before.
   | { type: 'preview'; range: [number, number] }
   // Each is answered by a Cap; if a new one arrives before the answer, only the last is answered.
   | { type: 'clip'; plane: Plane | null }
@@ -83,7 +85,7 @@ export interface Progress {
   done: boolean; // all that this view wants was received, and is in that surface
   full: boolean; // the memory budget leaves some updates out
   volume: number; // of the mesh, cubic world units
-  volumeBound: number; // the most by which refining the tetrahedra on the surfaces can change the volume
+  volumeBound: number | null; // the most by which refining the tetrahedra on the surfaces can change it; null: not known until done
   memory: number; // of the core, bytes
   busy: { updates: number; seconds: number }; // updates decoded and applied, and the time for it
   reconnects: number;

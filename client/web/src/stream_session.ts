@@ -6,6 +6,7 @@ import type { Core, Viewer } from '@core/core.js';
 
 import { Connection, kGoingAway } from './connection';
 import type { Box, MeshFormat, Plane, Report, Request, View } from './messages';
+import { PreviewPace } from './preview_pace';
 
 const kSurfaceIntervalMs = 40; // least time between two versions
 const kProgressIntervalMs = 100;
@@ -32,6 +33,9 @@ export class StreamSession {
   private surfaceTimer = 0;
   private surfaceEnd = 0; // when the last one was finished, performance.now()
   private surfaceMs = 0; // what it took
+  private previewed: [number, number] | null = null; // to be shown once the page shows the last surface
+  private pace = new PreviewPace();
+  private isPreviewing = false; // since the last view
 
   private progressTime = 0; // when it was last reported
   private progressTimer = 0;
@@ -58,26 +62,49 @@ export class StreamSession {
 
   // Connects with the first view.
   look(view: View): void {
+    this.endPreview();
     const error = this.viewer.look(view);
     if (error) return this.fail(error);
     this.connection.start();
     this.send();
-    this.isChanged = true; // another budget shows other tetrahedra
+    this.isChanged = true; // another budget or another range shows other tetrahedra
     this.reportProgress(true);
     this.scheduleSurface();
   }
 
+  // Without waiting for the server or for a pause: this follows the hand.
   preview(range: [number, number]): void {
-    const error = this.viewer.preview(range);
-    if (error) return this.fail(error);
-    this.isChanged = true;
-    this.reportProgress(true);
-    this.scheduleSurface();
+    this.previewed = range;
+    if (!this.isOpen) return this.answerPreview();
+    if (this.shown === this.version) this.showPreview(range);
   }
 
   pageShows(version: number): void {
     this.shown = version;
-    this.scheduleSurface();
+    if (this.previewed && version === this.version) this.showPreview(this.previewed);
+    else this.scheduleSurface();
+  }
+
+  private showPreview(range: [number, number]): void {
+    if (!this.isPreviewing) this.pace.begin(this.viewer.progress().updatesShown);
+    this.isPreviewing = true;
+    const start = performance.now();
+    const error = this.viewer.preview(range, this.pace.levels);
+    if (error) return this.fail(error);
+    this.isChanged = true;
+    this.sendSurface();
+    this.pace.took(performance.now() - start);
+    this.answerPreview();
+  }
+
+  private endPreview(): void {
+    this.isPreviewing = false;
+    if (this.previewed) this.answerPreview();
+  }
+
+  private answerPreview(): void {
+    this.previewed = null;
+    this.report({ type: 'preview' });
   }
 
   // Sends the surface again: edges are wanted, or not wanted any more.
@@ -204,6 +231,7 @@ export class StreamSession {
   }
 
   private sendSurface(): void {
+    clearTimeout(this.surfaceTimer);
     this.surfaceTimer = 0;
     if (this.isEnded || !this.isChanged || this.shown !== this.version) return;
     const start = performance.now();

@@ -25,8 +25,7 @@ async function handle(request: Request): Promise<void> {
       view = request.view;
       return session?.look(view);
     case 'preview':
-      session?.preview(request.range);
-      return report({ type: 'preview' });
+      return session ? session.preview(request.range) : report({ type: 'preview' });
     case 'clip':
       extras.plane = request.plane;
       return session?.sendCap();

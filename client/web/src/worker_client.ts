@@ -72,7 +72,7 @@ export class WorkerClient {
     this.sendView();
     this.send({ type: 'open', url: streamUrl(), dataset, ...(token === null ? {} : { token }) });
     this.sentPlane = wanted.plane;
-    this.isAwaitingCap = false;
+    this.isAwaitingCap = this.isAwaitingPreview = false;
     this.send({ type: 'clip', plane: wanted.plane });
     this.send({ type: 'tets', box: wanted.tetsBox });
     this.send({ type: 'edges', wanted: wanted.edges });

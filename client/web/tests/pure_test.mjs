@@ -11,8 +11,8 @@ const server = await createServer({
   appType: 'custom',
 });
 const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
-const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame'];
-const [{ fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec, frame] = await Promise.all(kModules.map(load));
+const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace'];
+const [{ fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec, frame, { PreviewPace }] = await Promise.all(kModules.map(load));
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -213,6 +213,7 @@ test('numbers have the digits that are significant', () => {
   assert.equal(format.bounded(43844.2, 10), '43,844 ± 10');
   assert.equal(format.bounded(123456, 2000), '123,000 ± 2,000');
   assert.equal(format.bounded(1234.4, 0), '1,234');
+  assert.equal(format.bounded(1234.4, null), '1,234');
   assert.equal(format.bytes(999), '999 B');
   assert.equal(format.bytes(1.5e6), '1.5 MB');
   assert.equal(format.short(-Infinity), '−∞');
@@ -220,5 +221,23 @@ test('numbers have the digits that are significant', () => {
   for (let i = 0; i < 100; ++i) {
     const x = 10 ** random(-8, 8);
     assert.ok(format.roundUp(x) >= x * (1 - 1e-9) && format.roundUp(x) <= 1.6 * x);
+  }
+});
+
+test('a preview gets coarser until a step is done in time, and not finer again if that would be too slow', () => {
+  for (let i = 0; i < 50; ++i) {
+    const pace = new PreviewPace();
+    const updates = 10 ** random(3, 7);
+    const msPerUpdate = 10 ** random(-4, -2.5);
+    const msOf = (levels) => (updates * msPerUpdate) / 2 ** levels;
+    pace.begin(updates);
+    const levels = Array.from({ length: 30 }, () => {
+      pace.took(msOf(pace.levels));
+      return pace.levels;
+    });
+    const last = levels.at(-1);
+    assert.ok(msOf(last) <= 55 || last === 15, `${msOf(last)} ms`);
+    assert.ok(last === 0 || msOf(last - 1) > 25, 'no coarser than needed');
+    assert.deepEqual(new Set(levels.slice(15)), new Set([last]), 'at rest');
   }
 });

@@ -1,0 +1,41 @@
+#include "client/view/coarse_front.h"
+
+#include <cassert>
+#include <span>
+#include <vector>
+
+#include "common/util/bits.h"
+
+namespace intervale {
+namespace {
+
+// The slots of the levels that stay. Finest first: class 2, 1 and 0 of scale 0, then those of scale 1.
+std::uint64_t slots_that_stay(int scale, int levels) {
+  std::uint64_t slots = 0;
+  for (int cls = 0; cls < 3; ++cls) slots |= 3 * scale + 2 - cls >= levels ? kSlotsOfClass[std::size_t(cls)] : 0;
+  return slots;
+}
+
+}  // namespace
+
+Front coarse_front(const StreamClient& client, int levels) {
+  const Front& fine = client.front();
+  std::vector<SlotGroup> groups;
+  const std::vector<SlotGroup> all = fine.splits();  // coarse scales first
+  groups.reserve(all.size());
+  for (SlotGroup group : all) {
+    group.slots &= slots_that_stay(scale_of_key(group.key), levels);
+    if (group.slots != 0) groups.push_back(group);
+  }
+  const Description& description = client.description();
+  Front coarse(description.grid, description.format, description.corners, fine.range(), fine.refine());
+  const auto keys_of = [&fine](const SlotGroup& group, std::span<ValueKey, kSlots> keys) {
+    const FrontState::Block* const block = fine.state().find_block(scale_of_key(group.key), position_of_key(group.key));
+    for (const Slot slot : set_bits<Slot>(group.slots)) keys[slot] = block->key[slot];
+  };
+  [[maybe_unused]] const auto misfit = coarse.split_all(groups, keys_of);
+  assert(!misfit && "parents are of coarser levels");
+  return coarse;
+}
+
+}  // namespace intervale

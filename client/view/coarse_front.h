@@ -1,0 +1,14 @@
+// A coarser stand-in for a mesh: what a viewer shows while its range changes from moment to moment.
+#pragma once
+
+#include "client/core/stream_client.h"
+#include "common/front/front.h"
+
+namespace intervale {
+
+// The front of a client's splits without those of its finest levels, for the same range. A level is the diamonds of one
+// scale and class, of which each has about half as many as the next finer one. levels: at least 0; 3 for each scale.
+// O(the client's splits).
+[[nodiscard]] Front coarse_front(const StreamClient& client, int levels);
+
+}  // namespace intervale

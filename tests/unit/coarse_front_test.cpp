@@ -1,0 +1,61 @@
+#include "client/view/coarse_front.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <utility>
+
+#include "client/view/boundary_surface.h"
+#include "common/selection/stream_plan.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/mesh_laws.h"
+
+namespace intervale {
+namespace {
+
+using testing::canonical;
+
+// A client that has all of a volume.
+StreamClient client_of(const IntervalVolume& volume) {
+  const auto shared = std::shared_ptr<const IntervalVolume>(&volume, [](const IntervalVolume*) {});
+  StreamPlan plan(shared);
+  plan.set_lod({});
+  auto client = StreamClient::start(volume.description());
+  while (const auto batch = plan.next(4096)) EXPECT_TRUE(client->apply(batch->payload));
+  return std::move(*client);
+}
+
+class CoarseFrontOf : public ::testing::TestWithParam<unsigned> {
+ protected:
+  std::shared_ptr<const IntervalVolume> volume =
+      GetParam() % 2 == 0 ? testing::build_shared(testing::gyroid({17, 12, 33}), {.range = {-0.3, 0.2}, .refine = Refine::uniform})
+                          : testing::build_shared(testing::digits({13, 20, 6}, GetParam()), {.range = {3, 5.5}, .refine = Refine::uniform});
+  StreamClient client = client_of(*volume);
+};
+
+TEST_P(CoarseFrontOf, EachLevelIsPartOfTheNextFinerOne) {
+  Front finer = coarse_front(client, 0);
+  EXPECT_EQ(canonical(finer.mesh()), canonical(client.mesh()));
+  for (int levels = 1; finer.split_count() > 0; ++levels) {
+    Front coarse = coarse_front(client, levels);
+    ASSERT_EQ(coarse.validate(), std::nullopt);
+    ASSERT_TRUE(coarse.is_part_of(finer));
+    ASSERT_LE(coarse.split_count(), finer.split_count());
+    finer = std::move(coarse);
+    ASSERT_LE(levels, 24) << "in the end nothing is left";
+  }
+}
+
+TEST_P(CoarseFrontOf, AnotherRangeShowsWhatTheFineMeshHasOfTheseLevels) {
+  const Range range = client.front().range(), within{range.alpha + 0.1, range.beta - 0.1};
+  Front moved = coarse_front(client, 3);
+  moved.set_range(within, Refine::boundary);
+  ASSERT_TRUE(client.show({.range = within, .refine = Refine::boundary}));
+  EXPECT_EQ(canonical(moved.mesh()), canonical(coarse_front(client, 3).mesh()));
+  EXPECT_LE(moved.tet_count(), client.tet_count());
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, CoarseFrontOf, ::testing::Range(0u, 4u));
+
+}  // namespace
+}  // namespace intervale
