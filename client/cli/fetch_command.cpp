@@ -118,7 +118,9 @@ Result<void> run(const FetchCommand& options) {
   if (options.picture) {
     const Description& description = fetched->client.description();
     const Range shown = resolve(description, fetch.shown).range;
-    if (auto drawn = write_picture(*options.picture, {mesh, description, shown}, options.fetch.lod.camera); !drawn) return drawn;
+    const auto drawn = write_picture(*options.picture, {mesh, description, shown}, options.fetch.lod.camera);
+    if (!drawn) return tl::unexpected(drawn.error());
+    if (!*drawn) fmt::print(stderr, "intervale-client: warning: nothing of the mesh is in the picture\n");
   }
   return report(options, *fetched, mesh);
 }

@@ -176,11 +176,14 @@ Result<Pixels> Canvas::finish() {
   if (const GLenum error = gl.GetError(); error != GL_NO_ERROR)
     return fail(fmt::format("cannot draw a picture of {} x {} pixels: OpenGL ES error {:#x}", width, height, error));
 
-  Pixels pixels{width, height, {}};
+  Pixels pixels{width, height, {}, false};
   pixels.rgb.reserve(rgba.size() / 4 * 3);
   for (int row = height - 1; row >= 0; --row) {  // the library's rows begin at the bottom
     const std::uint8_t* from = rgba.data() + std::size_t(row) * std::size_t(width) * 4;
-    for (int column = 0; column < width; ++column, from += 4) pixels.rgb.insert(pixels.rgb.end(), from, from + 3);
+    for (int column = 0; column < width; ++column, from += 4) {
+      pixels.rgb.insert(pixels.rgb.end(), from, from + 3);
+      pixels.has_drawing |= from[3] != 0;
+    }
   }
   return pixels;
 }

@@ -68,7 +68,7 @@ Result<void> check_picture(const PictureOptions& options, const std::optional<Ca
   return {};
 }
 
-Result<void> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera) {
+Result<bool> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera) {
   const Box box = box_of(subject.description.grid);
   const Camera seen_from = camera ? *camera : three_quarter_view(box, options.clip);
   const Viewpoint viewpoint(seen_from, box);
@@ -84,7 +84,8 @@ Result<void> write_picture(const PictureOptions& options, const PictureSubject& 
   auto pixels = canvas->finish();
   if (!pixels) return tl::unexpected(pixels.error());
   if (palette) draw_colour_bar(*pixels, *palette, *triangles.span, title_of(subject.description.labels));
-  return write_png(options.file, *pixels);
+  if (auto written = write_png(options.file, *pixels); !written) return tl::unexpected(written.error());
+  return pixels->has_drawing;
 }
 
 }  // namespace intervale

@@ -10,6 +10,7 @@ namespace intervale {
 struct Pixels {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;
+  bool has_drawing = false;  // anything but background
 };
 
 }  // namespace intervale

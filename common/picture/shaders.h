@@ -21,7 +21,8 @@ vec3 background() { return mix(vec3(0.83, 0.86, 0.90), vec3(0.98, 0.985, 0.99), 
 vec3 encoded(vec3 light) { return pow(clamp(light, 0.0, 1.0), vec3(1.0 / 2.2)); }
 )";
 
-inline constexpr char kBackgroundFragmentShader[] = R"(void main() { colour = vec4(encoded(background()), 1.0); })";
+// Alpha tells where something was drawn.
+inline constexpr char kBackgroundFragmentShader[] = R"(void main() { colour = vec4(encoded(background()), 0.0); })";
 
 inline constexpr char kMeshVertexShader[] = R"(#version 300 es
 layout(location = 0) in vec3 position;

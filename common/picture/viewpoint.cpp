@@ -8,7 +8,7 @@
 namespace intervale {
 namespace {
 
-constexpr Vec3 kThreeQuarter{0.5, 0.42, 1};  // towards the eye
+constexpr Vec3 kThreeQuarter{0.62, -1, 0.52};  // towards the eye, as in the viewer
 constexpr std::array<int, 2> kPixels{1280, 960};
 constexpr double kFov = 30;
 constexpr double kMargin = 1.04;    // around the box
@@ -36,8 +36,11 @@ Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip) {
   camera.fov = kFov;
   camera.viewport = kPixels;
   camera.look_at = middle_of(box);
+  camera.up = {0, 0, 1};
   Vec3 from = kThreeQuarter;
-  for (std::size_t i = 0; clip && i < 3; ++i) from[i] = std::copysign(from[i], clip->normal[i] < 0 ? -1.0 : 1.0);
+  for (std::size_t i = 0; clip && i < 3; ++i) {
+    if (clip->normal[i] != 0) from[i] = std::copysign(from[i], clip->normal[i]);
+  }
   const Axes axes = axes_of(from, camera.up);
   const double tan_y = std::tan(camera.fov * std::numbers::pi / 360), tan_x = tan_y * camera.viewport[0] / camera.viewport[1];
   double distance = 0;

@@ -10,8 +10,8 @@
 
 namespace intervale {
 
-// A camera that shows the whole box in 1280 x 960 pixels, in a three-quarter view from above; a cut from its open side.
-// The box is not a point.
+// A camera that shows the whole box in 1280 x 960 pixels, in a three-quarter view from above, z up; a cut from its open
+// side. The box is not a point.
 [[nodiscard]] Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip);
 
 // The scene is the world moved and scaled so that the box's corners lie on the unit sphere; floats are precise enough

@@ -93,7 +93,9 @@ Result<void> run(const ExtractCommand& options) {
     if (auto written = write_mesh(*options.output, mesh); !written) return written;
   }
   if (options.picture) {
-    if (auto drawn = write_picture(*options.picture, {mesh, description, shown->range}, options.lod.camera); !drawn) return drawn;
+    const auto drawn = write_picture(*options.picture, {mesh, description, shown->range}, options.lod.camera);
+    if (!drawn) return tl::unexpected(drawn.error());
+    if (!*drawn) fmt::print(stderr, "intervale: warning: nothing of the mesh is in the picture\n");
   }
   const double enclosed = volume_of(mesh);
   if (options.json) {

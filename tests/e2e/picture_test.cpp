@@ -91,9 +91,10 @@ Image drawn(const std::filesystem::path& file, const std::string& options) {
   const TempDir folder;
   const Finished done = extract(file, options, {"--image", folder / "x.png"});
   EXPECT_EQ(done.status, 0) << done.err;
-  EXPECT_EQ(done.err, "");
   EXPECT_THAT(done.out, HasSubstr("x.png"));
-  return read_png(folder / "x.png");
+  Image image = read_png(folder / "x.png");
+  EXPECT_EQ(done.err.empty(), share(image, Hue::background) < 1) << done.err;  // a warning
+  return image;
 }
 
 TEST(Pictures, OfABallIsBlueInTheMiddle) {
@@ -229,6 +230,16 @@ TEST(Pictures, OfNothingAreBackground) {
   ASSERT_EQ(built.status, 0) << built.err;
   const Image image = drawn(folder / "empty.ivm", "--clip 0 0 0 1 0 0 --edges");
   EXPECT_EQ(share(image, Hue::background), 1);
+}
+
+TEST(Pictures, ACameraThatSeesNothingIsToldAbout) {
+  const TempDir folder;
+  const std::string there = "--eye 16 16 99 --look-at 16 16 16 --viewport 64 64", away = "--eye 16 16 99 --look-at 16 16 999 --viewport 64 64";
+  const Finished seen = extract(ball(), there, {"--image", folder / "x.png"}), unseen = extract(ball(), away, {"--image", folder / "y.png"});
+  EXPECT_EQ(seen.status, 0) << seen.err;
+  EXPECT_EQ(seen.err, "");
+  EXPECT_EQ(unseen.status, 0) << unseen.err;
+  EXPECT_EQ(unseen.err, "intervale: warning: nothing of the mesh is in the picture\n");
 }
 
 TEST(Pictures, WhatCannotBeDrawnIsOneLine) {
