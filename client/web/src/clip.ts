@@ -4,7 +4,7 @@ import { element, input, onClick } from './dom';
 import { short } from './format';
 import type { Handles } from './handles';
 import type { Box, Plane, Vec3 } from './messages';
-import { clamped, handlePosition, mainAxis, normalTip, offsetRange, rotatedTowards, throughCenter } from './plane';
+import { clamped, facing, handlePosition, mainAxis, normalTip, offsetRange, rotatedTowards, throughCenter } from './plane';
 import type { ViewState } from './state';
 import type { Store } from './store';
 import { add, diagonal, dot, kAxes, rotated, scale, sub } from './vec';
@@ -27,8 +27,9 @@ export class ClipControls {
     input('clip-offset').addEventListener('input', () => {
       const t = input('clip-offset').valueAsNumber;
       this.change(({ normal }, box) => {
-        const [least, greatest] = offsetRange(box, normal);
-        return { normal, offset: least + t * (greatest - least) };
+        const sign = facing(normal);
+        const [least, greatest] = offsetRange(box, scale(normal, sign));
+        return { normal, offset: sign * (least + t * (greatest - least)) };
       });
     });
     this.addMoveHandle(handles);
@@ -69,9 +70,11 @@ export class ClipControls {
     input('clip').checked = clip !== null;
     element('clip-controls').hidden = clip === null;
     if (!clip || !frame) return;
-    const [least, greatest] = offsetRange(frame.box, clip.normal);
-    input('clip-offset').value = String((clip.offset - least) / (greatest - least || 1));
-    element('clip-offset-out').textContent = short(clip.offset);
+    const sign = facing(clip.normal);
+    const position = sign * clip.offset;
+    const [least, greatest] = offsetRange(frame.box, scale(clip.normal, sign));
+    input('clip-offset').value = String((position - least) / (greatest - least || 1));
+    element('clip-offset-out').textContent = short(position);
   }
 
   private addMoveHandle(handles: Handles): void {

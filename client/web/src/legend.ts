@@ -6,11 +6,11 @@ import type { ViewState } from './state';
 import type { Thickness } from './thickness';
 
 // unit: of length.
-export function showLegend(view: Readonly<ViewState>, { isAvailable, maximum }: Thickness, unit: string): void {
+export function showLegend(view: Readonly<ViewState>, { isAvailable, isKnown, maximum }: Thickness, unit: string): void {
   const showsThickness = view.thickness && isAvailable;
   element('legend').hidden = !showsThickness && !view.levels;
   if (showsThickness) {
-    const labels = ['0', short(maximum / 2), `${short(maximum)} or more`];
+    const labels = isKnown ? ['0', short(maximum / 2), `${short(maximum)} or more`] : ['0', '', ''];
     fill(`Thickness along the line of sight, ${unit}`, labels, kThicknessColors);
   } else if (view.levels) {
     fill('Level of detail', ['finest', '', 'coarsest'], kLevelColors);

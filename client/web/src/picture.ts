@@ -8,7 +8,7 @@ import { setStyles, shared, surfaceMaterials } from './materials';
 import type { Box, Cap, Vec3 } from './messages';
 import { Outlines } from './outlines';
 import { Pick } from './pick';
-import type { ViewState } from './state';
+import { kSurfaces, type ViewState } from './state';
 import { TetsView } from './tets';
 import { Thickness } from './thickness';
 import { Transparency } from './transparency';
@@ -16,6 +16,7 @@ import { Uploader } from './upload';
 import { along, corners, dot, length, sub, unit } from './vec';
 
 const kMaxPixelRatio = 2; // device pixels per CSS pixel
+const kAroundTets = 0.25; // the greatest opacity of surfaces around shrunken tetrahedra, which they would hide
 
 export class Picture {
   readonly renderer: WebGLRenderer;
@@ -64,6 +65,7 @@ export class Picture {
     shared.shift.value.set(...toDrawing(frame, [x, y, z]));
     shared.leastSpacing.value = frame.leastSpacing;
     shared.coarsestLevel.value = frame.coarsestLevel;
+    this.thickness.reset();
     this.surface.clear();
     this.setCap(frame, null);
     this.tets.discardPending();
@@ -77,7 +79,8 @@ export class Picture {
   }
 
   setStyles(view: ViewState): void {
-    setStyles(this.materials, view);
+    const seenThrough = kSurfaces.map((name) => [name, { ...view[name], opacity: Math.min(view[name].opacity, kAroundTets) }]);
+    setStyles(this.materials, view.tets ? { ...view, ...Object.fromEntries(seenThrough) } : view);
     shared.colorByLevel.value = view.levels ? 1 : 0;
     shared.shrink.value = view.shrink;
   }

@@ -31,6 +31,10 @@ export function rotatedTowards(box: Box, plane: Plane, tip: Vec3): Plane {
   return clamped(box, { normal, offset: dot(normal, handle) });
 }
 
+// 1 or -1: times the normal, a direction that points the way of the axis nearest to it. A plane's position is given along
+// that, so that it is the same for both of its normals, and on an axis the coordinate there.
+export const facing = (normal: Vec3): 1 | -1 => (dot(normal, mainAxis(normal).map(Math.abs) as Vec3) < 0 ? -1 : 1);
+
 // The signed unit axis nearest to v.
 export function mainAxis(v: Vec3): Vec3 {
   const i = [0, 1, 2].reduce((best, axis) => (Math.abs(v[axis]!) > Math.abs(v[best]!) ? axis : best), 0);

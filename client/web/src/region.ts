@@ -95,19 +95,20 @@ export class RegionControls {
   private addFields(): void {
     const label = (text: string) => create('span', {}, text);
     const grid = element('region-fields');
-    grid.append(label(''), ...kAxisNames.map(label));
-    for (const [end, name] of [['min', 'From'], ['max', 'To']] as const) {
-      this.fields[end] = kAxisNames.map((axisName, axis) => {
+    grid.append(label(''), label('From'), label('To'));
+    kAxisNames.forEach((axisName, axis) => {
+      grid.append(label(axisName));
+      for (const [end, name] of [['min', 'From'], ['max', 'To']] as const) {
         const field = create('input', { type: 'number', step: 'any', ariaLabel: `${name} ${axisName}` });
         field.addEventListener('change', () => {
           const to = field.valueAsNumber;
           if (Number.isFinite(to)) this.change((region, data) => faceMoved(region, data, axis, end, to));
           this.show();
         });
-        return field;
-      });
-      grid.append(label(name), ...this.fields[end]);
-    }
+        this.fields[end].push(field);
+        grid.append(field);
+      }
+    });
   }
 
   private wholeHandle(): Handle {

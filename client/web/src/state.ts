@@ -54,7 +54,7 @@ export function toHash(state: ViewState): string {
     put('up', write(state.pose.up));
     if (state.pose.fov !== kFov) put('fov', write([state.pose.fov]));
   }
-  if (state.range) put('range', state.range.map((x) => (Number.isFinite(x) ? write([x]) : x < 0 ? '-inf' : 'inf')).join(','));
+  if (state.range) put('range', state.range.map((x) => (Number.isFinite(x) ? String(x) : x < 0 ? '-inf' : 'inf')).join(',')); // exactly: values decide what is inside
   if (state.pixelError !== kDefaults.pixelError) put('px', write([state.pixelError]));
   if (state.maxTets !== null) put('tets', write([state.maxTets]));
   if (state.memory !== null) put('mb', write([state.memory]));

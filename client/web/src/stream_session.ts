@@ -36,6 +36,7 @@ export class StreamSession {
   private previewed: [number, number] | null = null; // to be shown once the page shows the last surface
   private pace = new PreviewPace();
   private isPreviewing = false; // since the last view
+  private range: [number, number] | null = null; // of the last view
 
   private progressTime = 0; // when it was last reported
   private progressTimer = 0;
@@ -63,11 +64,14 @@ export class StreamSession {
   // Connects with the first view.
   look(view: View): void {
     this.endPreview();
+    const isOtherRange = String(view.range) !== String(this.range);
+    this.range = view.range;
     const error = this.viewer.look(view);
     if (error) return this.fail(error);
     this.connection.start();
     this.send();
     this.isChanged = true; // another budget or another range shows other tetrahedra
+    if (isOtherRange && this.isOpen) this.sendSurface(); // without a pause
     this.reportProgress(true);
     this.scheduleSurface();
   }

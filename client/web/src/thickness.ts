@@ -24,6 +24,7 @@ export class Thickness {
   private maximumPass = fullScreenScene(compositeMaterial(kBlockMaximumFragment, this.uniforms));
   private maximumTarget = new WebGLRenderTarget(kBlocks, kBlocks, { type: FloatType, depthBuffer: false });
   private blocks = new Float32Array(4 * kBlocks * kBlocks);
+  isKnown = false; // the maximum, of what is shown
   private isReading = false;
   private hasMissedPicture = false; // one was drawn while the last was being read
 
@@ -35,6 +36,11 @@ export class Thickness {
       : this.isPrecise
         ? null
         : 'Thickness has low precision: this graphics card or driver blends only 16-bit floats (no EXT_float_blend).';
+  }
+
+  // Another data set: its maximum is not known.
+  reset(): void {
+    this.isKnown = false;
   }
 
   // drawLayers: draws all triangles of the solid with thickness materials.
@@ -52,10 +58,22 @@ export class Thickness {
     renderer.setClearColor(0x000000, 0);
     renderer.clear();
     drawLayers();
-    void this.updateMaximum(renderer, camera);
+    if (this.isKnown) void this.updateMaximum(renderer, camera);
+    else this.findMaximum(renderer, camera);
     renderer.setRenderTarget(null);
     this.uniforms.maximum.value = this.maximum;
     renderer.render(this.composite, camera);
+  }
+
+  // Waits for the graphics card: the first picture has its own colours, and not those of some other maximum.
+  private findMaximum(renderer: WebGLRenderer, camera: Camera): void {
+    renderer.setRenderTarget(this.maximumTarget);
+    renderer.render(this.maximumPass, camera);
+    renderer.readRenderTargetPixels(this.maximumTarget, 0, 0, kBlocks, kBlocks, this.blocks);
+    const greatest = this.greatest();
+    if (!(greatest > 0)) return; // nothing is shown yet
+    this.maximum = roundUp(greatest);
+    this.isKnown = true;
   }
 
   // Reads back the greatest thickness in the picture without blocking. The end of the colour map is a round number
@@ -76,9 +94,13 @@ export class Thickness {
     } finally {
       this.isReading = false;
     }
-    const greatest = this.blocks.reduce((most, x, i) => (i % 4 === 0 && x > most ? x : most), 0);
+    const greatest = this.greatest();
     const fits = !(greatest > 0) || (greatest <= this.maximum && greatest > this.maximum / 3);
     if (!fits) this.maximum = roundUp(greatest);
     if (!fits || this.hasMissedPicture) this.onMaximum();
+  }
+
+  private greatest(): number {
+    return this.blocks.reduce((most, x, i) => (i % 4 === 0 && x > most ? x : most), 0);
   }
 }

@@ -116,8 +116,14 @@ onPage('the clip plane shows a cap, and handles, keys, buttons and the slider mo
     await page.click(`#${id}`);
     await moved(id);
   }
+  await page.click('#clip-x');
   await page.fill('#clip-offset', '0.25');
   await moved('by the slider');
+  for (let k = 0; k < 2; ++k) {
+    assert.equal(await page.textContent('#clip-offset-out'), '−12', 'the coordinate, whichever way the plane faces');
+    assert.equal(Number(await page.inputValue('#clip-offset')), 0.25);
+    await page.click('#clip-flip');
+  }
   await settled(page);
   await changesPicture(page, () => page.click('#clip'));
   await page.waitForFunction(() => window.intervale.stats.capTriangles === 0);
@@ -139,11 +145,20 @@ onPage('handles and fields move the region and its faces', async (page) => {
   await page.getByLabel('From X').fill('-20');
   await page.keyboard.press('Tab');
   assert.equal((await region()).min[0], -20);
+  await page.evaluate(() => window.intervale.set({ region: { min: [-12.345678, -1.2345e-5, -20], max: [-1.2345, 12.345, 21] } }));
+  const cut = await page.$$eval('#region-fields input', (fields) => fields.filter((f) => f.scrollWidth > f.clientWidth).map((f) => f.value));
+  assert.deepEqual(cut, [], 'long numbers are seen whole');
 });
 
 onPage('shrunken tetrahedra replace the boundary surface in the region', async (page) => {
   await changesPicture(page, () => page.keyboard.press('s'), 0.002);
   await page.waitForFunction(() => window.intervale.stats.tets > 100);
+  await settled(page);
+  const shown = await pixels(page);
+  for (const name of ['alpha', 'beta', 'box']) await page.fill(`#${name}-opacity`, '0.25');
+  await settled(page);
+  assert.ok(difference(shown, await pixels(page)).share < 0.001, 'the surfaces around do not hide them');
+  for (const name of ['alpha', 'beta', 'box']) await page.fill(`#${name}-opacity`, '1');
   assert.match(await page.textContent('#tets-note'), /tetrahedra in the region/);
   await changesPicture(page, () => page.fill('#shrink', '0.4'), 0.002);
   await changesPicture(page, () => page.click('#tets'), 0.002);
@@ -151,9 +166,12 @@ onPage('shrunken tetrahedra replace the boundary surface in the region', async (
 });
 
 onPage('thickness has a legend in world units', async (page) => {
-  await changesPicture(page, () => page.keyboard.press('t'), 0.1);
-  assert.ok(await page.isVisible('#legend'));
-  await page.waitForFunction(() => Number.parseFloat(document.querySelector('#legend-high').textContent) > 20);
+  await page.keyboard.press('t');
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+  await page.waitForSelector('#legend:not([hidden])');
+  assert.ok(Number.parseFloat(await page.textContent('#legend-high')) > 20, 'with the first picture');
+  await changesPicture(page, () => page.click('#thickness'), 0.1);
+  await changesPicture(page, () => page.click('#thickness'), 0.1);
   await changesPicture(page, () => page.click('#thickness'), 0.1);
   assert.ok(!(await page.isVisible('#legend')));
 });

@@ -67,7 +67,7 @@ test('an invalid address gives the default view', () => {
 });
 
 test('a range is that of the data set, or one within it', () => {
-  for (const range of [[-Infinity, 3], [2, Infinity], [-Infinity, Infinity], [0, 0]]) {
+  for (const range of [[-Infinity, 3], [2, Infinity], [-Infinity, Infinity], [0, 0], [1 / 3, 1e-9 + 1 / 3], [-1e300, 5e-324]]) {
     assert.deepEqual(fromHash(toHash({ ...kDefaults, range })).range, range);
   }
   const every = { range: [-Infinity, Infinity], values: [-1, 5], hasEveryRange: true, hasRangesWithin: true };
@@ -180,6 +180,15 @@ test('a rotated plane touches the box and has a unit normal', () => {
     assert.ok(rotated.offset >= least - 1e-9 && rotated.offset <= most + 1e-9);
     assert.ok(Math.abs(vec.length(rotated.normal) - 1) < 1e-9);
   }
+});
+
+test('both normals of a plane give it one position, on an axis the coordinate there', () => {
+  for (let i = 0; i < 100; ++i) {
+    const normal = vec.unit(randomVec());
+    const offset = random(-9, 9);
+    assert.equal(plane.facing(normal) * offset, plane.facing(vec.scale(normal, -1)) * -offset);
+  }
+  for (const axis of vec.kAxes) assert.deepEqual([plane.facing(axis), plane.facing(vec.scale(axis, -1))], [1, -1]);
 });
 
 test('a region stays within the data, and min below max', () => {
