@@ -26,11 +26,11 @@ Result<GLuint> compiled(const Gl& gl, GLenum kind, const std::vector<const char*
   return fail(std::string("cannot draw a picture: this machine's OpenGL ES refuses a shader: ") + log.data());
 }
 
-Result<GLuint> linked(const Gl& gl, const char* vertex, const char* fragment) {
+Result<GLuint> linked(const Gl& gl, const char* vertex, const std::vector<const char*>& fragment) {
   const GLuint program = gl.CreateProgram();
   auto vertex_shader = compiled(gl, GL_VERTEX_SHADER, {vertex});
   if (!vertex_shader) return vertex_shader;
-  auto fragment_shader = compiled(gl, GL_FRAGMENT_SHADER, {kFragmentPreamble, fragment});
+  auto fragment_shader = compiled(gl, GL_FRAGMENT_SHADER, fragment);
   if (!fragment_shader) return fragment_shader;
   gl.AttachShader(program, *vertex_shader);
   gl.AttachShader(program, *fragment_shader);
@@ -113,7 +113,7 @@ Result<void> Canvas::begin(const Viewpoint& viewpoint, const std::optional<Palet
 
 Result<void> Canvas::draw_background() const {
   const Gl& gl = context_.gl();
-  const auto program = linked(gl, kBackgroundVertexShader, kBackgroundFragmentShader);
+  const auto program = linked(gl, kBackgroundVertexShader, {kFragmentPreamble, kBackgroundFragmentShader});
   if (!program) return tl::unexpected(program.error());
   GLuint no_attributes = 0;
   gl.GenVertexArrays(1, &no_attributes);
@@ -126,7 +126,7 @@ Result<void> Canvas::draw_background() const {
 
 Result<void> Canvas::prepare(const Viewpoint& viewpoint, const std::optional<Palette>& palette) const {
   const Gl& gl = context_.gl();
-  const auto program = linked(gl, kMeshVertexShader, kMeshFragmentShader);
+  const auto program = linked(gl, kMeshVertexShader, {kFragmentPreamble, palette ? kByValue : kBySurface, kMeshFragmentShader});
   if (!program) return tl::unexpected(program.error());
   gl.UseProgram(*program);
   const auto at = [&](const char* name) { return gl.GetUniformLocation(*program, name); };
@@ -135,7 +135,6 @@ Result<void> Canvas::prepare(const Viewpoint& viewpoint, const std::optional<Pal
   gl.Uniform3fv(at("eye"), 1, viewpoint.eye.data());
   gl.Uniform2fv(at("nearest_to_far"), 1, viewpoint.nearest_to_far.data());
   gl.Uniform1f(at("height"), GLfloat(size_[1]));
-  gl.Uniform1i(at("by_value"), palette ? 1 : 0);
   if (palette) use_palette(gl, *palette);
   describe_corners(gl);
   gl.Enable(GL_DEPTH_TEST);

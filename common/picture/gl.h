@@ -20,7 +20,7 @@ namespace intervale {
   F(GetProgramiv) F(GetShaderInfoLog) F(GetShaderiv) F(GetUniformLocation) F(LinkProgram) F(PolygonOffset) \
   F(ReadPixels) F(RenderbufferStorageMultisample) F(ShaderSource) F(Uniform1f) F(Uniform2fv) F(Uniform3fv) \
   F(UniformMatrix3fv) F(UniformMatrix4fv) F(UseProgram) F(VertexAttribIPointer) F(VertexAttribPointer) \
-  F(TexImage2D) F(TexParameteri) F(Uniform1i) F(Viewport)
+  F(TexImage2D) F(TexParameteri) F(Viewport)
 // clang-format on
 
 struct Gl {

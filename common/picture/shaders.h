@@ -12,6 +12,9 @@ void main() {
   gl_Position = vec4(corner, 0.0, 1.0);
 })";
 
+// Between the beginning of the mesh's fragment shader and the rest of it.
+inline constexpr char kByValue[] = "const bool by_value = true;\n", kBySurface[] = "const bool by_value = false;\n";
+
 // The beginning of both fragment shaders. Colours are mixed as linear light, and converted to sRGB at the end.
 inline constexpr char kFragmentPreamble[] = R"(#version 300 es
 precision highp float;
@@ -57,7 +60,6 @@ in vec3 v_to_eye;
 in vec3 v_sides;
 flat in uint v_part;
 in float v_value;
-uniform bool by_value;
 uniform sampler2D palette;
 uniform vec2 nearest_to_far;
 const vec3 parts[4] = vec3[4](vec3(0.040, 0.220, 0.540), vec3(0.860, 0.250, 0.030), vec3(0.820, 0.680, 0.400), vec3(0.860, 0.725, 0.450));
