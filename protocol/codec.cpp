@@ -48,7 +48,8 @@ Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
   const auto forget = message.forget.empty() ? 0 : out.CreateVector(encode_splits(message.forget));
   const RangeRequest& shown = message.shown;
   std::vector<fbs::Range> ranges;
-  if (shown.range) ranges.emplace_back(shown.range->alpha, shown.range->beta);
+  ranges.reserve(shown.ranges.size());
+  for (const Range& range : shown.ranges) ranges.emplace_back(range.alpha, range.beta);
   const auto in_order = ranges.empty() ? 0 : out.CreateVectorOfStructs(ranges);
   const auto refine = std::uint8_t(shown.refine ? 1 + int(*shown.refine) : 0);
   return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine);
@@ -125,10 +126,13 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
   if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
   View view{table.epoch(), lod, table.room(), {}, {}};
   if (const auto* ranges = table.ranges(); VectorLength(ranges) > 0) {
-    if (ranges->size() > kMaxRanges) return malformed("a view of " + std::to_string(ranges->size()) + " ranges, of which one can be shown");
-    const fbs::Range& range = *ranges->Get(0);
-    if (!(range.alpha() <= range.beta())) return malformed("a range's alpha is greater than its beta, or is no number");
-    view.shown.range = Range{range.alpha(), range.beta()};
+    if (ranges->size() > kMaxRanges)
+      return malformed("a view of " + std::to_string(ranges->size()) + " ranges, of which at most " + std::to_string(kMaxRanges) + " can be shown");
+    view.shown.ranges.reserve(ranges->size());
+    for (const fbs::Range* const range : *ranges) {
+      if (!(range->alpha() <= range->beta())) return malformed("a range's alpha is greater than its beta, or is no number");
+      view.shown.ranges.push_back({range->alpha(), range->beta()});
+    }
   }
   if (table.refine() > 1 + std::uint8_t(Refine::uniform)) return malformed("an unknown way to refine");
   if (table.refine() > 0) view.shown.refine = Refine(table.refine() - 1);

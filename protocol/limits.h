@@ -41,9 +41,6 @@ inline constexpr std::uint64_t kDefaultWindow = 256 << 10;
 // Most credit outstanding, which bounds the bytes in flight: enough for 1 Gbit/s at a round trip of 100 ms.
 inline constexpr std::uint64_t kMaxWindow = 16 << 20;
 
-// Most ranges in one View.
-inline constexpr std::size_t kMaxRanges = 1;
-
 // Longest name of a data set: that of a file name, since data sets are named after their files.
 inline constexpr std::size_t kMaxName = 255;
 

@@ -65,7 +65,7 @@ struct View {
   // Updates that the client forgets: at most kMaxHave; keys ascending; only keys and slots are sent. Both sides apply
   // the rule of Front::forget().
   std::vector<SlotGroup> forget = {};
-  // What is shown of the data set; both sides code the answers for it (common/codec/batch.h).
+  // What is shown of the data set, at most kMaxRanges ranges; both sides code the answers for it (common/codec/batch.h).
   RangeRequest shown = {};
   friend bool operator==(const View&, const View&) = default;
 };

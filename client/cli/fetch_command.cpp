@@ -6,16 +6,18 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/cli/commands.h"
 #include "client/net/fetch.h"
 #include "client/program/access_options.h"
 #include "common/mesh/io/mesh_writer.h"
-#include "common/mesh/mesh_digest.h"
+#include "common/mesh/join.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
+#include "common/program/mesh_figures.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
@@ -68,28 +70,45 @@ Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& op
   return fetch(url, options, events);
 }
 
-Result<void> report(const FetchCommand& options, const Fetched& fetched, const Mesh& mesh) {
+// The meshes of all ranges as one, and the figures of each if there are several.
+struct FetchedMesh {
+  Mesh mesh;
+  std::vector<MeshFigures> each;
+};
+
+FetchedMesh mesh_of(const StreamClient& client, bool has_digest) {
+  FetchedMesh all;
+  std::vector<Mesh> meshes = client.meshes();
+  for (std::size_t i = 0; i < meshes.size() && meshes.size() > 1; ++i) {
+    const Front& front = client.fronts()[i];
+    all.each.push_back(figures_of(meshes[i], front.shown_count(), has_digest, front.range()));
+  }
+  all.mesh = joined(std::move(meshes));
+  return all;
+}
+
+Result<void> report(const FetchCommand& options, const Fetched& fetched, const FetchedMesh& all) {
   const FetchStats& stats = fetched.stats;
-  const double volume = volume_of(mesh);
+  const MeshFigures figures = figures_of(all.mesh, fetched.client.updates_in_mesh(), options.digest);
   if (options.json) {
-    nlohmann::ordered_json json{{"updates", fetched.client.updates_in_mesh()},
-                                {"vertices", mesh.points.size()},
-                                {"tets", mesh.tets.size()},
-                                {"volume", volume},
+    nlohmann::ordered_json json{{"updates", figures.updates},
+                                {"vertices", figures.vertices},
+                                {"tets", figures.tets},
+                                {"volume", figures.volume},
                                 {"bytes_received", stats.session.bytes},
                                 {"messages", stats.session.messages},
                                 {"reconnects", stats.session.connections - 1},
                                 {"seconds_first_mesh", stats.seconds_first_mesh},
                                 {"seconds_applying", stats.session.seconds_applying},
                                 {"seconds", stats.seconds}};
-    if (options.digest) json["digest"] = mesh_digest(mesh);
+    if (figures.digest) json["digest"] = *figures.digest;
+    if (!all.each.empty()) json["ranges"] = to_json(all.each);
     return print_json(json);
   }
-  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}\n", printable(fetched.client.description().name),
-                                 fetched.client.updates_in_mesh(), mesh.points.size(), mesh.tets.size(), volume);
+  std::string text = printable(fetched.client.description().name) + ": " + to_text(figures) + "\n" + to_text(all.each);
   text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(stats.session.bytes),
                       stats.session.messages, 1000 * stats.seconds_first_mesh, stats.is_complete ? "all" : "budget reached", 1000 * stats.seconds);
-  if (options.digest) text += "digest " + mesh_digest(mesh) + "\n";
+  if (figures.digest) text += "digest " + *figures.digest + "\n";
   if (options.output) text += "wrote " + options.output->string() + "\n";
   if (options.picture) text += "drew " + options.picture->file.string() + "\n";
   return print(text);
@@ -105,24 +124,24 @@ Result<void> run(const FetchCommand& options) {
   if (options.picture) {
     if (auto possible = check_picture(*options.picture, options.fetch.lod.camera); !possible) return possible;
   }
-  const auto range = parse_range(options.range);
-  if (!range) return tl::unexpected(range.error());
+  const auto ranges = parse_ranges(options.range);
+  if (!ranges) return tl::unexpected(ranges.error());
   FetchOptions fetch = options.fetch;
-  fetch.shown = {*range, parse_refine(options.refine)};
+  fetch.shown = {*ranges, parse_refine(options.refine)};
   const auto fetched = fetch_with_progress(*url, fetch);
   if (!fetched) return tl::unexpected(fetched.error());
-  const Mesh mesh = fetched->client.mesh();
+  const FetchedMesh all = mesh_of(fetched->client, options.digest);
   if (options.output) {
-    if (auto written = write_mesh(*options.output, mesh); !written) return written;
+    if (auto written = write_mesh(*options.output, all.mesh); !written) return written;
   }
   if (options.picture) {
     const Description& description = fetched->client.description();
-    const Range shown = resolve(description, fetch.shown).range;
-    const auto drawn = write_picture(*options.picture, {mesh, description, shown}, options.fetch.lod.camera);
+    const Range shown = range_around(resolve(description, fetch.shown));
+    const auto drawn = write_picture(*options.picture, {all.mesh, description, shown}, options.fetch.lod.camera);
     if (!drawn) return tl::unexpected(drawn.error());
     if (!*drawn) fmt::print(stderr, "intervale-client: warning: nothing of the mesh is in the picture\n");
   }
-  return report(options, *fetched, mesh);
+  return report(options, *fetched, all);
 }
 
 }  // namespace
@@ -132,7 +151,7 @@ void add_fetch_command(Program& program) {
   CLI::App& command = program.add_command("fetch", "Receive a mesh, and write or draw it", [options] { return run(*options); });
   command.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
   command.add_option("-o,--output", options->output, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")->type_name("MESH");
-  add_range_option(command, options->range, kShownRangeHelp);
+  add_ranges_option(command, options->range, kShownRangeHelp);
   add_refine_option(command, options->refine, kShownRefineHelp);
   add_lod_options(command, options->fetch.lod);
   add_picture_options(command, options->picture);

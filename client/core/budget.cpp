@@ -52,15 +52,15 @@ void for_each_parent(Front::Handle handle, const Visit& visit) {
 
 class Balance {
  public:
-  Balance(Front& front, std::uint64_t max_tets, const Importance& importance)
-      : front_(front), max_tets_(max_tets), groups_(by_importance(front.splits(), importance)), end_(groups_.size()) {
+  Balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance)
+      : fronts_(fronts), max_tets_(max_tets), groups_(by_importance(fronts[0].splits(), importance)), end_(groups_.size()) {
     for (std::size_t g = 0; g < end_; ++g) place_.emplace(groups_[g].key, g);
   }
 
   void run() {
     fit();
     show_what_fits();
-    if (front_.tet_count() <= max_tets_) return;
+    if (tet_count() <= max_tets_) return;
     // Hiding can add tetrahedra: a coarse patch may have more than the fine ones that it replaces.
     wanted_.clear();
     end_ = groups_.size();
@@ -68,51 +68,70 @@ class Balance {
   }
 
  private:
+  // A split, in the mesh of one of the fronts.
+  struct Shown {
+    std::size_t front = 0;
+    Front::Handle handle;
+    friend bool operator==(const Shown&, const Shown&) = default;
+  };
+
+  [[nodiscard]] std::uint64_t tet_count() const {
+    std::uint64_t tets = 0;
+    for (const Front& front : fronts_) tets += front.tet_count();
+    return tets;
+  }
+
   void fit() {
-    while (front_.tet_count() > max_tets_ && hide_least(HUGE_VAL)) {
+    while (tet_count() > max_tets_ && hide_least(HUGE_VAL)) {
     }
   }
 
   void show_what_fits() {
-    for (std::size_t g = 0; g < end_ && front_.withheld_count() > 0; ++g) {
-      const std::uint64_t hidden = counting_slots(groups_[g].key) & ~front_.shown_slots(groups_[g].key);
-      for (const Slot slot : set_bits<Slot>(hidden)) {
-        wanted_.clear();
-        if (!show({groups_[g].key, slot}, groups_[g].importance / kHysteresis)) return;
+    for (std::size_t g = 0; g < end_; ++g) {
+      bool any = false;
+      for (std::size_t f = 0; f < fronts_.size(); ++f) {
+        if (fronts_[f].withheld_count() == 0) continue;
+        any = true;
+        const std::uint64_t hidden = counting_slots(fronts_[f], groups_[g].key) & ~fronts_[f].shown_slots(groups_[g].key);
+        for (const Slot slot : set_bits<Slot>(hidden)) {
+          wanted_.clear();
+          if (!show({f, {groups_[g].key, slot}}, groups_[g].importance / kHysteresis)) return;
+        }
       }
+      if (!any) return;
     }
   }
 
-  // The splits of a supercube that count for the range. The others follow them.
-  [[nodiscard]] std::uint64_t counting_slots(SupercubeKey key) const {
-    const FrontState::Block* const block = front_.state().find_block(scale_of_key(key), position_of_key(key));
+  // The splits of a supercube that count for a front's range. The others follow them.
+  [[nodiscard]] static std::uint64_t counting_slots(const Front& front, SupercubeKey key) {
+    const FrontState::Block* const block = front.state().find_block(scale_of_key(key), position_of_key(key));
     return block == nullptr ? 0 : block->counts;
   }
 
   // Shows a split that counts, and its ancestors. Splits less important than `worth` that are not among these make
   // room. False if there is not enough room.
-  bool show(Front::Handle handle, double worth) {
-    want(handle);
-    while (!front_.show(handle, max_tets_)) {
+  bool show(const Shown& split, double worth) {
+    want(split);
+    while (!fronts_[split.front].show(split.handle, tets_left(fronts_, split.front, max_tets_))) {
       if (!hide_least(worth)) return false;
     }
     return true;
   }
 
   // Of the ancestors, those that are shown keep theirs shown.
-  void want(Front::Handle handle) {
-    if (std::find(wanted_.begin(), wanted_.end(), handle) != wanted_.end()) return;
-    wanted_.push_back(handle);
-    if (front_.is_hidden(handle)) for_each_parent(handle, [this](Front::Handle parent) { want(parent); });
+  void want(const Shown& split) {
+    if (std::find(wanted_.begin(), wanted_.end(), split) != wanted_.end()) return;
+    wanted_.push_back(split);
+    if (fronts_[split.front].is_hidden(split.handle)) for_each_parent(split.handle, [&](Front::Handle parent) { want({split.front, parent}); });
   }
 
   // Hides a split if none of its children is shown; then its parents, if they are less important and only this child
   // kept them shown.
-  bool hide(Front::Handle handle) {
-    if (std::find(wanted_.begin(), wanted_.end(), handle) != wanted_.end() || !front_.hide(handle)) return false;
-    for_each_parent(handle, [&](Front::Handle parent) {
+  bool hide(const Shown& split) {
+    if (std::find(wanted_.begin(), wanted_.end(), split) != wanted_.end() || !fronts_[split.front].hide(split.handle)) return false;
+    for_each_parent(split.handle, [&](Front::Handle parent) {
       const auto place = place_.find(parent.supercube);
-      if (place != place_.end() && place->second >= end_) hide(parent);
+      if (place != place_.end() && place->second >= end_) hide({split.front, parent});
     });
     return true;
   }
@@ -123,21 +142,23 @@ class Balance {
     for (; end_ > 0 && groups_[end_ - 1].importance < worth; --end_) {
       const SupercubeKey key = groups_[end_ - 1].key;
       bool hidden = false;
-      for (int cls = 2; cls >= 0; --cls) {
-        for (const Slot slot : set_bits<Slot>(front_.shown_slots(key) & kSlotsOfClass[cls])) hidden = hide({key, slot}) || hidden;
+      for (std::size_t f = 0; f < fronts_.size(); ++f) {
+        for (int cls = 2; cls >= 0; --cls) {
+          for (const Slot slot : set_bits<Slot>(fronts_[f].shown_slots(key) & kSlotsOfClass[cls])) hidden = hide({f, {key, slot}}) || hidden;
+        }
       }
       if (hidden) return true;
     }
     return false;
   }
 
-  Front& front_;
+  std::span<Front> fronts_;
   std::uint64_t max_tets_;
   std::vector<Group> groups_;                                   // the most important first
   boost::unordered_flat_map<SupercubeKey, std::size_t> place_;  // of a supercube in groups_
   std::size_t end_ = 0;                                         // everything from here on that can be hidden is hidden
   // The split to be shown, and those of its ancestors that are hidden or first above these: not to be hidden.
-  std::vector<Front::Handle> wanted_;
+  std::vector<Shown> wanted_;
 };
 
 }  // namespace
@@ -148,7 +169,7 @@ Importance size_on_screen(const Camera& camera, const Grid& grid) {
   };
 }
 
-void balance(Front& front, std::uint64_t max_tets, const Importance& importance) { Balance(front, max_tets, importance).run(); }
+void balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance) { Balance(fronts, max_tets, importance).run(); }
 
 std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, std::size_t max_supercubes, const Importance& importance) {
   const std::vector<SlotGroup> splits = front.splits();

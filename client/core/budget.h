@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "common/front/front.h"
@@ -22,10 +23,11 @@ using Importance = std::function<double(SupercubeKey)>;
 // check_lod accepts.
 [[nodiscard]] Importance size_on_screen(const Camera& camera, const Grid& grid);
 
-// Hides and shows splits of a front until its mesh has at most max_tets tetrahedra and, as far as that allows, the most
-// important splits with their ancestors. Each mesh on the way has at most max_tets tetrahedra, or fewer than the mesh
-// before it. O(n log n) in the front's supercubes.
-void balance(Front& front, std::uint64_t max_tets, const Importance& importance);
+// Hides and shows splits of fronts of one data set, which have the same splits, until their meshes have at most max_tets
+// tetrahedra together and, as far as that allows, the most important splits with their ancestors. On the way they have
+// at most max_tets tetrahedra, or fewer than before. O(n log n) in a front's supercubes.
+void balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance);
+inline void balance(Front& front, std::uint64_t max_tets, const Importance& importance) { balance(std::span(&front, 1), max_tets, importance); }
 
 // The least important splits of a front: `count` of them, or those of max_supercubes supercubes if these have fewer.
 // All children of a split in the result are in it too, so Front::forget undoes every one. Keys ascending.

@@ -8,17 +8,19 @@ namespace intervale {
 
 Result<StreamClient> StreamClient::start(Description description, const Budget& budget, const RangeRequest& request) {
   if (auto ok = check_description(description); !ok) return tl::unexpected(ok.error());
-  const ShownRange shown = resolve(description, request);
+  const ShownRanges shown = resolve(description, request);
   if (auto held = check_held(description, shown); !held) return tl::unexpected(held.error());
-  Front front(description.grid, description.format, description.corners, shown.range, shown.refine);
-  return StreamClient(std::move(description), std::move(front), budget);
+  std::vector<Front> fronts;
+  fronts.reserve(kMaxRanges);
+  for (const ShownRange& one : shown) fronts.emplace_back(description.grid, description.format, description.corners, one.range, one.refine);
+  return StreamClient(std::move(description), std::move(fronts), budget);
 }
 
 Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch, const RangeRequest& shown) {
   keep_to_budget(epoch);
   forget(epoch);
   const std::uint64_t before = updates();
-  const auto applied = apply_batch(front_, description_, resolve(description_, shown), payload, budget_.max_tets);
+  const auto applied = apply_batch(fronts_, description_, resolve(description_, shown), payload, budget_.max_tets);
   if (!applied) return tl::unexpected(applied.error());
   if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than the room that the view names");
   rebalance();
@@ -26,12 +28,34 @@ Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uin
 }
 
 Result<void> StreamClient::show(const RangeRequest& request) {
-  const ShownRange shown = resolve(description_, request);
-  if (shown == ShownRange{front_.range(), front_.refine()}) return {};
+  const ShownRanges shown = resolve(description_, request);
+  const auto is_shown = [](const Front& front, const ShownRange& one) { return one == ShownRange{front.range(), front.refine()}; };
+  if (std::equal(fronts_.begin(), fronts_.end(), shown.begin(), shown.end(), is_shown)) return {};
   if (auto held = check_held(description_, shown); !held) return held;
-  front_.set_range(shown.range, shown.refine, budget_.max_tets);
+  while (fronts_.size() > shown.size()) fronts_.pop_back();
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    if (i == fronts_.size()) {
+      fronts_.push_back(fronts_[0]);
+    } else if (is_shown(fronts_[i], shown[i]) && fronts_[i].withheld_count() == 0) {
+      continue;
+    }
+    fronts_[i].set_range(shown[i].range, shown[i].refine, tets_left(fronts_, i, budget_.max_tets));
+  }
   rebalance();
   return {};
+}
+
+std::vector<Mesh> StreamClient::meshes() const {
+  std::vector<Mesh> meshes;
+  meshes.reserve(fronts_.size());
+  for (const Front& front : fronts_) meshes.push_back(front.mesh());
+  return meshes;
+}
+
+std::uint64_t StreamClient::sum(std::uint64_t (Front::*count)() const) const {
+  std::uint64_t sum = 0;
+  for (const Front& front : fronts_) sum += (front.*count)();
+  return sum;
 }
 
 void StreamClient::look(const Camera& camera) {
@@ -58,14 +82,14 @@ void StreamClient::keep_to_budget(std::uint64_t epoch) {
 }
 
 void StreamClient::rebalance() {
-  if (importance_ && over_budget()) balance(front_, budget_.max_tets, importance_);
+  if (importance_ && over_budget()) balance(fronts_, budget_.max_tets, importance_);
 }
 
 std::vector<SlotGroup> StreamClient::give_up(std::uint64_t epoch, std::size_t max_supercubes) {
   const std::uint64_t room = less_room_ ? less_room_->max_updates : budget_.max_updates;
   const std::uint64_t most = room - std::max<std::uint64_t>(1, room / 4);
   if (!importance_ || !forget_.empty() || updates() <= most) return {};
-  forget_ = least_important(front_, updates() - most, max_supercubes, importance_);
+  forget_ = least_important(fronts_[0], updates() - most, max_supercubes, importance_);
   forget_epoch_ = epoch;
   return forget_;
 }
@@ -77,7 +101,8 @@ void StreamClient::arrived(std::uint64_t epoch) {
 
 bool StreamClient::forget(std::uint64_t epoch) {
   if (forget_.empty() || epoch < forget_epoch_) return false;
-  front_.forget(std::exchange(forget_, {}));
+  for (Front& front : fronts_) front.forget(forget_);
+  forget_.clear();
   return true;
 }
 

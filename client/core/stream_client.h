@@ -1,4 +1,4 @@
-// A mesh that grows with the batches of a stream. No I/O; the client never has the field.
+// Meshes that grow with the batches of a stream, one for each range that is shown. No I/O; the client never has the field.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 
 #include "client/core/budget.h"
 #include "common/front/front.h"
+#include "common/mesh/join.h"
 #include "common/mesh/mesh.h"
 #include "common/patch/description.h"
 #include "common/util/result.h"
@@ -17,26 +18,26 @@ namespace intervale {
 
 // The most that a client keeps.
 struct Budget {
-  std::uint64_t max_tets = ~std::uint64_t(0);  // in its mesh
-  // In the mesh or hidden, some 15 bytes each; the server learns it as View::room.
+  std::uint64_t max_tets = ~std::uint64_t(0);  // in its mesh, or in all of them
+  // In the mesh or hidden, some 15 bytes each for each range that is shown; the server learns it as View::room.
   std::uint64_t max_updates = ~std::uint64_t(0);
   friend bool operator==(const Budget&, const Budget&) = default;
 };
 
 class StreamClient {
  public:
-  // Checks everything in a description from outside, and that the data set has what is to be shown (misuse). The mesh is
-  // then the patch of the root.
+  // Checks everything in a description from outside, and that the data set has what is to be shown (misuse). Each mesh
+  // is then the patch of the root.
   static Result<StreamClient> start(Description description, const Budget& budget = {}, const RangeRequest& shown = {});
 
-  // Applies one batch: the payload of a Batch, the epoch of its view, and what that view shows. The mesh is conforming after each successful
-  // call. A payload that is damaged, or does not fit the batches before it, is an error; this object must not be used
-  // again then. Updates that the mesh has no room for within max_tets are kept, but hidden: those that came last or,
-  // once look() was called, the least important ones.
+  // Applies one batch: the payload of a Batch, the epoch of its view, and what that view shows. The meshes are conforming
+  // after each successful call. A payload that is damaged, or does not fit the batches before it, is an error; this
+  // object must not be used again then. Updates that the meshes have no room for within max_tets are kept, but hidden:
+  // those that came last or, once look() was called, the least important ones.
   Result<void> apply(std::span<const std::uint8_t> payload, std::uint64_t epoch = 0, const RangeRequest& shown = {});
 
-  // What the mesh shows from now on, of the updates that are here. Fails, and changes nothing, if the data set has not
-  // all of it. Linear in the updates.
+  // What the meshes show from now on, of the updates that are here: the i-th is that of the i-th range. Fails, and
+  // changes nothing, if the data set has not all of it. Linear in the updates for each mesh that shows another range.
   Result<void> show(const RangeRequest& shown);
 
   // Where the mesh is seen from now on. camera: one that check_lod accepts.
@@ -54,31 +55,35 @@ class StreamClient {
   // A Done or a Batch of this epoch has arrived. apply() does the same.
   void arrived(std::uint64_t epoch);
 
-  // Some updates have no room in the mesh, or the patch of the root alone exceeds max_tets.
-  [[nodiscard]] bool over_budget() const { return updates_left_out() > 0 || front_.tet_count() > budget_.max_tets; }
-  [[nodiscard]] std::uint64_t updates() const { return front_.split_count(); }  // in the mesh or hidden
-  // Of those, the ones that the mesh is made with: those that count for the range, as far as there is room, and their
-  // ancestors.
-  [[nodiscard]] std::uint64_t updates_in_mesh() const { return front_.shown_count(); }
-  [[nodiscard]] std::uint64_t updates_left_out() const { return front_.withheld_count(); }  // for want of room
-  [[nodiscard]] std::uint64_t tet_count() const { return front_.tet_count(); }              // O(1)
+  // Some updates have no room in a mesh, or the patches of the root alone exceed max_tets.
+  [[nodiscard]] bool over_budget() const { return updates_left_out() > 0 || tet_count() > budget_.max_tets; }
+  [[nodiscard]] std::uint64_t updates() const { return fronts_[0].split_count(); }  // in the meshes or hidden
+  // Of those, the ones that a mesh is made with: those that count for its range, as far as there is room, and their
+  // ancestors. Here and in the next two, the sum of all meshes.
+  [[nodiscard]] std::uint64_t updates_in_mesh() const { return sum(&Front::shown_count); }
+  [[nodiscard]] std::uint64_t updates_left_out() const { return sum(&Front::withheld_count); }  // for want of room
+  [[nodiscard]] std::uint64_t tet_count() const { return sum(&Front::tet_count); }              // O(1)
   [[nodiscard]] const Description& description() const { return description_; }
   // The updates that another session resumes with; see Front::splits. None of them is given up any more.
   [[nodiscard]] std::vector<SlotGroup> resume() {
     forget_.clear();
-    return front_.splits();
+    return fronts_[0].splits();
   }
-  [[nodiscard]] const Front& front() const { return front_; }
-  [[nodiscard]] Mesh mesh() const { return front_.mesh(); }  // linear in the size of the mesh
+  // One for each range that is shown, in its order. Each stays where it is as long as there are as many ranges.
+  [[nodiscard]] const std::vector<Front>& fronts() const { return fronts_; }
+  [[nodiscard]] const Front& front() const { return fronts_[0]; }
+  [[nodiscard]] std::vector<Mesh> meshes() const;               // likewise; linear in their size
+  [[nodiscard]] Mesh mesh() const { return joined(meshes()); }  // all of them as one
 
  private:
-  StreamClient(Description description, Front front, const Budget& budget)
-      : description_(std::move(description)), front_(std::move(front)), budget_(budget) {}
+  StreamClient(Description description, std::vector<Front> fronts, const Budget& budget)
+      : description_(std::move(description)), fronts_(std::move(fronts)), budget_(budget) {}
+  [[nodiscard]] std::uint64_t sum(std::uint64_t (Front::*count)() const) const;
   void rebalance();
   bool forget(std::uint64_t epoch);
   void keep_to_budget(std::uint64_t epoch);
   Description description_;
-  Front front_;
+  std::vector<Front> fronts_;  // with the same splits; room for kMaxRanges, so that none moves
   Budget budget_;
   struct LessRoom {
     std::uint64_t epoch = 0, max_updates = 0;

@@ -37,7 +37,7 @@ struct LoadOptions {
   // Keep a mesh for each client, and compare them at the end: see verify_meshes.
   bool verify = false;
   Budget budget;       // of each of these meshes
-  RangeRequest shown;  // of the data set; needed if it has every range
+  RangeRequest shown;  // of the data set; ranges are needed if it has every range
   // How long a client tries to reach a lost server again; off: the client has failed. Requires verify: without a mesh
   // there is nothing to resume with.
   std::optional<LoadClock::duration> reconnect;

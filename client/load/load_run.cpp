@@ -103,7 +103,7 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   if (auto allowed = allow_files(options.clients); !allowed) return tl::unexpected(allowed.error());
   const auto description = describe(url);
   if (!description) return tl::unexpected(description.error());
-  if (description->has_every_range && !options.shown.range) return misuse("'" + url.name + "' has every range: say which with --range LO HI");
+  if (description->has_every_range && options.shown.ranges.empty()) return misuse("'" + url.name + "' has every range: say which with --range LO HI");
   if (auto held = check_held(*description, resolve(*description, options.shown)); !held) return tl::unexpected(held.error());
   std::optional<StreamClient> reference;
   if (options.verify) {
@@ -132,7 +132,7 @@ Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));
   report.busiest_thread = all.cpu_seconds / wall.count();
   if (reference) {
-    const auto [compared, differing] = verify_meshes(reference->front(), meshes, options.seed);
+    const auto [compared, differing] = verify_meshes(reference->fronts(), meshes, options.seed);
     report.verified = compared;
     report.differing = differing;
   }

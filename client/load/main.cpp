@@ -41,10 +41,10 @@ Result<void> run(const LoadCommand& options) {
   const auto url = parse_url(options.url, options.access);
   if (!url) return tl::unexpected(url.error());
   if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
-  const auto range = parse_range(options.range);
-  if (!range) return tl::unexpected(range.error());
+  const auto ranges = parse_ranges(options.range);
+  if (!ranges) return tl::unexpected(ranges.error());
   LoadOptions load = options.load;
-  load.shown = {*range, parse_refine(options.refine)};
+  load.shown = {*ranges, parse_refine(options.refine)};
   const auto report = run_load(*url, load);
   if (!report) return tl::unexpected(report.error());
   if (auto printed = options.json ? print_json(to_json(*report)) : print(to_text(*report)); !printed) return printed;
@@ -114,7 +114,7 @@ void add_options(CLI::App& app, LoadCommand& options) {
   app.add_option("URL", options.url, "ws://host:port/NAME, or wss://")->required();
   within(app.add_option("--clients", load.clients, "Number of clients that run at once")->required(), 1, 1e6, "N");
   add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent; answers may arrive up to 2 s later")->required();
-  add_range_option(app, options.range, kShownRangeHelp)->group("Views");
+  add_ranges_option(app, options.range, kShownRangeHelp)->group("Views");
   add_refine_option(app, options.refine, kShownRefineHelp)->group("Views");
   add_view_options(app, load);
   add_connection_options(app, load);

@@ -40,8 +40,13 @@ Canonical::Canonical(const Mesh& mesh) {
   std::ranges::sort(tets);
 }
 
-bool has_mesh_of(Front reference, const StreamClient& client) {
-  return reference.coarsen_to(client.front()) && are_equal(reference.mesh(), client.mesh());
+bool has_mesh_of(Front reference, const Front& front) { return reference.coarsen_to(front) && are_equal(reference.mesh(), front.mesh()); }
+
+// whole: whether the meshes themselves are compared.
+bool is_right(std::span<const Front> reference, std::span<const Front> fronts, bool whole) {
+  return std::ranges::equal(reference, fronts, [whole](const Front& expected, const Front& front) {
+    return front.is_part_of(expected) && (!whole || has_mesh_of(expected, front));
+  });
 }
 
 }  // namespace
@@ -51,7 +56,7 @@ bool are_equal(const Mesh& a, const Mesh& b) {
   return Canonical(a) == Canonical(b);
 }
 
-Verified verify_meshes(const Front& reference, std::span<const std::optional<StreamClient>> clients, std::uint64_t seed) {
+Verified verify_meshes(std::span<const Front> reference, std::span<const std::optional<StreamClient>> clients, std::uint64_t seed) {
   std::vector<const StreamClient*> meshes;
   for (const auto& client : clients) {
     if (client) meshes.push_back(&*client);
@@ -60,7 +65,7 @@ Verified verify_meshes(const Front& reference, std::span<const std::optional<Str
   Verified verified;
   for (const StreamClient* client : meshes) {
     const bool whole = verified.compared < kWhole;
-    const bool equal = client->front().is_part_of(reference) && (!whole || has_mesh_of(reference, *client));
+    const bool equal = is_right(reference, client->fronts(), whole);
     ++verified.compared;
     if (!equal) ++verified.differing;
   }

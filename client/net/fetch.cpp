@@ -57,7 +57,7 @@ class Fetch {
     const bool had_mesh = session_.mesh() != nullptr;
     const auto event = connection_->receive(session_);
     if (!event) return tl::unexpected(event.error());
-    if (event->kind == ClientSession::Event::Kind::opened && session_.description()->has_every_range && !options_.shown.range) {
+    if (event->kind == ClientSession::Event::Kind::opened && session_.description()->has_every_range && options_.shown.ranges.empty()) {
       return misuse("'" + url_.name + "' has every range: say which with --range LO HI");
     }
     if (event->is_new_mesh && had_mesh) notice("the data at " + url_.authority() + " changed meanwhile; starting again");

@@ -16,7 +16,7 @@ namespace intervale {
 
 struct FetchOptions {
   Lod lod;
-  RangeRequest shown;  // of the data set; needed if it has every range
+  RangeRequest shown;  // of the data set; ranges are needed if it has every range
   // The most bytes of messages that are received; only the first one, the description, may exceed it. No updates
   // arrive for less than that message and protocol::kMinCredit.
   std::optional<std::uint64_t> max_bytes;

@@ -12,6 +12,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "common/codec/range_coder.h"
 #include "common/codec/value_coder.h"
@@ -54,6 +55,29 @@ inline constexpr int kNearness = 8;
   for (int octave = 1; octave < kNearness - 1; ++octave) near += int(8 * distance >= spread << octave);
   return low != high || (refine == Refine::uniform && low == std::size_t(Side::inside)) ? 0 : near;
 }
+
+// The ranges that flags are coded for: those of the view that a batch answers. A diamond is as near to them as to the
+// nearest, in whatever order they are and however often each is there.
+class FlagRanges {
+ public:
+  FlagRanges(const ValueFormat& format, const ShownRanges& shown) {
+    ranges_.reserve(shown.size());
+    for (const ShownRange& one : shown) ranges_.push_back({KeySides(format, one.range), one.refine});
+  }
+  // span: of the keys at the diamond's vertices.
+  [[nodiscard]] int nearness(const KeySpan& span) const {
+    int nearest = kNearness;
+    for (const One& one : ranges_) nearest = std::min(nearest, intervale::nearness(one.sides, one.refine, span));
+    return nearest;
+  }
+
+ private:
+  struct One {
+    KeySides sides;
+    Refine refine;
+  };
+  std::vector<One> ranges_;
+};
 
 // The flag whether a diamond that can be split is split. Its model depends on the diamond's class, on nearness(), and on
 // the flags of the last three such diamonds.

@@ -10,10 +10,16 @@
 
 namespace intervale {
 
-// Applies a batch from outside to a front, and returns how many updates it had. description: of the data set; shown:
-// what the view was that the batch answers. The mesh gets at most max_tets tetrahedra (Front::split). Fails if the
-// bytes are not a batch; the front must then not be used any more.
-[[nodiscard]] Result<std::uint64_t> apply_batch(Front& front, const Description& description, const ShownRange& shown,
+// Applies a batch from outside to fronts of one data set, which have the same splits, one front at least; returns how
+// many updates it had. description: of the data set; shown: what the view was that the batch answers, whatever ranges
+// the fronts have. The meshes get at most max_tets tetrahedra together (Front::split). Fails if the bytes are not a
+// batch; the fronts must then not be used any more.
+[[nodiscard]] Result<std::uint64_t> apply_batch(std::span<Front> fronts, const Description& description, const ShownRanges& shown,
                                                 std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0));
+// The same for one front and one range.
+[[nodiscard]] inline Result<std::uint64_t> apply_batch(Front& front, const Description& description, const ShownRange& shown,
+                                                       std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0)) {
+  return apply_batch(std::span(&front, 1), description, ShownRanges{shown}, bytes, max_tets);
+}
 
 }  // namespace intervale

@@ -18,7 +18,9 @@
 // only on which splits are shown.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -133,5 +135,13 @@ class Front {
  private:
   FrontState state_;
 };
+
+// How many tetrahedra the mesh of fronts[i] may have so that the meshes of all have no more than max_tets.
+[[nodiscard]] inline std::uint64_t tets_left(std::span<const Front> fronts, std::size_t i, std::uint64_t max_tets) {
+  for (std::size_t other = 0; other < fronts.size(); ++other) {
+    if (other != i) max_tets -= std::min(max_tets, fronts[other].tet_count());
+  }
+  return max_tets;
+}
 
 }  // namespace intervale

@@ -22,8 +22,8 @@ struct Candidate {
 
 class BatchEncoder {
  public:
-  BatchEncoder(const IntervalVolume& volume, const ShownRange& shown, const SplitSet& split, std::span<const SlotGroup> groups)
-      : volume_(volume), shown_(shown), sides_(volume.description().format, shown.range), groups_(groups) {
+  BatchEncoder(const IntervalVolume& volume, const ShownRanges& shown, const SplitSet& split, std::span<const SlotGroup> groups)
+      : volume_(volume), ranges_(volume.description().format, shown), groups_(groups) {
     const SupercubeSet& set = volume.set();
     SplitLattice lattice(volume, split);
     ready_.reserve(groups.size());
@@ -59,7 +59,7 @@ class BatchEncoder {
     VertexKeys around;
     for (const Slot slot : set_bits<Slot>(ready_.back() & kSlotsOfClass[Class])) {
       const KeySpan span = lattice.gather<Class>(slot, around);
-      c->near = std::uint8_t(nearness(sides_, shown_.refine, span));
+      c->near = std::uint8_t(ranges_.nearness(span));
       if ((g.slots >> slot & 1) != 0) {
         ++updates_;
         c->key = volume_.key(first + count_below(occupancy, slot));
@@ -95,8 +95,7 @@ class BatchEncoder {
   }
 
   const IntervalVolume& volume_;
-  const ShownRange& shown_;
-  KeySides sides_;
+  FlagRanges ranges_;
   std::span<const SlotGroup> groups_;
   std::vector<std::uint64_t> ready_;   // by group: the slots of its candidates
   std::vector<std::size_t> first_;     // by group: the number of its first candidate
@@ -106,7 +105,7 @@ class BatchEncoder {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const ShownRange& shown, const SplitSet& split,
+std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const ShownRanges& shown, const SplitSet& split,
                                        std::span<const SlotGroup> groups) {
   const std::vector<std::uint8_t> diamonds = BatchEncoder(volume, shown, split, groups).code();
   std::vector<std::uint8_t> out;

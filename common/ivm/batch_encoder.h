@@ -14,7 +14,7 @@ namespace intervale {
 // The batch of these groups: keys strictly ascending, slots not 0; at most kBatchUpdatesMost updates. shown: what the
 // client looks at. split: what it has split once the batch is applied, closed under parents; the groups' updates are in
 // it.
-[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const ShownRange& shown, const SplitSet& split,
+[[nodiscard]] std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const ShownRanges& shown, const SplitSet& split,
                                                      std::span<const SlotGroup> groups);
 
 }  // namespace intervale

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "common/front/front.h"
 #include "common/ivm/interval_volume.h"
@@ -16,9 +17,12 @@ struct Extraction {
   std::uint64_t updates = 0;  // shown
 };
 
-// The mesh of a level of detail within its budgets: most important updates first, never more than max_tets tetrahedra
-// or max_updates updates. Fails if check_lod fails, and on a volume whose updates contradict each other (validate()
-// says which).
+// The mesh of a level of detail within its budgets, for each of these ranges: most important updates first, never more
+// than max_tets tetrahedra together or max_updates updates. relevant: to these ranges. Fails if check_lod fails, and on
+// a volume whose updates contradict each other (validate() says which).
+[[nodiscard]] Result<std::vector<Extraction>> extract(const IntervalVolume& volume, const RelevantUpdates& relevant, const ShownRanges& shown,
+                                                      const Lod& lod, const ParallelFor& parallel = serial);
+// The same, of one range.
 [[nodiscard]] Result<Extraction> extract(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod,
                                          const ParallelFor& parallel = serial);
 // The same, for the range of the data set.

@@ -14,7 +14,7 @@ IntervalVolume::IntervalVolume(Parts parts, std::shared_ptr<const ValueBounds> b
       keys_(std::move(parts.keys)),
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
-      relevant_(description_.grid, set_, {steps_, error_steps_}, description_.whole(), {}, std::move(parts.error_to_distance)),
+      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, {}, std::move(parts.error_to_distance)),
       bounds_(std::move(bounds)),
       statistics_(std::move(parts.statistics)) {}
 

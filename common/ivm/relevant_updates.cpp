@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/ivm/interval_volume.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -22,6 +23,20 @@ ErrorToDistance ErrorToDistance::at_least(double ratio, double unit, bool is_far
   const auto code = [&](int steps, int one) { return std::ceil(steps * std::log2(ratio / unit) - 1e-9) + one; };
   if (is_far) return ErrorToDistance(std::uint8_t(std::clamp(code(kFarSteps, kFarOne), double(kFirstFar), double(kNoBoundFar))));
   return ErrorToDistance(std::uint8_t(std::clamp(code(kNearSteps, kNearOne), 1.0, double(kNoBound))));
+}
+
+ErrorToDistance ErrorToDistance::farther(ErrorToDistance a, ErrorToDistance b, int scale) {
+  if (a.code_ > b.code_) std::swap(a, b);  // codes of far ones are greater than those of all others
+  if (a.code_ == 0 || a.is_far() == b.is_far()) return b;
+  constexpr int kSteps = kNearSteps / kFarSteps;
+  static_assert(kNearSteps % kFarSteps == 0 && kNearOne % kSteps == 0);
+  // One of them in the steps of the other: of the one with the higher bound.
+  if (kMaxFarDeviation >= float(1 << scale)) {
+    const int far = a.code_ == kNoBound ? kNoBoundFar : kFarOne + (a.code_ + kSteps - 1) / kSteps - kNearOne / kSteps;
+    return ErrorToDistance(std::uint8_t(std::clamp<int>(far, b.code_, kNoBoundFar)));
+  }
+  const int near = b.code_ == kNoBoundFar ? kNoBound : kNearOne + kSteps * (b.code_ - kFarOne);
+  return ErrorToDistance(std::uint8_t(std::clamp<int>(near, a.code_, kNoBound)));
 }
 
 bool ErrorToDistance::is_far() const { return code_ >= kFirstFar; }
@@ -45,9 +60,9 @@ double diamond_width(const Grid& grid) {
   return 2 * longest;
 }
 
-RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, const ShownRange& shown,
+RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown,
                                  std::vector<std::uint64_t> slots, std::vector<ErrorToDistance> error_to_distance)
-    : shown_(shown),
+    : shown_(std::move(shown)),
       slots_(std::move(slots)),
       error_to_distance_(std::move(error_to_distance)),
       supercube_step_(set.supercubes()),
@@ -78,6 +93,25 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
 std::size_t RelevantUpdates::memory_bytes() const {
   return slots_.size() * sizeof(std::uint64_t) + error_to_distance_.size() + supercube_step_.size() + brick_step_.size() +
          brick_object_error_.size() * sizeof(float) + error_.size() * sizeof(float);
+}
+
+RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each) {
+  const SupercubeSet& set = volume.set();
+  ShownRanges shown;
+  shown.reserve(each.size());
+  for (const auto& one : each) shown.insert(shown.end(), one->shown().begin(), one->shown().end());
+  std::vector<std::uint64_t> slots(set.supercubes());
+  std::vector<ErrorToDistance> to_distance(set.supercubes());
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+      for (const auto& one : each) {
+        slots[s] |= one->slots(s, set.occupancy()[s]);
+        to_distance[s] = ErrorToDistance::farther(to_distance[s], one->error_to_distance()[s], scale_of_key(key));
+      }
+    });
+  }
+  return {volume.description().grid, set, {volume.steps(), volume.error_steps()}, distinct(std::move(shown)), std::move(slots),
+          std::move(to_distance)};
 }
 
 }  // namespace intervale

@@ -1,13 +1,14 @@
 // Which updates of an interval volume are relevant to a range, and how far the surfaces of that range can move.
 //
 // Weiss and De Floriani 2008, section 6. A data set of one range holds only what its range needs: all of it is relevant.
-// Of a data set that was refined uniformly, or that has every range, any range within needs a part. Immutable, shared by
-// all sessions that look at that range.
+// Of a data set that was refined uniformly, or that has every range, any range within needs a part. Several ranges need
+// what each of them needs. Immutable, shared by all sessions that look at those ranges.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,8 @@
 #include "common/patch/description.h"
 
 namespace intervale {
+
+class IntervalVolume;
 
 // Converts errors to distances: how far the surfaces can still move, in world units, for each unit of field error. One
 // byte a supercube, a logarithmic code rounded up; 0: nothing moves. Most distances are also bounded by the width of
@@ -27,6 +30,8 @@ class ErrorToDistance {
   explicit ErrorToDistance(std::uint8_t code) : code_(code) {}
   // The least code for `ratio`, at least 0 or infinite, in units of `unit`.
   static ErrorToDistance at_least(double ratio, double unit, bool is_far = false);
+  // The least code by which errors of diamonds of this scale move surfaces as far as by each of both, with their bounds.
+  static ErrorToDistance farther(ErrorToDistance a, ErrorToDistance b, int scale);
   [[nodiscard]] std::uint8_t code() const { return code_; }
   [[nodiscard]] bool is_far() const;
   [[nodiscard]] float ratio(float unit) const;  // the largest float where no bound is known
@@ -52,11 +57,11 @@ struct UpdateErrors {
 class RelevantUpdates {
  public:
   // Of all updates of the set, if slots is empty. slots: by supercube, closed under parents; error_to_distance: by
-  // supercube. shown: what they are relevant to.
-  RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, const ShownRange& shown, std::vector<std::uint64_t> slots,
+  // supercube. shown: what they are relevant to, one range at least.
+  RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown, std::vector<std::uint64_t> slots,
                   std::vector<ErrorToDistance> error_to_distance);
 
-  [[nodiscard]] const ShownRange& shown() const { return shown_; }
+  [[nodiscard]] const ShownRanges& shown() const { return shown_; }
   // Of a supercube with this occupancy.
   [[nodiscard]] std::uint64_t slots(SupercubeIndex supercube, std::uint64_t occupancy) const {
     return slots_.empty() ? occupancy : slots_[supercube];
@@ -78,7 +83,7 @@ class RelevantUpdates {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  ShownRange shown_;
+  ShownRanges shown_;
   std::vector<std::uint64_t> slots_;                // by supercube; empty: all
   std::vector<ErrorToDistance> error_to_distance_;  // by supercube
   std::vector<std::uint8_t> supercube_step_;        // by supercube
@@ -88,5 +93,9 @@ class RelevantUpdates {
   std::array<float, 256> factor_;                   // by code of an ErrorToDistance
   float reach_ = 0;                                 // the largest object error for h = 1: half a diamond's width
 };
+
+// What several ranges need: an update is relevant if it is to any of them, and the surfaces around it can move as far as
+// those of the range that can move farthest. each: of this volume, one at least. O(updates).
+[[nodiscard]] RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each);
 
 }  // namespace intervale

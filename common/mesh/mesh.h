@@ -45,13 +45,15 @@ struct DefaultInit : std::allocator<T> {
 template <class T>
 using MeshArray = std::vector<T, DefaultInit<T>>;
 
-// Points in world coordinates, each used by a tetrahedron and given once; tetrahedra as four point indices, positively
-// oriented: (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).
+// Points in world coordinates, each used by a tetrahedron and given once (once for each range that it is of); tetrahedra as four point indices,
+// positively oriented: (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).
 struct Mesh {
   MeshArray<std::array<double, 3>> points;
   MeshArray<Surface> surface;  // one for each point
   MeshArray<double> value;     // of the field, one for each point; or none, where it is not known
   MeshArray<std::array<std::uint32_t, 4>> tets;
+  // Of a mesh of several ranges, which of them each tetrahedron is of: 0, 1, ... (join.h); none for one range.
+  MeshArray<std::uint8_t> part = {};
 };
 
 // The sum of the volumes of the tetrahedra, in world units cubed; compensated, so that their order changes it by less

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <tuple>
 
 namespace intervale {
 
@@ -25,10 +26,18 @@ Result<void> check_grid(const Grid& grid) {
   return {};
 }
 
-ShownRange resolve(const Description& d, const RangeRequest& request) {
+ShownRange resolve(const Description& d, const std::optional<Range>& range, const std::optional<Refine>& refine) {
   ShownRange shown = d.whole();
-  if (request.range && (d.has_every_range || *request.range != d.range)) shown = {*request.range, Refine::boundary};
-  if (request.refine) shown.refine = *request.refine;
+  if (range && (d.has_every_range || *range != d.range)) shown = {*range, Refine::boundary};
+  if (refine) shown.refine = *refine;
+  return shown;
+}
+
+ShownRanges resolve(const Description& d, const RangeRequest& request) {
+  if (request.ranges.empty()) return {resolve(d, std::nullopt, request.refine)};
+  ShownRanges shown;
+  shown.reserve(request.ranges.size());
+  for (const Range& range : request.ranges) shown.push_back(resolve(d, range, request.refine));
   return shown;
 }
 
@@ -44,6 +53,28 @@ Result<void> check_held(const Description& d, const ShownRange& shown) {
     return misuse("the data set '" + d.name + "' was built for the range " + has.str() + " alone: build it without --range for every range");
   }
   return misuse("the data set '" + d.name + "' was refined at its surfaces only: build it without --range, or with --refine uniform");
+}
+
+Result<void> check_held(const Description& d, const ShownRanges& shown) {
+  if (shown.size() > kMaxRanges)
+    return misuse("at most " + std::to_string(kMaxRanges) + " ranges can be shown at once, not " + std::to_string(shown.size()));
+  for (const ShownRange& one : shown) {
+    if (auto held = check_held(d, one); !held) return held;
+  }
+  return {};
+}
+
+Range range_around(const ShownRanges& shown) {
+  Range all = shown.front().range;
+  for (const ShownRange& one : shown) all = {std::min(all.alpha, one.range.alpha), std::max(all.beta, one.range.beta)};
+  return all;
+}
+
+ShownRanges distinct(ShownRanges shown) {
+  const auto bounds = [](const ShownRange& s) { return std::make_tuple(s.range.alpha, s.range.beta, s.refine); };
+  std::sort(shown.begin(), shown.end(), [&bounds](const ShownRange& a, const ShownRange& b) { return bounds(a) < bounds(b); });
+  shown.erase(std::unique(shown.begin(), shown.end()), shown.end());
+  return shown;
 }
 
 Result<void> check_description(const Description& d) {

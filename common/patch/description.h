@@ -2,9 +2,11 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
@@ -31,9 +33,13 @@ struct ShownRange {
   friend bool operator==(const ShownRange&, const ShownRange&) = default;
 };
 
+// Several ranges may be shown at once, a mesh for each: no more than this.
+inline constexpr std::size_t kMaxRanges = 4;
+using ShownRanges = std::vector<ShownRange>;
+
 // What somebody asks to be shown of a data set; what is not said follows from the data set (resolve()).
 struct RangeRequest {
-  std::optional<Range> range;
+  std::vector<Range> ranges;  // none: that of the data set
   std::optional<Refine> refine;
   friend bool operator==(const RangeRequest&, const RangeRequest&) = default;
 };
@@ -72,11 +78,21 @@ struct Description {
 
 // What a request means: without a range, that of the data set. Another range than that, or one of every range, is refined
 // at its surfaces if the request does not say how.
-[[nodiscard]] ShownRange resolve(const Description& description, const RangeRequest& request);
+[[nodiscard]] ShownRange resolve(const Description& description, const std::optional<Range>& range, const std::optional<Refine>& refine);
+// The same for each range of a request, in its order; at least one.
+[[nodiscard]] ShownRanges resolve(const Description& description, const RangeRequest& request);
 
 // Whether a data set has all that a range needs: its own range, or if it was refined uniformly any range within it.
 // Otherwise misuse, with what the data set has.
 [[nodiscard]] Result<void> check_held(const Description& description, const ShownRange& shown);
+// The same for each of them; more than kMaxRanges are misuse, too.
+[[nodiscard]] Result<void> check_held(const Description& description, const ShownRanges& shown);
+
+// The least range that has all of them in it; one at least.
+[[nodiscard]] Range range_around(const ShownRanges& shown);
+
+// In an order that does not depend on theirs, and each once.
+[[nodiscard]] ShownRanges distinct(ShownRanges shown);
 
 // Checks a grid from outside: sides within bounds; an affine of finite numbers that is not singular, which is one whose
 // determinant is above 1e-12 of the product of its columns' lengths; corners that a double holds.

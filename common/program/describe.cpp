@@ -13,6 +13,8 @@ nlohmann::ordered_json number(double value) {
 
 }  // namespace
 
+nlohmann::ordered_json to_json(const Range& range) { return nlohmann::ordered_json::array({number(range.alpha), number(range.beta)}); }
+
 void add_grid(nlohmann::ordered_json& json, const Grid& grid, const Labels& labels) {
   json["dims"] = grid.dims;
   json["spacing"] = grid.affine.spacing();
@@ -36,7 +38,7 @@ nlohmann::ordered_json to_json(const Description& description) {
   json["max_error"] = number(description.max_error);
   json["updates"] = description.updates;
   if (has_one) {
-    json["range"] = nlohmann::ordered_json::array({number(description.range.alpha), number(description.range.beta)});
+    json["range"] = to_json(description.range);
     json["refine"] = description.refine == Refine::uniform ? "uniform" : "boundary";
     json["coefficients"] = description.coefficients;
     json["full"] = {{"vertices", full.vertices}, {"tets", full.tets}, {"indexed_bytes", full.indexed_bytes()}};

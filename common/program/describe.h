@@ -13,6 +13,9 @@ namespace intervale {
 // such numbers.
 [[nodiscard]] nlohmann::ordered_json to_json(const Description& description);
 
+// The ends of a range, as above.
+[[nodiscard]] nlohmann::ordered_json to_json(const Range& range);
+
 // Adds dims, spacing (lengths of the affine's columns), origin (its last column), affine (12 numbers, row by row) and
 // the labels unit, field and field_unit.
 void add_grid(nlohmann::ordered_json& json, const Grid& grid, const Labels& labels);

@@ -54,8 +54,8 @@ class StreamPlan {
   // The most updates that the client holds.
   void set_room(std::uint64_t updates) { room_ = updates; }
 
-  // Replaces the range that is looked at: updates that are not relevant to it are not sent, nor any twice. relevant: of
-  // this volume. Before the set_lod() of the same view. O(supercubes).
+  // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice. relevant:
+  // of this volume. Before the set_lod() of the same view. O(supercubes).
   void set_relevant(std::shared_ptr<const RelevantUpdates> relevant);
 
   // Replaces the level of detail; check_lod(lod) must hold. O(bricks); with max_updates O(updates).

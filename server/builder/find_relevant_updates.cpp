@@ -102,7 +102,15 @@ std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_p
   std::vector<std::uint64_t> slots = relevant_slots(*volume, shown, on_all_cores);
   std::vector<ErrorToDistance> to_distance =
       has_distances ? distances(*volume, shown.range, slots) : std::vector<ErrorToDistance>(volume->set().supercubes());
-  return std::make_shared<const RelevantUpdates>(volume->description().grid, volume->set(), errors, shown, std::move(slots), std::move(to_distance));
+  return std::make_shared<const RelevantUpdates>(volume->description().grid, volume->set(), errors, ShownRanges{shown}, std::move(slots),
+                                                 std::move(to_distance));
+}
+
+std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,
+                                                             bool has_distances) {
+  std::vector<std::shared_ptr<const RelevantUpdates>> each;
+  for (const ShownRange& one : distinct(shown)) each.push_back(find_relevant_updates(volume, one, has_distances));
+  return each.size() == 1 ? each.front() : std::make_shared<const RelevantUpdates>(united(*volume, each));
 }
 
 }  // namespace intervale

@@ -11,5 +11,8 @@ namespace intervale {
 // 0 otherwise. Uses all cores that oneTBB may; takes some 8 bytes a sample meanwhile.
 [[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume,
                                                                            const ShownRange& shown, bool has_distances);
+// The same for several ranges, one at least.
+[[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume,
+                                                                           const ShownRanges& shown, bool has_distances);
 
 }  // namespace intervale

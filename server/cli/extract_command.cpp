@@ -10,14 +10,16 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "common/ivm/extraction.h"
 #include "common/ivm/load_volume.h"
 #include "common/mesh/io/mesh_writer.h"
-#include "common/mesh/mesh_digest.h"
+#include "common/mesh/join.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
 #include "common/program/lod_options.h"
+#include "common/program/mesh_figures.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
@@ -43,11 +45,11 @@ struct ExtractCommand {
 using Clock = std::chrono::steady_clock;
 
 // What is to be shown of a data set.
-Result<ShownRange> shown_of(const ExtractCommand& options, const Description& d) {
-  const auto range = parse_range(options.range);
-  if (!range) return tl::unexpected(range.error());
-  if (d.has_every_range && !*range) return misuse("'" + options.file + "' has every range: say which with --range LO HI");
-  const ShownRange shown = resolve(d, {*range, parse_refine(options.refine)});
+Result<ShownRanges> shown_of(const ExtractCommand& options, const Description& d) {
+  const auto ranges = parse_ranges(options.range);
+  if (!ranges) return tl::unexpected(ranges.error());
+  if (d.has_every_range && ranges->empty()) return misuse("'" + options.file + "' has every range: say which with --range LO HI");
+  ShownRanges shown = resolve(d, {*ranges, parse_refine(options.refine)});
   if (auto held = check_held(d, shown); !held) return tl::unexpected(held.error());
   return shown;
 }
@@ -65,8 +67,49 @@ ParallelFor with_progress(Progress& progress) {
   };
 }
 
+// The meshes of all ranges as one, and the figures of each if there are several.
+struct Extracted {
+  Mesh mesh;
+  std::uint64_t updates = 0;
+  std::vector<MeshFigures> each;
+};
+
+Result<Extracted> extract_ranges(const ExtractCommand& options, const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown) {
+  const auto relevant = find_relevant_updates(volume, shown, options.lod.camera.has_value());
+  Progress progress("extracting " + volume->description().name);
+  const ParallelFor parallel = with_progress(progress);
+  const auto fronts = extract(*volume, *relevant, shown, options.lod, parallel);
+  if (!fronts) return tl::unexpected(fronts.error());
+  Extracted all;
+  std::vector<Mesh> meshes;
+  meshes.reserve(fronts->size());
+  for (const Extraction& one : *fronts) {
+    meshes.push_back(one.front.mesh(parallel));
+    all.updates += one.updates;
+    if (shown.size() > 1) all.each.push_back(figures_of(meshes.back(), one.updates, options.digest, one.front.range()));
+  }
+  all.mesh = joined(std::move(meshes));
+  return all;
+}
+
+Result<void> report(const ExtractCommand& options, const std::string& name, const Extracted& extracted, double seconds) {
+  const MeshFigures figures = figures_of(extracted.mesh, extracted.updates, options.digest);
+  if (options.json) {
+    nlohmann::ordered_json json{
+        {"updates", figures.updates}, {"vertices", figures.vertices}, {"tets", figures.tets}, {"volume", figures.volume}, {"seconds", seconds}};
+    if (figures.digest) json["digest"] = *figures.digest;
+    if (!extracted.each.empty()) json["ranges"] = to_json(extracted.each);
+    return print_json(json);
+  }
+  std::string text = fmt::format("{}: {}, extracted in {:.3f} s\n", printable(name), to_text(figures), seconds) + to_text(extracted.each);
+  if (figures.digest) text += "digest " + *figures.digest + "\n";
+  if (options.output) text += "wrote " + options.output->string() + "\n";
+  if (options.picture) text += "drew " + options.picture->file.string() + "\n";
+  return print(text);
+}
+
 Result<void> run(const ExtractCommand& options) {
-  if (const auto range = parse_range(options.range); !range) return tl::unexpected(range.error());
+  if (const auto ranges = parse_ranges(options.range); !ranges) return tl::unexpected(ranges.error());
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
@@ -81,35 +124,18 @@ Result<void> run(const ExtractCommand& options) {
   const auto shown = shown_of(options, description);
   if (!shown) return tl::unexpected(shown.error());
   const auto start = Clock::now();
-  const auto relevant = find_relevant_updates(*volume, *shown, options.lod.camera.has_value());
-  std::optional<Progress> progress(std::in_place, "extracting " + description.name);
-  const ParallelFor parallel = with_progress(*progress);
-  const auto extracted = extract(**volume, *relevant, options.lod, parallel);
+  const auto extracted = extract_ranges(options, *volume, *shown);
   if (!extracted) return tl::unexpected(extracted.error());
-  const Mesh mesh = extracted->front.mesh(parallel);
-  progress.reset();  // erases its line
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (options.output) {
-    if (auto written = write_mesh(*options.output, mesh); !written) return written;
+    if (auto written = write_mesh(*options.output, extracted->mesh); !written) return written;
   }
   if (options.picture) {
-    const auto drawn = write_picture(*options.picture, {mesh, description, shown->range}, options.lod.camera);
+    const auto drawn = write_picture(*options.picture, {extracted->mesh, description, range_around(*shown)}, options.lod.camera);
     if (!drawn) return tl::unexpected(drawn.error());
     if (!*drawn) fmt::print(stderr, "intervale: warning: nothing of the mesh is in the picture\n");
   }
-  const double enclosed = volume_of(mesh);
-  if (options.json) {
-    nlohmann::ordered_json json{
-        {"updates", extracted->updates}, {"vertices", mesh.points.size()}, {"tets", mesh.tets.size()}, {"volume", enclosed}, {"seconds", seconds}};
-    if (options.digest) json["digest"] = mesh_digest(mesh);
-    return print_json(json);
-  }
-  std::string text = fmt::format("{}: {} updates, {} vertices, {} tetrahedra, volume {:.6g}, extracted in {:.3f} s\n", printable(description.name),
-                                 extracted->updates, mesh.points.size(), mesh.tets.size(), enclosed, seconds);
-  if (options.digest) text += "digest " + mesh_digest(mesh) + "\n";
-  if (options.output) text += "wrote " + options.output->string() + "\n";
-  if (options.picture) text += "drew " + options.picture->file.string() + "\n";
-  return print(text);
+  return report(options, description.name, *extracted, seconds);
 }
 
 }  // namespace
@@ -120,7 +146,7 @@ void add_extract_command(Program& program) {
   command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
   command.add_option("-o,--output", options->output, "Mesh to write: .vtu (tetrahedra), .vtp, .ply, .stl, .obj or .glb (boundary triangles)")
       ->type_name("MESH");
-  add_range_option(command, options->range, kShownRangeHelp);
+  add_ranges_option(command, options->range, kShownRangeHelp);
   add_refine_option(command, options->refine, kShownRefineHelp);
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);

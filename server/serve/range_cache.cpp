@@ -3,11 +3,20 @@
 #include <algorithm>
 #include <exception>
 #include <utility>
+#include <vector>
 
 namespace intervale {
 
-RangeCache::Relevant RangeCache::get(const Volume& volume, const ShownRange& shown) {
-  if (shown == volume->description().whole()) return {volume, &volume->relevant()};
+RangeCache::Relevant RangeCache::compute(const Volume& volume, const ShownRanges& shown) {
+  if (shown.size() == 1) return find_(volume, shown.front());
+  std::vector<Relevant> each;
+  each.reserve(shown.size());
+  for (const ShownRange& one : shown) each.push_back(get(volume, {one}));
+  return std::make_shared<const RelevantUpdates>(united(*volume, each));
+}
+
+RangeCache::Relevant RangeCache::get(const Volume& volume, const ShownRanges& shown) {
+  if (shown.size() == 1 && shown.front() == volume->description().whole()) return {volume, &volume->relevant()};
   std::promise<Relevant> promise;
   std::unique_lock lock(mutex_);
   const auto known =
@@ -21,7 +30,7 @@ RangeCache::Relevant RangeCache::get(const Volume& volume, const ShownRange& sho
   const auto entry = entries_.insert(entries_.begin(), Entry{volume, shown, promise.get_future().share()});
   lock.unlock();
   try {
-    Relevant relevant = find_(volume, shown);
+    Relevant relevant = compute(volume, shown);
     promise.set_value(relevant);
     lock.lock();
     entry->bytes = relevant->memory_bytes();

@@ -33,7 +33,7 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   if (!volume_) return Fault{CloseCode::no_such_dataset, "no such data set; see /api/datasets"};
   dataset_ = open.dataset;
   plan_.emplace(volume_);
-  planned_ = volume_->description().whole();
+  planned_ = {volume_->description().whole()};
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
 }
@@ -51,13 +51,13 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (!opened()) return Fault{CloseCode::out_of_order, "View before Open"};
   if (view_ != ViewState::none && view.epoch <= epoch_)
     return Fault{CloseCode::out_of_order, "the epoch of a View must be greater than the last one"};
-  const ShownRange shown = resolve(volume_->description(), view.shown);
+  ShownRanges shown = distinct(resolve(volume_->description(), view.shown));
   if (auto held = check_held(volume_->description(), shown); !held) return Fault{CloseCode::no_such_range, held.error().message};
   if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
   plan_->set_room(view.room.value_or(UINT64_MAX));
   epoch_ = view.epoch;
   new_lod_ = view.lod;
-  shown_ = shown;
+  shown_ = std::move(shown);
   view_ = ViewState::unanswered;
   target_ = kFirstPayload;
   return {};

@@ -30,7 +30,7 @@ class SessionState {
 
   // The next message to send. nullopt: none now; call again if has_work(). max_payload bounds a batch's payload. With
   // has_work() a call takes about a millisecond for each 16 KiB of max_payload, and in addition the first call for a view
-  // with max_updates O(updates of the data set), and for a new range the time of RangeCache::get().
+  // with max_updates O(updates of the data set), and for new ranges the time of RangeCache::get().
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
   // There may be a batch to select and encode.
@@ -61,8 +61,8 @@ class SessionState {
   std::string dataset_;
   std::optional<StreamPlan> plan_;
   std::optional<Lod> new_lod_;  // the last view, until the plan has it
-  ShownRange shown_;            // of the last view
-  ShownRange planned_;          // that the plan has
+  ShownRanges shown_;           // of the last view, as distinct() gives them
+  ShownRanges planned_;         // that the plan has
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding
   std::uint64_t last_grant_ = 0;

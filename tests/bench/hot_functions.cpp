@@ -132,7 +132,7 @@ void encode_one_batch(benchmark::State& state) {
       groups.push_back({b, s, key, set.occupancy()[s]});
     });
   }
-  for (auto _ : state) benchmark::DoNotOptimize(encode_batch(*f.sigma, f.sigma->description().whole(), f.all, groups));
+  for (auto _ : state) benchmark::DoNotOptimize(encode_batch(*f.sigma, {f.sigma->description().whole()}, f.all, groups));
   count_items(state, updates);
 }
 BENCHMARK(encode_one_batch)->Unit(benchmark::kMillisecond);

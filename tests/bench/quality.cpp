@@ -110,7 +110,7 @@ std::size_t bytes_of(const IntervalVolume& volume, const SplitSet& updates) {
   std::vector<SlotGroup> groups;
   std::uint64_t count = 0;
   const auto flush = [&] {
-    if (!groups.empty()) bytes += encode_batch(volume, volume.description().whole(), sent, groups).size();
+    if (!groups.empty()) bytes += encode_batch(volume, {volume.description().whole()}, sent, groups).size();
     groups.clear();
     count = 0;
   };
@@ -190,7 +190,7 @@ Curve follow_list(const Sigma& sigma, const Picture& picture, const std::vector<
       some.insert(order[at]);
       sent.insert(order[at]);
     }
-    return encode_batch(*sigma, sigma->description().whole(), sent, some.groups(set));
+    return encode_batch(*sigma, {sigma->description().whole()}, sent, some.groups(set));
   };
   return follow(*sigma, picture, next, at_least ? BytesSoFar([&] { return double(bytes_of(*sigma, sent)); }) : BytesSoFar());
 }

@@ -139,7 +139,7 @@ TEST_P(ExactValues, MeshesAreThoseOfTheSamplesInBothScopesAndThroughStreams) {
     ASSERT_TRUE(extracted);
     EXPECT_EQ(mesh_digest(extracted->front.mesh()), digest);
     ViewRequest view;
-    view.shown = {range, refine};
+    view.shown = {{range}, refine};
     ASSERT_TRUE(session.look(view));
     server.run();
     EXPECT_EQ(mesh_digest(session.mesh()->mesh()), digest);

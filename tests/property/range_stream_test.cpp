@@ -35,12 +35,18 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
     return std::make_shared<const IntervalVolume>(*FieldHierarchy(samples, {testing::random_range(field, random), Refine::uniform}).compact());
   }
 
-  // Within the data set's.
+  // Within the data set's, one to four of them.
   [[nodiscard]] RangeRequest random_request() {
     const Range& whole = volume->description().range;
-    Range range = testing::random_range(field, random);
-    range = {std::clamp(range.alpha, whole.alpha, whole.beta), std::clamp(range.beta, whole.alpha, whole.beta)};
-    return {range, random() % 3 == 0 ? Refine::uniform : Refine::boundary};
+    RangeRequest request;
+    request.refine = random() % 3 == 0 ? Refine::uniform : Refine::boundary;
+    const std::size_t count = random() % 2 == 0 ? 1 : 1 + random() % kMaxRanges;
+    while (request.ranges.size() < count) {
+      const Range range = testing::random_range(field, random);
+      request.ranges.push_back({std::clamp(range.alpha, whole.alpha, whole.beta), std::clamp(range.beta, whole.alpha, whole.beta)});
+      if (request.ranges.size() < count && random() % 6 == 0) request.ranges.push_back(request.ranges.front());
+    }
+    return request;
   }
 
   [[nodiscard]] ViewRequest random_view() {
@@ -55,12 +61,27 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
     return view;
   }
 
-  void expect_whole(const ClientSession& session, const RangeRequest& request) const {
-    const ShownRange shown = resolve(volume->description(), request);
-    const auto expected = extract(*volume, *find_relevant_updates(volume, shown, false), {});
-    ASSERT_TRUE(expected);
-    EXPECT_EQ(mesh_digest(session.mesh()->mesh()), mesh_digest(expected->front.mesh()));
-    EXPECT_EQ(session.mesh()->updates_in_mesh(), expected->updates);
+  // The mesh of each range is that of a fresh client that asks for this range alone. At an error above 0 it is if the
+  // client holds no more than its view wants.
+  void expect_each(const ClientSession& session, const ViewRequest& view) const {
+    const ShownRanges shown = resolve(volume->description(), view.shown);
+    ASSERT_EQ(session.mesh()->fronts().size(), shown.size());
+    std::uint64_t updates = 0;
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      const auto expected = extract(*volume, *find_relevant_updates(volume, shown[i], false), view.lod);
+      ASSERT_TRUE(expected);
+      EXPECT_EQ(mesh_digest(session.mesh()->fronts()[i].mesh()), mesh_digest(expected->front.mesh())) << "range " << i << " of " << shown.size();
+      updates += expected->updates;
+    }
+    EXPECT_EQ(session.mesh()->updates_in_mesh(), updates);
+  }
+
+  void expect_valid(const ClientSession& session) {
+    for (const Front& front : session.mesh()->fronts()) {
+      ASSERT_EQ(front.validate().value_or(""), "");
+      if (random() % 4 != 0) continue;  // this is slow
+      ASSERT_EQ(testing::broken_law(front.mesh(), field.volume.grid, front.range().alpha == front.range().beta), "");
+    }
   }
 
   testing::ValueField field = testing::random_value_field(kBoxes[GetParam() % 4], GetParam());
@@ -81,9 +102,7 @@ TEST_P(RangeStream, EndsWithTheMeshOfAFreshClient) {
         EXPECT_EQ(session.epoch(), epoch);
         server.run(int(random() % 3));
       }
-      if (session.mesh() != nullptr) {
-        ASSERT_EQ(session.mesh()->front().validate().value_or(""), "");
-      }
+      if (session.mesh() != nullptr) expect_valid(session);
       ASSERT_TRUE(session.look(random_view()));
     }
     server.run();
@@ -92,7 +111,7 @@ TEST_P(RangeStream, EndsWithTheMeshOfAFreshClient) {
     ASSERT_TRUE(session.look(whole));
     server.run();
     EXPECT_EQ(session.state(), ClientSession::State::idle);
-    expect_whole(session, whole.shown);
+    expect_each(session, whole);
     EXPECT_EQ(session.mesh()->updates(), session.stats().updates) << "an update was sent twice";
     session.disconnected();
   }
@@ -111,7 +130,7 @@ TEST_P(RangeStream, KeepsItsBudgetsAndForgets) {
     view.budget = {.max_tets = 200 + random() % 2000, .max_updates = room};
     ASSERT_TRUE(session.look(view));
     server.run(1 + int(random() % 4));
-    ASSERT_EQ(session.mesh()->front().validate().value_or(""), "");
+    expect_valid(session);
     server.run();
     EXPECT_LE(session.mesh()->updates(), room);
     session.look_again();
@@ -121,7 +140,65 @@ TEST_P(RangeStream, KeepsItsBudgetsAndForgets) {
   whole.shown = random_request();
   ASSERT_TRUE(session.look(whole));
   server.run();
-  expect_whole(session, whole.shown);
+  expect_each(session, whole);
+}
+
+// At any error, and with a budget and a camera the meshes of extract().
+TEST_P(RangeStream, AFreshClientHasTheMeshesOfItsRanges) {
+  for (int trial = 0; trial < 4; ++trial) {
+    ClientSession session({.dataset = "made", .client = "test"});
+    ViewRequest view;
+    view.shown = random_request();
+    view.lod.error_percent = double(random() % 40);
+    ASSERT_TRUE(session.look(view));
+    testing::SessionServer server(volume, session);
+    server.run();
+    expect_valid(session);
+    expect_each(session, view);
+
+    const ViewRequest seen = [&] {
+      ViewRequest with = random_view();
+      with.shown = view.shown;
+      return with;
+    }();
+    ClientSession other({.dataset = "made", .client = "test"});
+    ASSERT_TRUE(other.look(seen));
+    testing::SessionServer again(volume, other);
+    again.run();
+    const ShownRanges shown = resolve(volume->description(), seen.shown);
+    const auto expected = extract(*volume, *find_relevant_updates(volume, shown, true), shown, seen.lod);
+    ASSERT_TRUE(expected);
+    for (std::size_t i = 0; i < shown.size(); ++i)
+      EXPECT_EQ(mesh_digest(other.mesh()->fronts()[i].mesh()), mesh_digest((*expected)[i].front.mesh())) << "range " << i;
+  }
+}
+
+// What is on its way is the same for ranges in another order, and with one of them twice.
+TEST_P(RangeStream, OrderAndRepetitionDoNotMatterToTheServer) {
+  ViewRequest view = random_view();
+  ClientSession one({.dataset = "made", .client = "test"}), other({.dataset = "made", .client = "test"});
+  ASSERT_TRUE(one.look(view));
+  std::shuffle(view.shown.ranges.begin(), view.shown.ranges.end(), random);
+  if (view.shown.ranges.size() < kMaxRanges) view.shown.ranges.push_back(view.shown.ranges.front());
+  ASSERT_TRUE(other.look(view));
+  testing::SessionServer a(volume, one), b(volume, other);
+  a.run();
+  b.run();
+  EXPECT_EQ(one.stats().bytes, other.stats().bytes);
+  EXPECT_EQ(one.mesh()->updates(), other.mesh()->updates());
+}
+
+TEST_P(RangeStream, RefusesMoreRangesThanCanBeShown) {
+  ClientSession session({.dataset = "made", .client = "test"});
+  session.look({});
+  testing::SessionServer server(volume, session);
+  server.run();
+  ViewRequest five;
+  five.shown.ranges.assign(kMaxRanges + 1, volume->description().range);
+  const auto refused = session.look(five);
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().usage);
+  EXPECT_EQ(session.mesh()->fronts().size(), 1u);
 }
 
 TEST_P(RangeStream, RefusesARangeThatTheDataSetHasNot) {
@@ -132,9 +209,9 @@ TEST_P(RangeStream, RefusesARangeThatTheDataSetHasNot) {
   server.run();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   ViewRequest beyond;
-  if (std::isfinite(d.range.alpha)) beyond.shown.range = Range{std::nextafter(d.range.alpha, -kInfinity), d.range.beta};
-  if (std::isfinite(d.range.beta)) beyond.shown.range = Range{d.range.alpha, std::nextafter(d.range.beta, kInfinity)};
-  if (!beyond.shown.range) return;  // it has every range
+  if (std::isfinite(d.range.alpha)) beyond.shown.ranges = {{std::nextafter(d.range.alpha, -kInfinity), d.range.beta}};
+  if (std::isfinite(d.range.beta)) beyond.shown.ranges = {{d.range.alpha, std::nextafter(d.range.beta, kInfinity)}};
+  if (beyond.shown.ranges.empty()) return;  // it has every range
   const auto refused = session.look(beyond);
   ASSERT_FALSE(refused);
   EXPECT_TRUE(refused.error().usage);

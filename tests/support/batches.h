@@ -23,7 +23,7 @@ inline std::vector<std::uint8_t> batch_of(const IntervalVolume& volume, std::spa
     if (groups.empty() || groups.back().supercube != p.supercube) groups.push_back({p.brick, p.supercube, p.key, 0});
     groups.back().slots |= std::uint64_t(1) << p.slot;
   }
-  return encode_batch(volume, volume.description().whole(), split, groups);
+  return encode_batch(volume, {volume.description().whole()}, split, groups);
 }
 
 }  // namespace intervale::testing

@@ -50,7 +50,7 @@ TEST_P(CoarseFrontOf, AnotherRangeShowsWhatTheFineMeshHasOfTheseLevels) {
   const Range range = client.front().range(), within{range.alpha + 0.1, range.beta - 0.1};
   Front moved = coarse_front(client, 3);
   moved.set_range(within, Refine::boundary);
-  ASSERT_TRUE(client.show({.range = within, .refine = Refine::boundary}));
+  ASSERT_TRUE(client.show({.ranges = {within}, .refine = Refine::boundary}));
   EXPECT_EQ(canonical(moved.mesh()), canonical(coarse_front(client, 3).mesh()));
   EXPECT_LE(moved.tet_count(), client.tet_count());
 }

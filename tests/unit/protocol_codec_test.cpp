@@ -55,8 +55,9 @@ std::vector<ClientMessage> client_messages() {
           View{2, {}, 12345, {{{}, {}, supercube_key(3, {1, 0, 2}), 5}, {{}, {}, supercube_key(0, {7, 8, 9}), 1}}},
           View{std::numeric_limits<std::uint64_t>::max(),
                {.error = 0.5, .error_percent = 10, .roi = Box{{-1, 0, 1}, {2, 0, 3}}, .max_updates = 1ull << 60}},
-          View{3, {}, {}, {}, {Range{-1.5, std::numeric_limits<double>::infinity()}, {}}},
-          View{4, {}, {}, {}, {Range{2, 2}, Refine::uniform}},
+          View{3, {}, {}, {}, {{{-1.5, std::numeric_limits<double>::infinity()}}, {}}},
+          View{4, {}, {}, {}, {{{2, 2}}, Refine::uniform}},
+          View{7, {}, {}, {}, {{{2, 2}, {0, 1}, {2, 2}, {-1, 5}}, Refine::boundary}},
           View{6, {}, {}, {}, {{}, Refine::boundary}},
           View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}},
           Credit{65536},
@@ -269,8 +270,12 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
   wrong[7].roi->min[0] = kNan;
   wrong[8].error_percent = -0.5;
   for (const Range& range : {Range{1, 0}, Range{std::nan(""), 0}, Range{0, std::nan("")}}) {
-    EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {range, {}}}))));
+    EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {{range}, {}}}))));
+    EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {{{0, 1}, range, {0, 1}}, {}}}))));
   }
+  const auto five = decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {std::vector<Range>(kMaxRanges + 1, {0, 1}), {}}})));
+  ASSERT_FALSE(five);
+  EXPECT_EQ(five.error().message, "malformed message: a view of 5 ranges, of which at most 4 can be shown");
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {{}, Refine(2)}}))));
   for (const Lod& lod : wrong) EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, lod})))) << &lod - wrong.data();
 }

@@ -20,7 +20,7 @@ struct RangeCacheTest : ::testing::Test {
     ++found;
     return find_relevant_updates(of, shown, false);
   };
-  static ShownRange shown(int number) { return {{0, 0.01 * number}, Refine::boundary}; }
+  static ShownRanges shown(int number) { return {{{0, 0.01 * number}, Refine::boundary}}; }
 };
 
 TEST_F(RangeCacheTest, FindsEachRangeOnceForAllThreads) {
@@ -38,12 +38,12 @@ TEST_F(RangeCacheTest, FindsEachRangeOnceForAllThreads) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(found, 8);
   EXPECT_EQ(same, 4);
-  EXPECT_EQ(cache.get(volume, volume->description().whole()).get(), &volume->relevant()) << "nothing has to be found";
+  EXPECT_EQ(cache.get(volume, {volume->description().whole()}).get(), &volume->relevant()) << "nothing has to be found";
   EXPECT_EQ(found, 8);
 }
 
 TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
-  const std::size_t bytes = find(volume, shown(1))->memory_bytes();
+  const std::size_t bytes = find(volume, shown(1).front())->memory_bytes();
   found = 0;
   RangeCache cache(find, 2 * bytes + bytes / 2);
   (void)cache.get(volume, shown(1));
@@ -64,6 +64,18 @@ TEST_F(RangeCacheTest, DropsWhatBelongsToDataSetsThatAreGone) {
   volume = testing::build_shared(testing::gyroid({9, 9, 9}), {.range = {-1, 1}, .refine = Refine::uniform});
   (void)cache.get(volume, shown(1));
   EXPECT_TRUE(old.expired());
+  EXPECT_EQ(found, 2);
+}
+
+TEST_F(RangeCacheTest, SeveralRangesAreUnitedOnceOfWhatEachNeeds) {
+  RangeCache cache(find);
+  const ShownRanges both = distinct({shown(2).front(), shown(1).front(), shown(2).front()});
+  ASSERT_EQ(both.size(), 2u);
+  const auto first = cache.get(volume, shown(1)), all = cache.get(volume, both);
+  EXPECT_EQ(found, 2);
+  EXPECT_EQ(all->shown(), both);
+  EXPECT_EQ(cache.get(volume, both), all);
+  EXPECT_EQ(cache.get(volume, shown(1)), first);
   EXPECT_EQ(found, 2);
 }
 

@@ -344,6 +344,27 @@ TEST(Nearness, IsThatOfTheNaiveDefinition) {
   for (const int count : seen) EXPECT_GT(count, 100);
 }
 
+TEST(Nearness, OfSeveralRangesIsThatOfTheNearest) {
+  std::mt19937 random(4);
+  const ValueFormat format{SampleType::u16, 1, 0, 400};
+  for (int trial = 0; trial < 5000; ++trial) {
+    const ValueKey low = ValueKey(random() % 380), high = low + ValueKey(random() % 20);
+    KeySpan span{low, low};
+    span.add(high);
+    ShownRanges shown;
+    int nearest = kNearness;
+    for (unsigned i = 0; i <= random() % kMaxRanges; ++i) {
+      const double alpha = int(random() % 440) - 20;
+      shown.push_back({{alpha, alpha + double(random() % 100)}, Refine(random() % 2)});
+      nearest = std::min(nearest, naive_nearness(KeySides(format, shown.back().range), shown.back().refine, {low, high}));
+    }
+    ASSERT_EQ(FlagRanges(format, shown).nearness(span), nearest) << "trial " << trial;
+    std::shuffle(shown.begin(), shown.end(), random);
+    shown.push_back(shown.front());
+    ASSERT_EQ(FlagRanges(format, shown).nearness(span), nearest) << "trial " << trial;
+  }
+}
+
 TEST(Nearness, HoldsAtTheBordersOfTheKeys) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const ValueKey last = ~ValueKey(0) - 1;

@@ -40,7 +40,7 @@ TEST(VerifyMeshes, PartsOfTheStreamPass) {
     clients.emplace_back();  // one that failed
   }
   for (unsigned seed = 0; seed < 5; ++seed) {
-    const auto verified = verify_meshes(streamed(volume, 1000).front(), clients, seed);
+    const auto verified = verify_meshes(streamed(volume, 1000).fronts(), clients, seed);
     EXPECT_EQ(verified.compared, 6u);
     EXPECT_EQ(verified.differing, 0u);
   }
@@ -52,7 +52,7 @@ TEST(VerifyMeshes, AnotherMeshIsFound) {
   clients.reserve(7);
   for (int i = 0; i < 6; ++i) clients.emplace_back(streamed(volume, i));
   clients.emplace_back(streamed(volume_of_range({-0.3, 0.21}), 1000));
-  const auto verified = verify_meshes(streamed(volume, 1000).front(), clients, 1);
+  const auto verified = verify_meshes(streamed(volume, 1000).fronts(), clients, 1);
   EXPECT_EQ(verified.compared, 7u);
   EXPECT_EQ(verified.differing, 1u);
 }

@@ -84,7 +84,7 @@ class Viewer {
                      .fov = camera["fov"].as<double>(),
                      .viewport = {camera["viewport"][0].as<int>(), camera["viewport"][1].as<int>()},
                      .pixel_error = view["pixelError"].as<double>()};
-    if (!view["range"].isNull()) wanted.shown.range = Range{view["range"][0].as<double>(), view["range"][1].as<double>()};
+    if (!view["range"].isNull()) wanted.shown.ranges = {{view["range"][0].as<double>(), view["range"][1].as<double>()}};
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
     stale_ = true;  // a budget hides and shows at once
@@ -95,16 +95,16 @@ class Viewer {
   // The range that is shown until the next look(). levels: how many of the finest ones are left out (coarse_front.h).
   std::string preview(const val& range, int levels) {
     if (!surface_) return {};
-    const RangeRequest request{.range = Range{range[0].as<double>(), range[1].as<double>()}};
+    const RangeRequest request{.ranges = {{range[0].as<double>(), range[1].as<double>()}}, .refine = {}};
     stale_ = is_previewing_ = true;
     if (levels == 0) {
       coarse_.reset();
       return text_of(session_.preview(request));
     }
-    const ShownRange shown = resolve(session_.mesh()->description(), request);
+    const ShownRanges shown = resolve(session_.mesh()->description(), request);
     if (auto held = check_held(session_.mesh()->description(), shown); !held) return text_of(held);
     if (!coarse_ || coarse_->levels != levels) coarse_.emplace(*session_.mesh(), levels);
-    coarse_->front.set_range(shown.range, shown.refine);
+    coarse_->front.set_range(shown.front().range, shown.front().refine);
     return {};
   }
   void connected(double now) { session_.connected(time_of(now)); }

@@ -90,7 +90,13 @@ void write_vtu(MeshOutput& out, const Mesh& mesh) {
   out.text("<Cells>\n");
   write_cells(out, mesh.tets);
   write_array(out, R"(type="UInt8" Name="types")", mesh.tets.size(), [](std::uint64_t) { return std::uint8_t{kTetraCell}; });
-  out.text("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
+  out.text("</Cells>\n");
+  if (!mesh.part.empty()) {
+    out.text("<CellData Scalars=\"range\">\n");
+    write_array(out, R"(type="UInt8" Name="range")", mesh.part.size(), [&](std::uint64_t i) { return mesh.part[i]; });
+    out.text("</CellData>\n");
+  }
+  out.text("</Piece>\n</UnstructuredGrid>\n</VTKFile>\n");
 }
 
 void write_vtp(MeshOutput& out, const Mesh& mesh, const BoundaryMesh& boundary) {

@@ -1,0 +1,111 @@
+// What several ranges need together.
+#include "common/ivm/relevant_updates.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "common/util/bits.h"
+#include "server/builder/find_relevant_updates.h"
+#include "tests/support/interval_volumes.h"
+
+namespace intervale {
+namespace {
+
+constexpr std::array<testing::Dims, 4> kBoxes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
+
+using Each = std::vector<std::shared_ptr<const RelevantUpdates>>;
+
+class United : public ::testing::TestWithParam<unsigned> {
+ protected:
+  // One to four ranges within the data set's, or its own.
+  [[nodiscard]] Each random_ranges() {
+    Each each;
+    for (unsigned count = 1 + random_() % kMaxRanges; count > 0; --count) {
+      double low = std::uniform_real_distribution(-1.5, 1.5)(random_), high = std::uniform_real_distribution(-1.5, 1.5)(random_);
+      if (low > high) std::swap(low, high);
+      const ShownRange shown{{low, high}, Refine(random_() % 2)};
+      each.push_back(find_relevant_updates(volume_, random_() % 5 == 0 ? volume_->description().whole() : shown, random_() % 4 != 0));
+    }
+    return each;
+  }
+
+  std::mt19937 random_{GetParam()};
+  std::shared_ptr<const IntervalVolume> volume_ =
+      testing::build_shared(testing::gyroid(kBoxes[GetParam() % kBoxes.size()]), {.range = {-1.5, 1.5}, .refine = Refine::uniform});
+};
+
+TEST_P(United, IsWhatEachRangeNeeds) {
+  const SupercubeSet& set = volume_->set();
+  for (int trial = 0; trial < 4; ++trial) {
+    const Each each = random_ranges();
+    const RelevantUpdates all = united(*volume_, each);
+    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      unsigned brick_step = 0;
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+        const std::uint64_t occupancy = set.occupancy()[s];
+        std::uint64_t slots = 0;
+        for (const auto& one : each) slots |= one->slots(s, occupancy);
+        ASSERT_EQ(all.slots(s, occupancy), slots);
+        unsigned most = 0;
+        for (const Slot slot : set_bits<Slot>(slots)) most = std::max(most, volume_->error_step(set.first(b, s) + count_below(occupancy, slot)));
+        ASSERT_EQ(all.supercube_error_steps()[s], most);
+        brick_step = std::max(brick_step, most);
+        for (unsigned step = 0; step < volume_->error_steps().size(); step += 7) {
+          float farthest = 0;
+          for (const auto& one : each) farthest = std::max(farthest, one->object_error(s, scale_of_key(key), step));
+          ASSERT_GE(all.object_error(s, scale_of_key(key), step), farthest);
+        }
+        if (slots != 0) {
+          ASSERT_GE(all.brick_object_error(b), all.object_error(s, scale_of_key(key), most));
+        }
+      });
+      ASSERT_EQ(all.brick_error_step(b), brick_step);
+    }
+  }
+}
+
+TEST_P(United, OrderAndRepetitionDoNotMatter) {
+  Each each = random_ranges();
+  const RelevantUpdates one = united(*volume_, each);
+  std::shuffle(each.begin(), each.end(), random_);
+  each.push_back(each.front());
+  const RelevantUpdates other = united(*volume_, each);
+  EXPECT_EQ(one.shown(), other.shown());
+  for (SupercubeIndex s{0}; s < volume_->set().supercubes(); ++s) {
+    const std::uint64_t occupancy = volume_->set().occupancy()[s];
+    ASSERT_EQ(one.slots(s, occupancy), other.slots(s, occupancy));
+    ASSERT_EQ(one.error_to_distance()[s].code(), other.error_to_distance()[s].code());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, United, ::testing::Range(0u, 8u));
+
+// Of all pairs of codes, at every scale: the least code that bounds both, as far as its steps allow.
+TEST(ErrorToDistance, TheFartherOfTwoBoundsBoth) {
+  const auto distance = [](ErrorToDistance code, int scale, float error) {
+    return std::min(error * code.ratio(1), code.is_far() ? kMaxFarDeviation : float(1 << scale));
+  };
+  for (int scale = 0; scale < 12; ++scale) {
+    for (unsigned a = 0; a < 256; a += 3) {
+      for (unsigned b = 0; b < 256; b += 5) {
+        const ErrorToDistance first{std::uint8_t(a)}, second{std::uint8_t(b)};
+        const ErrorToDistance farther = ErrorToDistance::farther(first, second, scale);
+        ASSERT_EQ(farther.code(), ErrorToDistance::farther(second, first, scale).code());
+        for (const float error : {1e-5F, 0.1F, 1.0F, 300.0F}) {
+          const float both = std::max(distance(first, scale, error), distance(second, scale, error));
+          ASSERT_GE(distance(farther, scale, error), both) << a << " " << b << " " << scale;
+          if (first.is_far() == second.is_far()) {
+            ASSERT_EQ(distance(farther, scale, error), both);
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace intervale
