@@ -27,17 +27,17 @@ StreamClient client_of(const IntervalVolume& volume) {
 
 class CoarseFrontOf : public ::testing::TestWithParam<unsigned> {
  protected:
-  std::shared_ptr<const IntervalVolume> volume =
+  std::shared_ptr<const IntervalVolume> volume_ =
       GetParam() % 2 == 0 ? testing::build_shared(testing::gyroid({17, 12, 33}), {.range = {-0.3, 0.2}, .refine = Refine::uniform})
                           : testing::build_shared(testing::digits({13, 20, 6}, GetParam()), {.range = {3, 5.5}, .refine = Refine::uniform});
-  StreamClient client = client_of(*volume);
+  StreamClient client_ = client_of(*volume_);
 };
 
 TEST_P(CoarseFrontOf, EachLevelIsPartOfTheNextFinerOne) {
-  Front finer = coarse_front(client, 0);
-  EXPECT_EQ(canonical(finer.mesh()), canonical(client.mesh()));
+  Front finer = coarse_front(client_, 0);
+  EXPECT_EQ(canonical(finer.mesh()), canonical(client_.mesh()));
   for (int levels = 1; finer.split_count() > 0; ++levels) {
-    Front coarse = coarse_front(client, levels);
+    Front coarse = coarse_front(client_, levels);
     ASSERT_EQ(coarse.validate(), std::nullopt);
     ASSERT_TRUE(coarse.is_part_of(finer));
     ASSERT_LE(coarse.split_count(), finer.split_count());
@@ -47,12 +47,12 @@ TEST_P(CoarseFrontOf, EachLevelIsPartOfTheNextFinerOne) {
 }
 
 TEST_P(CoarseFrontOf, AnotherRangeShowsWhatTheFineMeshHasOfTheseLevels) {
-  const Range range = client.front().range(), within{range.alpha + 0.1, range.beta - 0.1};
-  Front moved = coarse_front(client, 3);
+  const Range range = client_.front().range(), within{range.alpha + 0.1, range.beta - 0.1};
+  Front moved = coarse_front(client_, 3);
   moved.set_range(within, Refine::boundary);
-  ASSERT_TRUE(client.show({.ranges = {within}, .refine = Refine::boundary}));
-  EXPECT_EQ(canonical(moved.mesh()), canonical(coarse_front(client, 3).mesh()));
-  EXPECT_LE(moved.tet_count(), client.tet_count());
+  ASSERT_TRUE(client_.show({.ranges = {within}, .refine = Refine::boundary}));
+  EXPECT_EQ(canonical(moved.mesh()), canonical(coarse_front(client_, 3).mesh()));
+  EXPECT_LE(moved.tet_count(), client_.tet_count());
 }
 
 INSTANTIATE_TEST_SUITE_P(Random, CoarseFrontOf, ::testing::Range(0u, 4u));
