@@ -25,6 +25,7 @@ export class Thickness {
   private maximumTarget = new WebGLRenderTarget(kBlocks, kBlocks, { type: FloatType, depthBuffer: false });
   private blocks = new Float32Array(4 * kBlocks * kBlocks);
   isKnown = false; // the maximum, of what is shown
+  private isOtherSurface = false; // drawn since the maximum was last read
   private isReading = false;
   private hasMissedPicture = false; // one was drawn while the last was being read
 
@@ -41,6 +42,11 @@ export class Thickness {
   // Another data set: its maximum is not known.
   reset(): void {
     this.isKnown = false;
+  }
+
+  // The surface changes: the maximum becomes that of the new one, whatever it was before.
+  surfaceChanged(): void {
+    this.isOtherSurface = true;
   }
 
   // drawLayers: draws all triangles of the solid with thickness materials.
@@ -85,6 +91,8 @@ export class Thickness {
     }
     this.isReading = true;
     this.hasMissedPicture = false;
+    const isOther = this.isOtherSurface;
+    this.isOtherSurface = false;
     renderer.setRenderTarget(this.maximumTarget);
     renderer.render(this.maximumPass, camera);
     try {
@@ -95,7 +103,8 @@ export class Thickness {
       this.isReading = false;
     }
     const greatest = this.greatest();
-    const fits = !(greatest > 0) || (greatest <= this.maximum && greatest > this.maximum / 3);
+    const isRound = !isOther || this.maximum === roundUp(greatest);
+    const fits = !(greatest > 0) || (greatest <= this.maximum && greatest > this.maximum / 3 && isRound);
     if (!fits) this.maximum = roundUp(greatest);
     if (!fits || this.hasMissedPicture) this.onMaximum();
   }

@@ -149,6 +149,7 @@ export class Viewer {
     if (surface.upload(frame)) {
       if (this.pendingCap && !uploader.hasBudget) return 0; // surface and cap together, in the next frame
       surface.swap();
+      this.picture.thickness.surfaceChanged();
       shown = surface.version;
       this.isDirty = true;
     }
