@@ -229,6 +229,23 @@ describe('Controls', () => {
       }));
   }
 
+  test('colours of values show on surfaces and cuts, with a bar', () =>
+    withPage(`${kCamera}&clip=1,0,0,0.25`, {}, async (page) => {
+      const colorBy = async (name) => {
+        await page.selectOption('#color-by', name);
+        await page.waitForTimeout(300);
+        await settled(page);
+        return pixels(page);
+      };
+      const first = await pixels(page);
+      const { mean } = difference(first, await colorBy('value'));
+      assert.ok(mean > 0.5, `${mean}`);
+      assert.deepEqual(await page.$$eval('#palette option', (options) => options.map(({ value }) => value)), ['viridis', 'cividis', 'inferno', 'ice', 'grey']);
+      assert.deepEqual(await page.$$eval('#legend .ends span', (spans) => spans.map(({ textContent }) => textContent)), ['128', '158', '188']);
+      const back = difference(first, await colorBy('surface'));
+      assert.ok(back.mean < 0.5, `${back.mean}`);
+    }));
+
   test('keys have the effects of the switches', () =>
     withPage(kCamera, {}, async (page) => {
       await page.focus('#canvas');

@@ -1,7 +1,7 @@
 // window.intervale: the page's interface for tests and for embedding pages. Values are read-only (except longestBlock)
 // and current when they are read; changes are made through the functions.
 import type { Report, Request } from './messages';
-import type { ViewState } from './state';
+import { exclusive, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
 import type { Viewer } from './viewer';
@@ -19,7 +19,7 @@ export const automation = (view: Store<ViewState>, status: Store<Status>, viewer
   get progress() { return status.value.progress; },
   stats: viewer.stats, // longestBlock may be set to 0, which restarts its measurement
   canvas: viewer.picture.canvas,
-  set: (change: Partial<ViewState>) => view.set(change), // as the controls do
+  set: (change: Partial<ViewState>) => view.set(exclusive(change)), // as the controls do
   send: (request: Request) => worker.send(request), // to the worker
   next: <T extends Report['type']>(type: T) => worker.next(type), // from the worker
   photograph: () => viewer.photograph(), // the canvas as PNG, without outlines

@@ -5,7 +5,7 @@ import { BufferAttribute, BufferGeometry, LineSegments, type Material, Mesh, Sce
 import { type Frame, toDrawing } from './frame';
 import type { SurfaceMaterials } from './materials';
 import type { SurfaceChange, SurfacePiece } from './messages';
-import type { Uploader } from './upload';
+import { setValues, type Uploader } from './upload';
 import { applied, boxAround, center, corners, diagonal } from './vec';
 
 interface PieceObjects {
@@ -17,6 +17,7 @@ export class BoundarySurfaceView {
   readonly faces = new Scene();
   readonly edges = new Scene();
   version = 0; // of what is shown; 0: nothing yet
+  hasValues = false; // what is shown
   private pieces = new Map<number, PieceObjects>(); // shown, by id
   private pending: SurfaceChange[] = []; // oldest first
   private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
@@ -40,7 +41,7 @@ export class BoundarySurfaceView {
     while (this.uploaded.length < change.pieces.length && this.uploader.hasBudget) {
       const piece = change.pieces[this.uploaded.length]!;
       const objects = this.objectsOf(piece, frame);
-      this.uploader.send(objects.mesh.geometry, piece.vertices.byteLength + piece.indices.byteLength);
+      this.uploader.send(objects.mesh.geometry, piece.vertices.byteLength + piece.indices.byteLength + (piece.values?.byteLength ?? 0));
       if (objects.lines) this.uploader.send(objects.lines.geometry, piece.edges!.byteLength);
       this.uploaded.push({ id: piece.id, objects });
     }
@@ -60,6 +61,7 @@ export class BoundarySurfaceView {
     }
     this.uploaded = [];
     this.version = change.version;
+    this.hasValues = change.hasValues;
   }
 
   clear(): void {
@@ -68,6 +70,7 @@ export class BoundarySurfaceView {
     this.pending = [];
     for (const id of this.pieces.keys()) this.remove(id);
     this.version = 0;
+    this.hasValues = false;
   }
 
   // materials: for the next draw; either one, or one per surface.
@@ -100,6 +103,7 @@ export class BoundarySurfaceView {
       return made;
     };
     const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials.opaque);
+    setValues(mesh.geometry, piece.values);
     const lines = piece.edges ? new LineSegments(geometry(piece.edges, piece.edgeCounts, 2), this.materials.edges) : null;
     return { mesh, lines };
   }

@@ -1,6 +1,6 @@
 // The client core as the module '@core/core.js': what core/bindings.cpp binds. INTERVALE_CORE_DIR says where it is when
 // the page is built; tsconfig.json gives it these types.
-import type { Box, Cap, Plane, Progress, SurfaceChange, Tets, View } from './messages';
+import type { Box, Cap, Palette, Plane, Progress, SurfaceChange, Tets, View } from './messages';
 
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
@@ -18,9 +18,10 @@ export interface Viewer {
   updates(): number;
   done(): boolean;
   progress(): Omit<Progress, 'surfaceVersion' | 'memory' | 'busy'>;
-  updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version'>; // all: every piece, changed or not
+  wantValues(wanted: boolean): void; // whether pieces, caps and tetrahedra have values, from the next updateSurface() on; if so, that must be of all
+  updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version' | 'hasValues'>; // all: every piece, changed or not
   isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap() and tets() must not be called
-  cap(plane: Plane): Pick<Cap, 'vertices' | 'triangles'>;
+  cap(plane: Plane): Pick<Cap, 'vertices' | 'values' | 'triangles'>;
   tets(box: Box): Omit<Tets, 'box'>;
   save(path: string): ArrayBuffer | string; // the file, in the format of the path's extension; or an error
   digest(): string;
@@ -28,6 +29,7 @@ export interface Viewer {
 }
 export interface Core {
   Viewer: new (dataset: string) => Viewer;
+  palettes(): Palette[]; // all, the default first
   HEAPU8: Uint8Array;
 }
 declare const createCore: (options: { locateFile: (path: string) => string }) => Promise<Core>;

@@ -1,17 +1,31 @@
-// The legend (a colour bar), where colours show thickness or levels of detail.
+// The legend (a colour bar), where colours show values of the field, thickness or levels of detail.
 import { type ColorMap, kLevelColors, kThicknessColors } from './color_maps';
+import type { Dataset } from './datasets';
 import { element } from './dom';
 import { short } from './format';
+import type { Range } from './range';
 import type { ViewState } from './state';
 import type { Thickness } from './thickness';
 
-// unit: of length.
-export function showLegend(view: Readonly<ViewState>, { isAvailable, isKnown, maximum }: Thickness, unit: string): void {
+let drawn: ColorMap | null = null; // in the legend's bar
+
+// bar: of values; null: not known yet.
+export function showLegend(
+  view: Readonly<ViewState>,
+  { isAvailable, isKnown, maximum }: Thickness,
+  dataset: Dataset | null,
+  bar: { span: Range; colors: ColorMap } | null,
+): void {
   const showsThickness = view.thickness && isAvailable;
-  element('legend').hidden = !showsThickness && !view.levels;
-  if (showsThickness) {
+  const values = view.colorBy === 'value' ? bar : null;
+  element('legend').hidden = !showsThickness && !view.levels && !values;
+  if (values) {
+    const [low, high] = values.span;
+    const title = [dataset?.field || 'Field', dataset?.fieldUnit].filter(Boolean).join(', ');
+    fill(title, [low, (low + high) / 2, high].map(short), values.colors);
+  } else if (showsThickness) {
     const labels = isKnown ? ['0', short(maximum / 2), `${short(maximum)} or more`] : ['0', '', ''];
-    fill(`Thickness along the line of sight, ${unit}`, labels, kThicknessColors);
+    fill(`Thickness along the line of sight, ${dataset?.unit || 'world units'}`, labels, kThicknessColors);
   } else if (view.levels) {
     fill('Level of detail', ['finest', '', 'coarsest'], kLevelColors);
   }
@@ -20,6 +34,8 @@ export function showLegend(view: Readonly<ViewState>, { isAvailable, isKnown, ma
 function fill(title: string, labels: string[], colors: ColorMap): void {
   element('legend-title').textContent = title;
   ['low', 'middle', 'high'].forEach((name, i) => (element(`legend-${name}`).textContent = labels[i]!));
+  if (colors === drawn) return;
+  drawn = colors;
   const canvas = element<HTMLCanvasElement>('legend-ramp');
   const context = canvas.getContext('2d');
   if (!context) return;

@@ -15,10 +15,11 @@ import { rangeOf } from './range';
 import { watchRange } from './range_controls';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
-import { fromHash, toHash, type ViewState } from './state';
+import { exclusive, fromHash, toHash, type ViewState } from './state';
 import { Status } from './status';
 import { Store } from './store';
 import { watchTheme } from './theme';
+import { ValueColors } from './value_colors';
 import { Viewer } from './viewer';
 import { updatesIn, type Wanted, WorkerClient } from './worker_client';
 
@@ -33,11 +34,13 @@ class Page {
   private readonly handles: Handles;
   private readonly clip: ClipControls;
   private readonly region: RegionControls;
+  private readonly valueColors: ValueColors;
 
   constructor(private readonly viewer: Viewer, private readonly worker: WorkerClient) {
     this.handles = new Handles(viewer);
     this.clip = new ClipControls(view, viewer, this.handles);
     this.region = new RegionControls(view, viewer, this.handles);
+    this.valueColors = new ValueColors(view, status, () => viewer.invalidate());
     this.watchViewer();
     view.watch([], (value) => {
       const chosen = value.dataset !== status.value.dataset?.name && status.value.datasets?.find(({ name }) => name === value.dataset);
@@ -79,7 +82,7 @@ class Page {
       const pose = viewer.pose();
       if (pose) showAxes(element<SVGSVGElement>('axes'), pose);
       this.handles.place();
-      showLegend(view.value, viewer.picture.thickness, status.value.dataset?.unit || 'world units');
+      showLegend(view.value, viewer.picture.thickness, status.value.dataset, this.valueColors.bar);
     };
   }
 
@@ -94,7 +97,10 @@ class Page {
     onClick('fullscreen', toggleFullScreen);
     onClick('help', showHelp);
     watchPanel(view, status);
-    watchRange(view, status, (range) => this.worker.preview(range));
+    watchRange(view, status, (range) => {
+      this.worker.preview(range);
+      this.valueColors.preview(range);
+    });
     watchSaving(status, viewer, this.worker);
     watchTheme(() => {
       viewer.picture.setBackground(getComputedStyle(element('stage')).backgroundColor);
@@ -128,6 +134,7 @@ class Page {
       { key: 'T', description: 'Thickness', run: () => toggle('thickness') },
       { key: 'W', description: 'Wireframe', run: () => toggle('wireframe') },
       { key: 'L', description: 'Colour by level of detail', run: () => toggle('levels') },
+      { key: 'V', description: 'Colour by value', run: toggleValueColors },
       { key: 'H', description: 'This help', run: showHelp },
     ];
   }
@@ -137,7 +144,7 @@ class Page {
     const pose = this.viewer.pose();
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
-    const { range, pixelError, region, maxTets, memory, clip, tets, wireframe } = view.value;
+    const { range, pixelError, region, maxTets, memory, clip, tets, wireframe, colorBy } = view.value;
     const viewport: [number, number] = [canvas.width, canvas.height];
     const { dataset } = status.value;
     return {
@@ -145,6 +152,7 @@ class Page {
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,
+      values: colorBy === 'value',
     };
   }
 
@@ -180,8 +188,10 @@ function toggleFullScreen(): void {
 const showHelp = () => element<HTMLDialogElement>('help-dialog').showModal();
 
 function toggle(name: 'wireframe' | 'levels' | 'thickness'): void {
-  if (!input(name).disabled) view.set({ [name]: !view.value[name] });
+  if (!input(name).disabled) view.set(exclusive({ [name]: !view.value[name] }));
 }
+
+const toggleValueColors = () => view.set(exclusive({ colorBy: view.value.colorBy === 'value' ? 'surface' : 'value' }));
 
 // The address follows the view, and the view follows an address that the user enters.
 function watchAddress(): void {

@@ -1,6 +1,6 @@
 // The materials, and the uniforms that they share.
 import {
-  Color, CustomBlending, DoubleSide, GLSL3, type IUniform, Matrix3, NoBlending, OneFactor, OneMinusSrcAlphaFactor,
+  Color, CustomBlending, type DataTexture, DoubleSide, GLSL3, type IUniform, Matrix3, NoBlending, OneFactor, OneMinusSrcAlphaFactor,
   RawShaderMaterial, type ShaderMaterialParameters, SrcAlphaFactor, Vector2, Vector3, Vector4, ZeroFactor,
 } from 'three';
 import * as shaders from './shaders';
@@ -16,6 +16,8 @@ export const shared = {
   hiddenMax: { value: new Vector3(-1, -1, -1) },
   colorByLevel: { value: 0 },
   coarsestLevel: { value: 1 },
+  palette: { value: null as DataTexture | null }, // of the field's values
+  span: { value: new Vector2(0, 1) }, // see kColoring
   depthRange: { value: new Vector2(0, 1) },
   shrink: { value: 0.8 },
   pixelScale: { value: 1 }, // pixels per unit of length, at one unit from the eye
@@ -67,7 +69,10 @@ const kAlphaBlending: Parameters = {
   depthWrite: false,
 };
 
-export function surfaceMaterials(): SurfaceMaterials {
+const coloredBy = (value: boolean): Parameters => (value ? { defines: { BY_VALUE: '' } } : {});
+
+// byValue: colours show the field's values, which each vertex has then.
+export function surfaceMaterials(byValue: boolean): SurfaceMaterials {
   const opacities: Record<SurfaceName, IUniform> = { alpha: { value: 1 }, beta: { value: 1 }, box: { value: 1 } };
   const each = (fragment: string, uniforms: (name: SurfaceName) => Uniforms, parameters: Parameters) =>
     kSurfaces.map((name) => material(shaders.kSurfaceVertex, fragment, uniforms(name), parameters));
@@ -75,9 +80,9 @@ export function surfaceMaterials(): SurfaceMaterials {
   const colorAndOpacityOf = (name: SurfaceName) => ({ color: shared[name], opacity: opacities[name] });
   const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }; // lets edges lie in front
   return {
-    opaque: each(shaders.kOpaqueFragment, colorOf, offset),
+    opaque: each(shaders.kOpaqueFragment, colorOf, { ...offset, ...coloredBy(byValue) }),
     depth: each(shaders.kTransparentFragment, colorAndOpacityOf, { ...offset, colorWrite: false }),
-    transparent: each(shaders.kTransparentFragment, colorAndOpacityOf, kAccumulation),
+    transparent: each(shaders.kTransparentFragment, colorAndOpacityOf, { ...kAccumulation, ...coloredBy(byValue) }),
     edges: each(shaders.kEdgeFragment, () => ({ lineColor: { value: new Vector4(0, 0, 0, 0.5) } }), kAlphaBlending),
   };
 }
@@ -98,9 +103,9 @@ export function setStyles(materials: SurfaceMaterials, styles: Record<SurfaceNam
 }
 
 const kDepthOnly: Parameters = { colorWrite: false };
-export const capMaterial = () => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box });
+export const capMaterial = (byValue: boolean) => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box }, coloredBy(byValue));
 export const capDepthMaterial = () => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box }, kDepthOnly);
-export const tetsMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {});
+export const tetsMaterial = (byValue: boolean) => material(shaders.kTetsVertex, shaders.kTetsFragment, {}, coloredBy(byValue));
 export const tetsDepthMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {}, kDepthOnly);
 
 // capFacing: see kThicknessFragment. Without depth test: hidden layers are added, too.

@@ -39,6 +39,7 @@ export type Request =
   | { type: 'clip'; plane: Plane | null }
   | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
   | { type: 'edges'; wanted: boolean } // whether pieces have edges
+  | { type: 'values'; wanted: boolean } // whether pieces, caps and tetrahedra have values
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
   | { type: 'save'; format: MeshFormat }
   | { type: 'digest' }; // answered by a report of the same type
@@ -54,6 +55,7 @@ export interface View {
 
 // From the worker to the page.
 export type Report =
+  | { type: 'palettes'; palettes: Palette[] } // once, when the core has been loaded; the default first
   | { type: 'connection'; state: ConnectionState }
   | { type: 'opened'; resumed: boolean } // resumed: the mesh is kept and the stream continues
   | { type: 'progress'; progress: Progress }
@@ -64,6 +66,12 @@ export type Report =
   | { type: 'saved'; format: MeshFormat; name: string; bytes: ArrayBuffer }
   | { type: 'digest'; digest: string; updates: number; tets: number }
   | { type: 'error'; text: string }; // for the user; the session is closed
+
+// 256 colours, red, green and blue, a byte each, sRGB; the first is that of the least value.
+export interface Palette {
+  name: string;
+  colours: ArrayBuffer;
+}
 
 export type ConnectionState =
   | { state: 'connecting' }
@@ -100,6 +108,7 @@ export interface Progress {
 export interface SurfacePiece {
   id: number;
   vertices: ArrayBuffer;
+  values: ArrayBuffer | null; // of the field at each vertex, float32; null unless wanted
   indices: ArrayBuffer;
   edges: ArrayBuffer | null; // two uint32 indices each, every edge once per group; in the same three groups
   triangles: [number, number, number]; // per group
@@ -112,6 +121,7 @@ export interface SurfacePiece {
 // deleted. To be shown as a whole, or there would be cracks. A piece without triangles is in `removed`.
 export interface SurfaceChange {
   version: number; // from 1
+  hasValues: boolean; // all pieces have, also those from earlier changes
   reset: boolean; // delete all earlier pieces first
   pieces: SurfacePiece[];
   removed: number[]; // ids
@@ -123,6 +133,7 @@ export interface SurfaceChange {
 export interface Cap {
   plane: Plane | null;
   vertices: ArrayBuffer;
+  values: ArrayBuffer | null; // as in a SurfacePiece
   triangles: number;
   version: number; // of the boundary surface made from the same mesh
 }
@@ -133,6 +144,7 @@ export interface Cap {
 export interface Tets {
   box: Box | null;
   vertices: ArrayBuffer;
+  values: ArrayBuffer | null; // as in a SurfacePiece
   count: number;
   outOf: number; // tetrahedra in the box: more than count where they are too many to show
 }

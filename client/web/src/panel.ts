@@ -3,7 +3,7 @@ import type { Dataset } from './datasets';
 import { create, element, input, onClick, setText } from './dom';
 import { bytes, count, short } from './format';
 import { rangeOf } from './range';
-import { kSurfaces, type ViewState } from './state';
+import { exclusive, kSurfaces, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
 
@@ -12,7 +12,7 @@ const kTetBudgets = [null, 10e3, 20e3, 50e3, 100e3, 200e3, 500e3, 1e6, 2e6, 5e6,
 const kMemoryBudgets = [null, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]; // MB
 
 // What is reset when another data set is chosen: values of the last one, and coordinates in its box.
-const kReset: Partial<ViewState> = { range: null, pose: null, clip: null, region: null, tets: false };
+const kReset: Partial<ViewState> = { range: null, span: null, pose: null, clip: null, region: null, tets: false };
 
 // The slider of the screen-space error: from 0.5 pixels, ten positions per doubling.
 const kLeastPixels = 0.5;
@@ -71,7 +71,7 @@ function watchSurfaces(view: Store<ViewState>, status: Store<Status>): void {
 
 function watchSwitches(view: Store<ViewState>): void {
   for (const name of ['wireframe', 'levels', 'thickness'] as const) {
-    input(name).addEventListener('change', () => view.set({ [name]: input(name).checked }));
+    input(name).addEventListener('change', () => view.set(exclusive({ [name]: input(name).checked })));
     view.watch([name], (value) => (input(name).checked = value[name]));
   }
 }

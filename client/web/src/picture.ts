@@ -26,7 +26,8 @@ export class Picture {
   readonly uploader: Uploader;
   readonly cap: CapView;
   readonly tets: TetsView;
-  private materials = surfaceMaterials();
+  private materials = surfaceMaterials(false);
+  private valueMaterials = surfaceMaterials(true);
   private transparency = new Transparency();
   private pick = new Pick();
   private camera = new PerspectiveCamera();
@@ -80,7 +81,9 @@ export class Picture {
 
   setStyles(view: ViewState): void {
     const seenThrough = kSurfaces.map((name) => [name, { ...view[name], opacity: Math.min(view[name].opacity, kAroundTets) }]);
-    setStyles(this.materials, view.tets ? { ...view, ...Object.fromEntries(seenThrough) } : view);
+    const styles = view.tets ? { ...view, ...Object.fromEntries(seenThrough) } : view;
+    setStyles(this.materials, styles);
+    setStyles(this.valueMaterials, styles);
     shared.colorByLevel.value = view.levels ? 1 : 0;
     shared.shrink.value = view.shrink;
   }
@@ -101,14 +104,19 @@ export class Picture {
 
   draw(frame: Frame, pose: Pose, view: ViewState, withOutlines: boolean): void {
     this.setCamera(frame, pose);
-    const { renderer, camera, materials } = this;
+    const { renderer, camera } = this;
+    // What has no values yet is drawn in the colours of the surfaces.
+    const isByValue = (part: { hasValues: boolean }) => view.colorBy === 'value' && part.hasValues && shared.palette.value !== null;
+    const materials = isByValue(this.surface) ? this.valueMaterials : this.materials;
+    const cap = isByValue(this.cap) ? this.cap.valueMaterial : this.cap.material;
+    const tets = isByValue(this.tets) ? this.tets.valueMaterial : this.tets.material;
     renderer.setRenderTarget(null);
     renderer.setClearColor(this.background, 1);
     renderer.clear();
     if (view.thickness && this.thickness.isAvailable) {
       this.thickness.draw(renderer, camera, () => this.drawThicknessLayers(frame, pose));
     } else {
-      this.drawOpaque(materials.opaque, this.cap.material, this.tets.material);
+      this.drawOpaque(materials.opaque, cap, tets);
       if (view.wireframe) renderer.render(this.surface.edges, camera);
       if (materials.transparent.some((material) => material.visible)) {
         const drawDepth = () => this.drawOpaque(materials.depth, this.cap.depth, this.tets.depth);

@@ -20,13 +20,25 @@ void transform(vec3 p) {
 }
 `;
 
+// The field's value at a vertex, where colours show values (BY_VALUE).
+const kValue = `
+#ifdef BY_VALUE
+in float value;
+out float vValue;
+void pass_value() { vValue = value; }
+#else
+void pass_value() {}
+#endif
+`;
+
 export const kSurfaceVertex = `${kPrecision}
 in uvec4 position; // the bits of three floats; then the normal and the level of detail
 out vec3 vNormal;
 flat out float vLevel;
-${kTransform}
+${kTransform}${kValue}
 void main() {
   transform(drawing_position(position.xyz));
+  pass_value();
   ivec3 n = ivec3(uvec3(position.w << 24, position.w << 16, position.w << 8)) >> 24;
   vNormal = vec3(n) / 127.0;
   vLevel = float(position.w >> 24);
@@ -55,13 +67,24 @@ vec3 lit(vec3 color, vec3 n, vec3 p) {
 }
 `;
 
-const kLevelColoring = `
+// What replaces a surface's colour: that of the field's value, or of the level of detail.
+const kColoring = `
+#ifdef BY_VALUE
+in float vValue;
+uniform sampler2D palette; // 256 x 1 texels
+uniform vec2 span; // the value of the first colour; 1 / (that of the last - it)
+vec3 colored(vec3 color, float level) {
+  float t = clamp((vValue - span.x) * span.y, 0.0, 1.0);
+  return texture(palette, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
+}
+#else
 uniform float colorByLevel; // 1: levels of detail replace the surface's colour; 0: they do not
 uniform float coarsestLevel;
 ${colorMapGlsl(kLevelColors)}
 vec3 colored(vec3 color, float level) {
   return mix(color, color_map(level / max(coarsestLevel, 1.0)), colorByLevel);
 }
+#endif
 `;
 
 // Discards fragments beyond the clip plane, and those in the box that shows shrunken tetrahedra instead.
@@ -79,7 +102,7 @@ const kSurfaceColor = `
 in vec3 vNormal;
 flat in float vLevel;
 uniform vec3 color;
-${kClipping}${kLevelColoring}${kLighting}
+${kClipping}${kColoring}${kLighting}
 vec3 surface_color() { return lit(colored(color, vLevel), normalize(vNormal + 1e-6), vPosition); }
 `;
 
@@ -134,9 +157,10 @@ export const kCapVertex = `${kPrecision}
 in uvec4 position; // the bits of three floats; then the distances from the triangle's sides, and the level of detail
 out vec3 vSides;
 flat out float vLevel;
-${kTransform}
+${kTransform}${kValue}
 void main() {
   transform(drawing_position(position.xyz));
+  pass_value();
   vSides = vec3(uvec3(position.w, position.w >> 8, position.w >> 16) & 255u) / 255.0;
   vLevel = float(position.w >> 24);
 }`;
@@ -147,7 +171,7 @@ in vec3 vSides;
 flat in float vLevel;
 uniform vec3 color;
 uniform float edgeWidth; // half of it, pixels
-${kClipping}${kLevelColoring}${kLighting}
+${kClipping}${kColoring}${kLighting}
 out vec4 fragColor;
 void main() {
   if (is_hidden()) discard;
@@ -171,8 +195,9 @@ uniform float shrink;
 out vec3 vUnshrunk;
 flat out float vLevel;
 out vec2 vOnSurface; // interpolated over the triangle: 1 where all corners lie on alpha; the same for beta
-${kTransform}
+${kTransform}${kValue}
 void main() {
+  pass_value();
   vec3 c = drawing_position(center);
   vUnshrunk = drawing_position(position);
   transform(c + (vUnshrunk - c) * shrink);
@@ -188,7 +213,7 @@ flat in float vLevel;
 in vec2 vOnSurface;
 uniform vec3 alpha, beta, box;
 uniform vec4 clip;
-${kLevelColoring}${kLighting}
+${kColoring}${kLighting}
 out vec4 fragColor;
 void main() {
   vec3 n = normalize(cross(dFdx(vPosition), dFdy(vPosition)));

@@ -4,8 +4,8 @@
 //   #data=NAME&eye=x,y,z&at=x,y,z&up=x,y,z&fov=30
 //
 // and, where they differ from the defaults: range=low,high (either may be -inf or inf), px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset,
-// roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe), shrink, and alpha, beta and box
-// (each rrggbb,opacity).
+// roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe), shrink, color=value, palette (a name),
+// span=low,high, and alpha, beta and box (each rrggbb,opacity).
 import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
 import { clamp, cross, length, sub, unit } from './vec';
@@ -17,6 +17,8 @@ export interface SurfaceStyle {
 
 export type SurfaceName = 'alpha' | 'beta' | 'box';
 export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // the order of the groups in a SurfacePiece
+
+export type ColorBy = 'surface' | 'value';
 
 export class ViewState {
   dataset: string | null = null; // null: the server's first
@@ -32,6 +34,9 @@ export class ViewState {
   thickness = false;
   wireframe = false;
   levels = false; // colour by level of detail
+  colorBy: ColorBy = 'surface'; // value: of the field
+  palette: string | null = null; // of values; null: the default
+  span: [number, number] | null = null; // of values with colours of their own, ascending; null: see spanOf()
   alpha: SurfaceStyle = { color: '#3d7fd6', opacity: 1 };
   beta: SurfaceStyle = { color: '#f0862a', opacity: 1 };
   box: SurfaceStyle = { color: '#d8c49a', opacity: 1 };
@@ -40,6 +45,12 @@ export class ViewState {
 export const kDefaults: Readonly<ViewState> = { ...new ViewState() };
 
 const kFlags = ['tets', 'thickness', 'levels', 'wireframe'] as const;
+
+// A change of the view, with what it rules out: colours show one thing at a time.
+export function exclusive(change: Partial<ViewState>): Partial<ViewState> {
+  if (change.colorBy === 'value') return { ...change, thickness: false, levels: false };
+  return change.thickness || change.levels ? { ...change, colorBy: 'surface' } : change;
+}
 
 // Seven digits: precise to a hundredth of a pixel on any screen.
 const write = (numbers: number[]): string => numbers.map((n) => String(Number(n.toPrecision(7)))).join(',');
@@ -63,6 +74,9 @@ export function toHash(state: ViewState): string {
   const flags = kFlags.filter((flag) => state[flag]);
   if (flags.length > 0) put('show', flags.join(','));
   if (state.shrink !== kDefaults.shrink) put('shrink', write([state.shrink]));
+  if (state.colorBy !== kDefaults.colorBy) put('color', state.colorBy);
+  if (state.palette !== null) put('palette', encodeURIComponent(state.palette));
+  if (state.span) put('span', state.span.join(','));
   for (const name of kSurfaces) {
     const style = state[name];
     const standard = kDefaults[name];
@@ -127,10 +141,13 @@ export function fromHash(hash: string): ViewState {
   for (const flag of kFlags) state[flag] = shown.includes(flag);
   state.tets = state.tets && state.region !== null;
   state.shrink = readClamped(get('shrink'), 0.4, 1) ?? kDefaults.shrink;
+  state.palette = get('palette');
+  const span = read(get('span'), 2);
+  if (span && span[0]! <= span[1]!) state.span = [span[0]!, span[1]!];
   for (const name of kSurfaces) {
     const style = /^([0-9a-f]{6}),([0-9.e-]+)$/i.exec(get(name) ?? '');
     const opacity = readClamped(style?.[2] ?? null, 0, 1);
     if (style && opacity !== null) state[name] = { color: '#' + style[1]!.toLowerCase(), opacity };
   }
-  return state;
+  return get('color') === 'value' ? { ...state, ...exclusive({ colorBy: 'value' }) } : state;
 }

@@ -1,6 +1,7 @@
 // The status of the page: what it knows of the server and the mesh. Not part of the address.
 import type { Dataset, Statistics } from './datasets';
 import type { ConnectionState, MeshFormat, Progress } from './messages';
+import type { NamedColors } from './palette';
 
 export class Status {
   datasets: Dataset[] | null = null; // null: not received yet
@@ -8,6 +9,7 @@ export class Status {
   statistics: Statistics | null = null; // of its field, where there are any
   connection: ConnectionState = { state: 'closed' };
   opened = { times: 0, resumed: false }; // how often a session was opened; whether the last one was resumed
+  palettes: NamedColors[] = []; // for values, the default first; empty until the core was loaded
   progress: Progress | null = null;
   error: string | null = null; // for the user; shown with a button to try again
   needsToken = false;

@@ -11,11 +11,14 @@ import { PreviewPace } from './preview_pace';
 const kSurfaceIntervalMs = 40; // least time between two versions
 const kProgressIntervalMs = 100;
 
+const buffersOf = ({ vertices, values }: { vertices: ArrayBuffer; values: ArrayBuffer | null }) => (values ? [vertices, values] : [vertices]);
+
 type SendReport = (report: Report, transfer?: Transferable[]) => void;
 
 // What the page wants to be shown with the boundary surface. The worker changes it, and then calls the session.
 export interface Extras {
   edges: boolean;
+  values: boolean;
   plane: Plane | null;
   box: Box | null;
 }
@@ -111,7 +114,7 @@ export class StreamSession {
     this.report({ type: 'preview' });
   }
 
-  // Sends the surface again: edges are wanted, or not wanted any more.
+  // Sends the surface again: edges or values are wanted, or not wanted any more.
   remake(): void {
     this.needsAll = true;
     this.isChanged = true;
@@ -124,22 +127,22 @@ export class StreamSession {
     const { plane } = this.extras;
     const { version } = this;
     if (plane === null || version === 0) {
-      return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), triangles: 0, version } });
+      return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), values: null, triangles: 0, version } });
     }
     if (this.viewer.isStale()) return this.scheduleSurface();
     const cap = this.viewer.cap(plane);
-    this.report({ type: 'cap', cap: { ...cap, plane, version } }, [cap.vertices]);
+    this.report({ type: 'cap', cap: { ...cap, plane, version } }, buffersOf(cap));
   }
 
   // As sendCap().
   sendTets(): void {
     const { box } = this.extras;
     if (box === null || this.version === 0) {
-      return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), count: 0, outOf: 0 } });
+      return this.report({ type: 'tets', tets: { box, vertices: new ArrayBuffer(0), values: null, count: 0, outOf: 0 } });
     }
     if (this.viewer.isStale()) return this.scheduleSurface();
     const tets = this.viewer.tets(box);
-    this.report({ type: 'tets', tets: { ...tets, box } }, [tets.vertices]);
+    this.report({ type: 'tets', tets: { ...tets, box } }, buffersOf(tets));
   }
 
   close(): void {
@@ -240,12 +243,14 @@ export class StreamSession {
     if (this.isEnded || !this.isChanged || this.shown !== this.version) return;
     const start = performance.now();
     this.isChanged = false;
-    const change = this.viewer.updateSurface(this.extras.edges, this.needsAll);
+    const { edges, values: hasValues } = this.extras;
+    this.viewer.wantValues(hasValues);
+    const change = this.viewer.updateSurface(edges, this.needsAll);
     this.needsAll = false;
     if (change.pieces.length > 0 || change.removed.length > 0 || change.reset) {
       ++this.version;
-      const buffers = change.pieces.flatMap(({ vertices, indices, edges }) => [vertices, indices, ...(edges ? [edges] : [])]);
-      this.report({ type: 'surface', change: { ...change, version: this.version } }, buffers);
+      const buffers = change.pieces.flatMap((piece) => [...buffersOf(piece), piece.indices, ...(piece.edges ? [piece.edges] : [])]);
+      this.report({ type: 'surface', change: { ...change, version: this.version, hasValues } }, buffers);
     }
     if (this.extras.plane) this.sendCap();
     if (this.extras.box) this.sendTets();

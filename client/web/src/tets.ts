@@ -4,7 +4,7 @@ import { BufferAttribute, BufferGeometry, Group, InterleavedBuffer, InterleavedB
 import { tetsDepthMaterial, tetsMaterial } from './materials';
 import type { Tets } from './messages';
 import { staticMesh } from './static_mesh';
-import type { Uploader } from './upload';
+import { setValues, type Uploader } from './upload';
 
 const kChunk = 1 << 12; // tetrahedra per mesh: 460 kB
 const kTetWords = 28; // 32-bit words of a tetrahedron's four vertices
@@ -12,8 +12,10 @@ const kTriangles = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]; // of a tetrahedron; th
 
 export class TetsView {
   readonly group = new Group();
-  readonly material = tetsMaterial();
+  readonly material = tetsMaterial(false);
+  readonly valueMaterial = tetsMaterial(true);
   readonly depth = tetsDepthMaterial();
+  hasValues = false; // what is shown
   private triangles: BufferAttribute | null = null; // the same for every chunk, so shared
   private pending: Tets | null = null;
   private chunks: Mesh[] = []; // of pending, uploaded so far
@@ -39,7 +41,8 @@ export class TetsView {
       const first = this.chunks.length * kChunk;
       const n = Math.min(kChunk, tets.count - first);
       const mesh = staticMesh(this.chunk(new Uint32Array(tets.vertices, 4 * kTetWords * first, kTetWords * n)));
-      this.uploader.send(mesh.geometry, 4 * kTetWords * n);
+      if (tets.values) setValues(mesh.geometry, new Float32Array(tets.values, 16 * first, 4 * n));
+      this.uploader.send(mesh.geometry, (4 * kTetWords + (tets.values ? 16 : 0)) * n);
       mesh.geometry.setDrawRange(0, kTriangles.length * n);
       this.chunks.push(mesh);
     }
@@ -52,6 +55,7 @@ export class TetsView {
     this.group.remove(...old);
     dispose(old);
     for (const mesh of this.chunks) this.group.add(mesh);
+    this.hasValues = !!this.pending?.values;
     this.chunks = [];
     this.pending = null;
   }

@@ -9,6 +9,11 @@ import { staticMesh } from './static_mesh';
 const kBudgetMs = 4;
 const kBudgetBytes = 2e6;
 
+// The field's values at the vertices of a geometry; null: it has none.
+export function setValues(geometry: BufferGeometry, values: ArrayBuffer | Float32Array | null): void {
+  if (values) geometry.setAttribute('value', new BufferAttribute(new Float32Array(values), 1));
+}
+
 export class Uploader {
   private scene = new Scene();
   private target = new WebGLRenderTarget(1, 1);

@@ -11,7 +11,7 @@ const report = (message: Report, transfer: Transferable[] = []) => scope.postMes
 const core = createCore({ locateFile: () => wasmUrl });
 let session: StreamSession | null = null;
 let view: View | null = null;
-const extras: Extras = { edges: false, plane: null, box: null };
+const extras: Extras = { edges: false, values: false, plane: null, box: null };
 
 async function handle(request: Request): Promise<void> {
   const loaded = await core;
@@ -36,6 +36,10 @@ async function handle(request: Request): Promise<void> {
       if (extras.edges === request.wanted) return;
       extras.edges = request.wanted;
       return session?.remake();
+    case 'values':
+      if (extras.values === request.wanted) return;
+      extras.values = request.wanted;
+      return session?.remake();
     case 'shown':
       return session?.pageShows(request.version);
     case 'save':
@@ -51,4 +55,7 @@ scope.onmessage = ({ data }: MessageEvent<Request>) => {
   const failed = (error: unknown) => report({ type: 'error', text: `The client core failed: ${String(error)}` });
   last = last.then(() => handle(data)).catch(failed);
 };
-core.catch((error: unknown) => report({ type: 'error', text: `The client core cannot be loaded: ${String(error)}` }));
+core.then(
+  (loaded) => report({ type: 'palettes', palettes: loaded.palettes() }),
+  (error: unknown) => report({ type: 'error', text: `The client core cannot be loaded: ${String(error)}` }),
+);

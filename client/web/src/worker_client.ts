@@ -1,6 +1,7 @@
 // The page's side of the worker: sends what the view needs at a limited rate, and keeps the status current.
 import { streamUrl } from './datasets';
 import type { Box, Plane, Report, Request, View } from './messages';
+import { paletteOf } from './palette';
 import type { Range } from './range';
 import type { Status } from './status';
 import type { Store } from './store';
@@ -20,6 +21,7 @@ export interface Wanted {
   plane: Plane | null;
   tetsBox: Box | null;
   edges: boolean;
+  values: boolean; // of the field, for colours
 }
 
 export class WorkerClient {
@@ -76,6 +78,7 @@ export class WorkerClient {
     this.send({ type: 'clip', plane: wanted.plane });
     this.send({ type: 'tets', box: wanted.tetsBox });
     this.send({ type: 'edges', wanted: wanted.edges });
+    this.send({ type: 'values', wanted: wanted.values });
   }
 
   // Sends what differs from what was wanted before.
@@ -86,6 +89,7 @@ export class WorkerClient {
     this.requestCap();
     if (!sameJson(wanted.tetsBox, last?.tetsBox ?? null)) this.requestTets();
     if (wanted.edges !== (last?.edges ?? false)) this.send({ type: 'edges', wanted: wanted.edges });
+    if (wanted.values !== (last?.values ?? false)) this.send({ type: 'values', wanted: wanted.values });
   }
 
   // Shows a range of what was received, until the next view. One request at a time: the latest range is sent when the
@@ -140,6 +144,9 @@ export class WorkerClient {
         break;
       case 'opened':
         this.status.set({ opened: { times: this.status.value.opened.times + 1, resumed: report.resumed } });
+        break;
+      case 'palettes':
+        this.status.set({ palettes: report.palettes.map(paletteOf) });
         break;
       case 'progress':
         this.status.set({ progress: report.progress });

@@ -101,7 +101,7 @@ class Mesh {
   // groups: the faces on alpha, on beta and on the cube.
   piece(id, groups) {
     const indexOf = new Map();
-    const list = []; // vertices: p, and the normal n
+    const list = []; // vertices: p, the value f, and the normal n
     const indices = [];
     const edges = [];
     const edgeCounts = [0, 0, 0];
@@ -115,10 +115,10 @@ class Mesh {
           const key = `${v} ${group} ${group === 2 ? side : ''}`;
           if (!indexOf.has(key)) {
             indexOf.set(key, list.length);
-            const { p } = this.vertices[v];
+            const { p, f } = this.vertices[v];
             const ofCube = () => [0, 1, 2].map((d) => (d === axis ? (p[d] === 0 ? -1 : 1) : 0));
             const ofSurface = () => gradientDirection(p).map((x) => (group === 0 ? -x : x));
-            list.push({ p, n: group === 2 ? ofCube() : ofSurface() });
+            list.push({ p, f, n: group === 2 ? ofCube() : ofSurface() });
           }
           return indexOf.get(key);
         });
@@ -141,29 +141,33 @@ class Mesh {
     });
     const bound = (pick) => [0, 1, 2].map((d) => pick(...list.map(({ p }) => p[d])));
     return {
-      id, vertices, indices: new Uint32Array(indices).buffer, edges: wantsEdges ? new Uint32Array(edges).buffer : null,
+      id, vertices, values: valuesOf(list), indices: new Uint32Array(indices).buffer, edges: wantsEdges ? new Uint32Array(edges).buffer : null,
       triangles: groups.map((faces) => faces.length), edgeCounts, min: bound(Math.min), max: bound(Math.max),
     };
   }
   // The section by a plane, in samples.
   cap(plane) {
-    const corners = []; // of triangles: p, and the distances from the sides
+    const corners = []; // of triangles: p, the value f, and the distances from the sides
     for (const tet of this.tets) {
       const d = tet.map((v) => this.vertices[v].p.reduce((sum, x, i) => sum + x * plane.normal[i], -plane.offset));
       const pos = [0, 1, 2, 3].filter((i) => d[i] > 0);
       if (pos.length === 0 || pos.length === 4) continue;
       const neg = [0, 1, 2, 3].filter((i) => d[i] <= 0);
-      const point = (i, j) => this.vertices[tet[i]].p.map((x, k) => x + (d[i] / (d[i] - d[j])) * (this.vertices[tet[j]].p[k] - x));
+      const point = (i, j) => {
+        const [a, b] = [this.vertices[tet[i]], this.vertices[tet[j]]];
+        const between = (x, y) => x + (d[i] / (d[i] - d[j])) * (y - x);
+        return { p: a.p.map((x, k) => between(x, b.p[k])), f: between(a.f, b.f) };
+      };
       const edges =
         pos.length === 2 ? [[pos[0], neg[0]], [pos[0], neg[1]], [pos[1], neg[1]], [pos[1], neg[0]]]
         : pos.length === 1 ? neg.map((n) => [pos[0], n])
         : pos.map((p) => [p, neg[0]]);
       const points = edges.map(([i, j]) => point(i, j));
       const all = [[255, 0, 0], [0, 255, 0], [0, 0, 255]];
-      if (points.length === 3) corners.push(...points.map((p, i) => ({ p, sides: all[i] })));
+      if (points.length === 3) corners.push(...points.map((at, i) => ({ ...at, sides: all[i] })));
       // The side opposite to the second corner is the quadrilateral's diagonal: not drawn as an edge.
       else for (const triangle of [[0, 1, 2], [2, 3, 0]]) {
-        corners.push(...triangle.map((i, k) => ({ p: points[i], sides: [[255, 255, 0], [0, 255, 0], [0, 255, 255]][k] })));
+        corners.push(...triangle.map((i, k) => ({ ...points[i], sides: [[255, 255, 0], [0, 255, 0], [0, 255, 255]][k] })));
       }
     }
     const vertices = new ArrayBuffer(16 * corners.length);
@@ -173,7 +177,7 @@ class Mesh {
       sides.forEach((s, d) => view.setUint8(16 * i + 12 + d, s));
       view.setUint8(16 * i + 15, this.level);
     });
-    return { vertices, triangles: corners.length / 3 };
+    return { vertices, values: valuesOf(corners), triangles: corners.length / 3 };
   }
   // The tetrahedra whose centres are in a box, in samples.
   inBox(box) {
@@ -189,7 +193,7 @@ class Mesh {
         view.setUint8(at + 25, this.level);
       });
     });
-    return { vertices, count: tets.length, outOf: tets.length };
+    return { vertices, values: valuesOf(tets.flat().map((v) => this.vertices[v])), count: tets.length, outOf: tets.length };
   }
 }
 
@@ -199,10 +203,12 @@ let version = 0;
 let plane = null;
 let box = null;
 let wantsEdges = false;
+let wantsValues = false;
 let name = '';
 let timer = 0;
 
 const post = (report) => self.postMessage(report);
+const valuesOf = (list) => (wantsValues ? Float32Array.from(list, ({ f }) => f).buffer : null);
 const toSamples = (p) => p.map((x) => x + kSide / 2); // the origin of the world is the centre of the cube
 
 function postProgress(done) {
@@ -216,16 +222,16 @@ function postProgress(done) {
 }
 function postCap() {
   const inSamples = plane && { normal: plane.normal, offset: plane.offset + plane.normal.reduce((sum, n) => sum + (n * kSide) / 2, 0) };
-  post({ type: 'cap', cap: { plane, version, ...(inSamples && mesh ? mesh.cap(inSamples) : { vertices: new ArrayBuffer(0), triangles: 0 }) } });
+  post({ type: 'cap', cap: { plane, version, ...(inSamples && mesh ? mesh.cap(inSamples) : { vertices: new ArrayBuffer(0), values: null, triangles: 0 }) } });
 }
 function postTets() {
-  const none = { vertices: new ArrayBuffer(0), count: 0, outOf: 0 };
+  const none = { vertices: new ArrayBuffer(0), values: null, count: 0, outOf: 0 };
   post({ type: 'tets', tets: { box, ...(box && mesh ? mesh.inBox({ min: toSamples(box.min), max: toSamples(box.max) }) : none) } });
 }
 function postSurface(reset) {
   version++;
   const pieces = mesh.boundary();
-  post({ type: 'surface', change: { version, reset, pieces, removed: [] } });
+  post({ type: 'surface', change: { version, hasValues: wantsValues, reset, pieces, removed: [] } });
   if (plane) postCap();
   if (box) postTets();
 }
@@ -254,6 +260,10 @@ function open(dataset) {
   }, 3000);
 }
 
+// Two palettes: from blue to red, and from black to green.
+const palette = (name, color) => ({ name, colours: Uint8Array.from({ length: 768 }, (_, i) => color(Math.floor(i / 3))[i % 3]).buffer });
+post({ type: 'palettes', palettes: [palette('warm', (x) => [x, 0, 255 - x]), palette('green', (x) => [0, x, 0])] });
+
 self.onmessage = ({ data }) => {
   if (data.type === 'open') {
     open(data.dataset);
@@ -270,6 +280,10 @@ self.onmessage = ({ data }) => {
   } else if (data.type === 'edges') {
     wantsEdges = data.wanted;
     if (mesh) postSurface(false);
+  } else if (data.type === 'values') {
+    const isOther = data.wanted !== wantsValues;
+    wantsValues = data.wanted;
+    if (isOther && mesh) postSurface(false);
   } else if (data.type === 'save') {
     post({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
   }

@@ -11,8 +11,8 @@ const server = await createServer({
   appType: 'custom',
 });
 const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
-const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace'];
-const [{ fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec, frame, { PreviewPace }] = await Promise.all(kModules.map(load));
+const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette'];
+const [{ exclusive, fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette] = await Promise.all(kModules.map(load));
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -46,9 +46,12 @@ test('an address restores the view that it was written from', () => {
       region: { min: a.map((x, d) => Math.min(x, b[d])), max: a.map((x, d) => Math.max(x, b[d])) },
       tets: i % 2 === 0,
       shrink: 0.55,
-      thickness: i % 3 === 0,
+      thickness: i % 7 !== 0 && i % 3 === 0,
       wireframe: i % 2 === 1,
-      levels: i % 5 === 0,
+      levels: i % 7 !== 0 && i % 5 === 0,
+      colorBy: i % 7 ? 'surface' : 'value',
+      palette: [null, 'grey', 'a b&'][i % 3],
+      span: i % 2 ? [Math.min(a[1], b[1]), Math.max(a[1], b[1])] : null,
       alpha: { color: '#012345', opacity: 0.25 },
       beta: kDefaults.beta,
       box: { color: '#ffffff', opacity: 0 },
@@ -58,7 +61,7 @@ test('an address restores the view that it was written from', () => {
 });
 
 test('an invalid address gives the default view', () => {
-  const invalid = ['#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#range=2,1', '#range=1', '#range=a,b', '#range=inf,inf', '#range=1,', '#eye=1,1,1&at=1,1,1'];
+  const invalid = ['#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#range=2,1', '#range=1', '#range=a,b', '#range=inf,inf', '#range=1,', '#span=2,1&color=red', '#span=-inf,1', '#eye=1,1,1&at=1,1,1'];
   for (const hash of ['', '#', ...invalid]) {
     assert.deepEqual(fromHash(hash), kDefaults, hash);
   }
@@ -82,6 +85,36 @@ test('a range is that of the data set, or one within it', () => {
   assert.deepEqual(values.boundMoved([1, 2], 0, 3), [3, 3]);
   assert.deepEqual(values.boundMoved([1, 2], 1, 0), [0, 0]);
   assert.deepEqual(values.boundMoved([1, 2], 1, Infinity), [1, Infinity]);
+});
+
+test('the span of colours is the part of the range that the values reach, unless it is set', () => {
+  const every = { range: [-Infinity, Infinity], values: [-1, 5], hasEveryRange: true, hasRangesWithin: true };
+  const one = { range: [2, Infinity], values: [-1, 5], hasEveryRange: false, hasRangesWithin: false };
+  assert.deepEqual(palette.spanOf(every, null, null), [2, 5], 'the upper half, which is shown');
+  assert.deepEqual(palette.spanOf(every, [-3, 1], null), [-1, 1]);
+  assert.deepEqual(palette.spanOf(every, [-Infinity, Infinity], null), [-1, 5]);
+  assert.deepEqual(palette.spanOf(every, [8, 9], null), [5, 5]);
+  assert.deepEqual(palette.spanOf(one, [3, 4], null), [2, 5], 'this one shows its own range only');
+  assert.deepEqual(palette.spanOf(every, [1, 2], [-7, 99]), [-7, 99]);
+  for (const span of [[0, 0], [1 / 3, 1e-9 + 1 / 3], [-1e30, 5e-324]]) assert.deepEqual(fromHash(toHash({ ...kDefaults, span })).span, span);
+});
+
+test('colours show one thing at a time', () => {
+  assert.deepEqual(exclusive({ colorBy: 'value' }), { colorBy: 'value', thickness: false, levels: false });
+  for (const name of ['thickness', 'levels']) assert.deepEqual(exclusive({ [name]: true }), { [name]: true, colorBy: 'surface' });
+  for (const change of [{ colorBy: 'surface' }, { thickness: false }, { wireframe: true }]) assert.deepEqual(exclusive(change), change);
+  const { colorBy, thickness, levels } = fromHash('#color=value&show=thickness,levels');
+  assert.deepEqual([colorBy, thickness, levels], ['value', false, false]);
+});
+
+test('a palette has its bytes as colours, and the default stands in for one that is not known', () => {
+  const bytes = Uint8Array.from({ length: 768 }, () => Math.floor(random(0, 256)));
+  const grey = palette.paletteOf({ name: 'grey', colours: bytes.buffer });
+  assert.deepEqual(grey.colors.flat().map((x) => Math.round(255 * x)), [...bytes]);
+  const other = { name: 'ice', colors: [] };
+  assert.equal(palette.chosenPalette([other, grey], 'grey'), grey);
+  for (const name of [null, 'none']) assert.equal(palette.chosenPalette([other, grey], name), other);
+  assert.equal(palette.chosenPalette([], 'grey'), null);
 });
 
 test('the share that a range encloses is the sum over what lies between', () => {
