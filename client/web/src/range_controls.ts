@@ -23,6 +23,7 @@ export function watchRange(view: Store<ViewState>, status: Store<Status>, previe
   const chart = element('histogram');
   let moving: Range | null = null; // by a handle, and not yet in the view
   let restTimer = 0;
+  let restFrame = 0;
 
   const current = (): Range | null => {
     const { dataset } = status.value;
@@ -45,8 +46,12 @@ export function watchRange(view: Store<ViewState>, status: Store<Status>, previe
     const share = enclosedShare(statistics, range);
     setText(element('range-volume'), `encloses ${short(share * boxVolume(dataset))} ${volumeUnit(dataset)}, ${(100 * share).toPrecision(3)} % of the box`);
   };
-  const commit = () => {
+  const cancelRest = () => {
     window.clearTimeout(restTimer);
+    window.cancelAnimationFrame(restFrame);
+  };
+  const commit = () => {
+    cancelRest();
     if (moving) view.set({ range: moving });
     moving = null;
     show();
@@ -58,8 +63,9 @@ export function watchRange(view: Store<ViewState>, status: Store<Status>, previe
     moving = boundMoved(range, end, to);
     preview(moving);
     show();
-    window.clearTimeout(restTimer);
-    restTimer = window.setTimeout(commit, kRestMs);
+    cancelRest();
+    // Moves arrive with frames: while one is drawn for longer than that, the handle may have moved on.
+    restTimer = window.setTimeout(() => (restFrame = window.requestAnimationFrame(commit)), kRestMs);
   };
 
   fields.forEach((field, end) => {
