@@ -20,7 +20,7 @@ after(async () => {
 describe('After the server is lost', () => {
   test('the page reconnects and resumes the stream without repeated updates', async () => {
     const first = await serve(data);
-    const port = await throttledProxy(first.port, 40_000);
+    const port = await throttledProxy(first.port, 20_000);
     const { page, close } = await open(browser, `http://127.0.0.1:${port}/#data=buckyball&roi=-100,-100,-100,100,100,100`);
     await page.waitForFunction(() => window.intervale.progress?.updates > 3000);
     await first.kill();

@@ -55,7 +55,7 @@ export async function startFakeServer(token = null) {
 
 // The page at an address. Its `problems` collect console errors and warnings, exceptions, and violations of the policy.
 // script: a function that runs in the page before its own scripts.
-export async function openPage(browser, url, { width = 1280, height = 800, theme = 'dark', script } = {}) {
+export async function openPage(browser, url, { width = 800, height = 560, theme = 'dark', script } = {}) {
   const context = await browser.newContext({ viewport: { width, height }, colorScheme: theme, acceptDownloads: true });
   const page = await context.newPage();
   page.problems = [];

@@ -4,7 +4,7 @@
 
 const kSide = 48; // of the cube, in sample spacings
 const kRange = [-0.45, 0.75];
-const kGrids = [6, 12, 24]; // cells per side
+const kGrids = [4, 8, 16]; // cells per side
 const kPieceSide = 16; // of a piece of the boundary surface, in sample spacings
 
 const field = (x, y, z) => {
