@@ -52,7 +52,7 @@ Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
   for (const Range& range : shown.ranges) ranges.emplace_back(range.alpha, range.beta);
   const auto in_order = ranges.empty() ? 0 : out.CreateVectorOfStructs(ranges);
   const auto refine = std::uint8_t(shown.refine ? 1 + int(*shown.refine) : 0);
-  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine);
+  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early);
 }
 
 Offset<fbs::Credit> encode_body(FlatBufferBuilder& out, const Credit& message) { return fbs::CreateCredit(out, message.bytes); }
@@ -124,7 +124,7 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
                         .pixel_error = c->pixel_error()};
   }
   if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
-  View view{table.epoch(), lod, table.room(), {}, {}};
+  View view{table.epoch(), lod, table.room(), {}, {}, table.early()};
   if (const auto* ranges = table.ranges(); VectorLength(ranges) > 0) {
     if (ranges->size() > kMaxRanges)
       return malformed("a view of " + std::to_string(ranges->size()) + " ranges, of which at most " + std::to_string(kMaxRanges) + " can be shown");

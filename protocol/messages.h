@@ -67,6 +67,9 @@ struct View {
   std::vector<SlotGroup> forget = {};
   // What is shown of the data set, at most kMaxRanges ranges; both sides code the answers for it (common/codec/batch.h).
   RangeRequest shown = {};
+  // The server may begin before it is known how far the surfaces of the ranges move. The mesh may get finer than the
+  // view asks for.
+  bool early = false;
   friend bool operator==(const View&, const View&) = default;
 };
 struct Credit {

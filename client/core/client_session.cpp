@@ -23,7 +23,7 @@ Result<void> ClientSession::look(ViewRequest request) {
   if (mesh_) {
     if (auto shown = mesh_->show(request.shown); !shown) return shown;
   }
-  view_ = request;
+  view_ = std::move(request);
   if (mesh_ && view_->camera) mesh_->look(*view_->camera);
   if (state_ != State::connecting) send_view();
   return {};
@@ -175,6 +175,7 @@ void ClientSession::send_haves() {
 void ClientSession::send_view() {
   protocol::View view{++epoch_, view_->lod};
   view.shown = view_->shown;
+  view.early = view_->early;
   if (shown_.empty() || shown_.back().shown != view.shown) shown_.push_back({epoch_, view.shown});
   if (mesh_) {
     mesh_->set_budget(view_->budget, epoch_);

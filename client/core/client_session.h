@@ -31,6 +31,7 @@ struct ViewRequest {
   std::optional<Camera> camera = {};
   Budget budget = {};
   RangeRequest shown = {};  // of the data set
+  bool early = false;       // see protocol::View
 };
 
 // On one thread.

@@ -95,11 +95,8 @@ std::size_t RelevantUpdates::memory_bytes() const {
          brick_object_error_.size() * sizeof(float) + error_.size() * sizeof(float);
 }
 
-RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each) {
+RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown) {
   const SupercubeSet& set = volume.set();
-  ShownRanges shown;
-  shown.reserve(each.size());
-  for (const auto& one : each) shown.insert(shown.end(), one->shown().begin(), one->shown().end());
   std::vector<std::uint64_t> slots(set.supercubes());
   std::vector<ErrorToDistance> to_distance(set.supercubes());
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
@@ -110,8 +107,7 @@ RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared
       }
     });
   }
-  return {volume.description().grid, set, {volume.steps(), volume.error_steps()}, distinct(std::move(shown)), std::move(slots),
-          std::move(to_distance)};
+  return {volume.description().grid, set, {volume.steps(), volume.error_steps()}, std::move(shown), std::move(slots), std::move(to_distance)};
 }
 
 }  // namespace intervale

@@ -94,8 +94,9 @@ class RelevantUpdates {
   float reach_ = 0;                                 // the largest object error for h = 1: half a diamond's width
 };
 
-// What several ranges need: an update is relevant if it is to any of them, and the surfaces around it can move as far as
-// those of the range that can move farthest. each: of this volume, one at least. O(updates).
-[[nodiscard]] RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each);
+// What several ranges, or the parts of one, need together: an update is relevant if it is to any of them, and the surfaces
+// around it can move as far as those that can move farthest. each: of this volume, one at least. shown: the ranges.
+// O(updates).
+[[nodiscard]] RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown);
 
 }  // namespace intervale

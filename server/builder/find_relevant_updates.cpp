@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "common/util/bits.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/error_to_distance.h"
+#include "server/builder/estimate_distances.h"
 
 namespace intervale {
 namespace {
@@ -66,7 +68,7 @@ RangeOfField field_of(const IntervalVolume& from, const Range& range) {
   return field;
 }
 
-std::vector<ErrorToDistance> distances(const IntervalVolume& volume, const Range& range, const std::vector<std::uint64_t>& slots) {
+std::vector<ErrorToDistance> measured(const IntervalVolume& volume, const Range& range, const std::vector<std::uint64_t>& slots) {
   const SupercubeSet& all = volume.set();
   std::vector<SupercubeKey> keys;
   std::vector<std::uint64_t> occupancy;
@@ -85,32 +87,48 @@ std::vector<ErrorToDistance> distances(const IntervalVolume& volume, const Range
   }
   const SupercubeSet relevant(keys, std::move(occupancy));
   const RangeOfField field = field_of(volume, range);
-  const auto measured = measure_error_to_distance(
+  const auto found = measure_error_to_distance(
       field.volume, field.range, volume.domain(), relevant, [&](UpdateIndex i) { return double(volume.error_steps()[steps[i]]); },
       volume.description().max_error);
   std::vector<ErrorToDistance> result(all.supercubes());
-  for (std::size_t i = 0; i < number.size(); ++i) result[number[i]] = measured[i];
+  for (std::size_t i = 0; i < number.size(); ++i) result[number[i]] = found[i];
   return result;
 }
 
 }  // namespace
 
-std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRange& shown,
-                                                             bool has_distances) {
-  if (shown == volume->description().whole()) return {volume, &volume->relevant()};
-  const UpdateErrors errors{volume->steps(), volume->error_steps()};
-  std::vector<std::uint64_t> slots = relevant_slots(*volume, shown, on_all_cores);
-  std::vector<ErrorToDistance> to_distance =
-      has_distances ? distances(*volume, shown.range, slots) : std::vector<ErrorToDistance>(volume->set().supercubes());
-  return std::make_shared<const RelevantUpdates>(volume->description().grid, volume->set(), errors, ShownRanges{shown}, std::move(slots),
+std::vector<ShownRange> parts_of(const ShownRange& shown) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const auto [alpha, beta] = shown.range;
+  std::vector<ShownRange> parts;
+  if (shown.refine == Refine::uniform || (alpha == -kInfinity && beta == kInfinity)) parts.push_back(shown);
+  if (alpha != -kInfinity) parts.push_back({{alpha, kInfinity}, Refine::boundary});
+  if (beta != kInfinity) parts.push_back({{-kInfinity, beta}, Refine::boundary});
+  return parts;
+}
+
+std::shared_ptr<const RelevantUpdates> find_relevant_part(const IntervalVolume& volume, const ShownRange& part, Distances distances) {
+  const UpdateErrors errors{volume.steps(), volume.error_steps()};
+  std::vector<std::uint64_t> slots = relevant_slots(volume, part, on_all_cores);
+  std::vector<ErrorToDistance> to_distance(volume.set().supercubes());
+  if (part.refine == Refine::boundary && distances == Distances::estimated) to_distance = estimate_distances(volume, part.range, slots, on_all_cores);
+  if (part.refine == Refine::boundary && distances == Distances::measured) to_distance = measured(volume, part.range, slots);
+  return std::make_shared<const RelevantUpdates>(volume.description().grid, volume.set(), errors, ShownRanges{part}, std::move(slots),
                                                  std::move(to_distance));
 }
 
 std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,
-                                                             bool has_distances) {
+                                                             Distances distances) {
+  if (shown.size() == 1 && shown.front() == volume->description().whole()) return {volume, &volume->relevant()};
   std::vector<std::shared_ptr<const RelevantUpdates>> each;
-  for (const ShownRange& one : distinct(shown)) each.push_back(find_relevant_updates(volume, one, has_distances));
-  return each.size() == 1 ? each.front() : std::make_shared<const RelevantUpdates>(united(*volume, each));
+  for (const ShownRange& one : shown) {
+    if (one == volume->description().whole()) {
+      each.emplace_back(volume, &volume->relevant());
+      continue;
+    }
+    for (const ShownRange& part : parts_of(one)) each.push_back(find_relevant_part(*volume, part, distances));
+  }
+  return std::make_shared<const RelevantUpdates>(united(*volume, each, distinct(shown)));
 }
 
 }  // namespace intervale

@@ -75,7 +75,7 @@ struct Extracted {
 };
 
 Result<Extracted> extract_ranges(const ExtractCommand& options, const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown) {
-  const auto relevant = find_relevant_updates(volume, shown, options.lod.camera.has_value());
+  const auto relevant = find_relevant_updates(volume, shown, options.lod.camera ? Distances::measured : Distances::none);
   Progress progress("extracting " + volume->description().name);
   const ParallelFor parallel = with_progress(progress);
   const auto fronts = extract(*volume, *relevant, shown, options.lod, parallel);

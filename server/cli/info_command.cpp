@@ -44,7 +44,7 @@ Result<double> enclosed_volume(const std::shared_ptr<const ValueVolume>& set, co
 Result<double> enclosed_volume(const std::shared_ptr<const IntervalVolume>& set, const Range& range) {
   const ShownRange shown = resolve(set->description(), range, {});
   if (auto held = check_held(set->description(), shown); !held) return tl::unexpected(held.error());
-  const auto extracted = extract(*set, *find_relevant_updates(set, shown, false), {}, on_all_cores);
+  const auto extracted = extract(*set, *find_relevant_updates(set, {shown}, Distances::none), {}, on_all_cores);
   if (!extracted) return tl::unexpected(extracted.error());
   return volume_of(extracted->front.mesh(on_all_cores));
 }

@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "protocol/transport/tls.h"
-#include "server/builder/find_relevant_updates.h"
 #include "server/serve/access.h"
 #include "server/serve/admission.h"
 #include "server/serve/atomic_shared_ptr.h"
@@ -22,10 +21,7 @@ namespace intervale {
 // Outlives every session. options and viewer do not change while serving.
 struct ServerContext {
   explicit ServerContext(const ServeOptions& requested)
-      : options(requested),
-        ranges([](const RangeCache::Volume& volume, const ShownRange& shown) { return find_relevant_updates(volume, shown, true); }),
-        write_budget(requested.max_queued_bytes),
-        scheduler(requested.threads) {}
+      : options(requested), write_budget(requested.max_queued_bytes), scheduler(requested.threads) {}
   const ServeOptions options;            // threads is not 0
   AtomicSharedPtr<Catalogue> catalogue;  // nullptr: still loading
   RangeCache ranges;

@@ -7,30 +7,40 @@
 
 namespace intervale {
 
-RangeCache::Relevant RangeCache::compute(const Volume& volume, const ShownRanges& shown) {
-  if (shown.size() == 1) return find_(volume, shown.front());
+RangeCache::RangeCache(Find find, std::size_t most_bytes)
+    : find_(std::move(find)), most_bytes_(most_bytes), measuring_([this](const std::stop_token& stop) { measure_all(stop); }) {}
+
+RangeCache::Relevant RangeCache::compute(const Volume& volume, const ShownRanges& shown, Distances distances) {
+  const bool is_one = shown.size() == 1;
+  const std::vector<ShownRange> parts = is_one ? parts_of(shown.front()) : shown;
   std::vector<Relevant> each;
-  each.reserve(shown.size());
-  for (const ShownRange& one : shown) each.push_back(get(volume, {one}));
-  return std::make_shared<const RelevantUpdates>(united(*volume, each));
+  each.reserve(parts.size());
+  for (const ShownRange& part : parts) {
+    each.push_back(is_one && part == shown.front() ? find_(*volume, part, distances) : get(volume, {part}, distances));
+  }
+  if (each.size() == 1) return each.front();
+  return std::make_shared<const RelevantUpdates>(united(*volume, each, shown));
 }
 
-RangeCache::Relevant RangeCache::get(const Volume& volume, const ShownRanges& shown) {
+std::list<RangeCache::Entry>::iterator RangeCache::find_entry(const Volume& volume, const ShownRanges& shown, Distances distances) {
+  return std::find_if(entries_.begin(), entries_.end(),
+                      [&](const Entry& entry) { return entry.distances == distances && entry.shown == shown && entry.volume.lock() == volume; });
+}
+
+RangeCache::Relevant RangeCache::get(const Volume& volume, const ShownRanges& shown, Distances distances) {
   if (shown.size() == 1 && shown.front() == volume->description().whole()) return {volume, &volume->relevant()};
   std::promise<Relevant> promise;
   std::unique_lock lock(mutex_);
-  const auto known =
-      std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.shown == shown && entry.volume.lock() == volume; });
-  if (known != entries_.end()) {
+  if (const auto known = find_entry(volume, shown, distances); known != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, known);
     const std::shared_future<Relevant> relevant = known->relevant;
     lock.unlock();
     return relevant.get();
   }
-  const auto entry = entries_.insert(entries_.begin(), Entry{volume, shown, promise.get_future().share()});
+  const auto entry = entries_.insert(entries_.begin(), Entry{volume, shown, distances, promise.get_future().share()});
   lock.unlock();
   try {
-    Relevant relevant = compute(volume, shown);
+    Relevant relevant = compute(volume, shown, distances);
     promise.set_value(relevant);
     lock.lock();
     entry->bytes = relevant->memory_bytes();
@@ -51,6 +61,48 @@ void RangeCache::drop_old() {
     bytes += entry->bytes;
     const bool is_computed = entry->bytes != 0, is_first = entry == entries_.begin();
     entry = is_computed && (entry->volume.expired() || (bytes > most_bytes_ && !is_first)) ? entries_.erase(entry) : std::next(entry);
+  }
+}
+
+std::shared_ptr<const RangeCache::Measurement> RangeCache::measure(const Volume& volume, const ShownRanges& shown, std::function<void()> on_ready) {
+  const auto request = std::make_shared<Measurement>();
+  request->volume_ = volume;
+  request->shown_ = shown;
+  request->on_ready_ = std::move(on_ready);
+  std::unique_lock lock(mutex_);
+  const auto known = find_entry(volume, shown, Distances::measured);
+  if ((known != entries_.end() && known->bytes != 0) || ShownRanges{volume->description().whole()} == shown) {
+    lock.unlock();
+    request->promise_.set_value(get(volume, shown, Distances::measured));
+    return request;
+  }
+  std::erase_if(requests_, [](const auto& other) { return other.expired(); });
+  requests_.push_back(request);
+  has_requests_.notify_one();
+  return request;
+}
+
+void RangeCache::stop() {
+  measuring_.request_stop();
+  if (measuring_.joinable()) measuring_.join();
+}
+
+void RangeCache::measure_all(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (has_requests_.wait(lock, stop, [this] { return !requests_.empty(); }) && !stop.stop_requested()) {
+    auto request = requests_.back().lock();
+    requests_.pop_back();
+    lock.unlock();
+    if (request) {
+      try {
+        request->promise_.set_value(get(request->volume_, request->shown_, Distances::measured));
+      } catch (...) {
+        request->promise_.set_exception(std::current_exception());
+      }
+      request->on_ready_();
+      request.reset();
+    }
+    lock.lock();
   }
 }
 

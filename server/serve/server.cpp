@@ -137,6 +137,7 @@ void Server::stop() {
   running_->io.stop();
   for (std::thread& thread : running_->threads) thread.join();
   running_->context.scheduler.clear();
+  running_->context.ranges.stop();
 }
 
 }  // namespace intervale

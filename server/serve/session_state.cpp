@@ -17,6 +17,14 @@ Fault other_version(std::uint32_t payload) {
                                         (theirs < protocol::kPayloadVersion ? ": update the client" : ": update the server")};
 }
 
+constexpr double kCoarser = 4;
+
+// For estimates, which are up to this many times too large for most diamonds.
+Lod coarser(Lod lod) {
+  lod.camera->pixel_error *= kCoarser;
+  return lod;
+}
+
 }  // namespace
 
 std::optional<Fault> SessionState::receive(const protocol::ClientMessage& message) {
@@ -56,8 +64,12 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
   plan_->set_room(view.room.value_or(UINT64_MAX));
   epoch_ = view.epoch;
-  new_lod_ = view.lod;
+  lod_ = view.lod;
+  if (shown_ != shown || !lod_.camera) measurement_.reset();
   shown_ = std::move(shown);
+  is_early_ = view.early;
+  is_new_ = true;
+  waits_ = false;
   view_ = ViewState::unanswered;
   target_ = kFirstPayload;
   return {};
@@ -75,14 +87,45 @@ std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
   return {};
 }
 
+void SessionState::set_relevant(RangeCache::Relevant relevant, bool is_measured) {
+  plan_->set_relevant(std::move(relevant));
+  planned_ = shown_;
+  is_measured_ = is_measured;
+}
+
+// Without a camera distances do not matter. With one, a view that takes estimates begins with them, coarser than it asks
+// for, since what an estimate sends too much stays; it is completed when they are measured. Other views wait for that.
+// False if this one does.
+bool SessionState::begin_view() {
+  const bool is_planned = planned_ == shown_;
+  const bool has_needed = is_planned && (is_measured_ || !lod_.camera);
+  if (!is_new_ && has_needed) return true;
+  if (!has_needed && lod_.camera && measure()) {
+    is_new_ = true;
+  } else if (measurement_ && (!is_early_ || lod_.max_updates)) {
+    return false;
+  } else if (!is_planned) {
+    set_relevant(ranges_.get(volume_, shown_, Distances::estimated), shown_ == ShownRanges{volume_->description().whole()});
+  }
+  if (std::exchange(is_new_, false)) plan_->set_lod(measurement_ ? coarser(lod_) : lod_);
+  return true;
+}
+
+// Whether distances of the view's ranges are measured: the plan has them then.
+bool SessionState::measure() {
+  if (!measurement_) measurement_ = ranges_.measure(volume_, shown_, wake_);
+  if (!measurement_->is_ready()) return false;
+  set_relevant(std::exchange(measurement_, nullptr)->result(), true);
+  return true;
+}
+
 std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
   if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
   if (!has_work()) return {};
-  if (new_lod_) {
-    if (planned_ != shown_) plan_->set_relevant(ranges_.get(volume_, shown_));
-    planned_ = shown_;
-    plan_->set_lod(*std::exchange(new_lod_, std::nullopt));
+  if (!begin_view()) {
+    waits_ = true;
+    return {};
   }
   // A batch does not use all the credit: the connection would be idle until the client's next grant arrives. Clients
   // grant a quarter of their window or more, and a batch takes about half of its bound.
@@ -91,7 +134,8 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   const std::uint64_t size = std::min(bound, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
   auto batch = plan_->next(size);
   if (!batch) {
-    if (!plan_->done()) return {};
+    waits_ = plan_->done() && measurement_;
+    if (!plan_->done() || measurement_) return {};
     view_ = ViewState::done;
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }

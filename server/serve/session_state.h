@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,16 +26,22 @@ class SessionState {
   SessionState(const AtomicSharedPtr<Catalogue>& catalogue, RangeCache& ranges, std::shared_ptr<const Scope> scope)
       : catalogue_(catalogue), ranges_(ranges), scope_(std::move(scope)) {}
 
+  // Before the first message. wake: called on another thread when a session that waits() should go on; perhaps also
+  // later, even after the session.
+  void set_wake(std::function<void()> wake) { wake_ = std::move(wake); }
+
   // Handles a client's message. A fault ends the session: call nothing afterwards.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
   // The next message to send. nullopt: none now; call again if has_work(). max_payload bounds a batch's payload. With
   // has_work() a call takes about a millisecond for each 16 KiB of max_payload, and in addition the first call for a view
-  // with max_updates O(updates of the data set), and for new ranges the time of RangeCache::get().
+  // with max_updates O(updates of the data set), and for new ranges the time of RangeCache::get() with estimates.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
   // There may be a batch to select and encode.
-  [[nodiscard]] bool has_work() const { return opened_was_sent_ && is_streaming() && !needs_credit(); }
+  [[nodiscard]] bool has_work() const { return opened_was_sent_ && is_streaming() && !needs_credit() && !waits(); }
+  // Until it is known how far surfaces of new ranges move.
+  [[nodiscard]] bool waits() const { return waits_ && measurement_ && !measurement_->is_ready(); }
   // Nothing was sent yet for the last view.
   [[nodiscard]] bool view_is_unanswered() const { return view_ == ViewState::unanswered; }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
@@ -53,6 +60,9 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
   std::optional<protocol::Fault> on(const protocol::Have& have);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
+  bool begin_view();
+  bool measure();
+  void set_relevant(RangeCache::Relevant relevant, bool is_measured);
 
   const AtomicSharedPtr<Catalogue>& catalogue_;
   RangeCache& ranges_;
@@ -60,9 +70,15 @@ class SessionState {
   Catalogue::Volume volume_;
   std::string dataset_;
   std::optional<StreamPlan> plan_;
-  std::optional<Lod> new_lod_;  // the last view, until the plan has it
-  ShownRanges shown_;           // of the last view, as distinct() gives them
-  ShownRanges planned_;         // that the plan has
+  Lod lod_;                                                     // of the last view
+  ShownRanges shown_;                                           // of the last view, as distinct() gives them
+  bool is_early_ = false;                                       // the last view takes estimates
+  bool is_new_ = false;                                         // the plan does not have the last view yet
+  ShownRanges planned_;                                         // that the plan has
+  bool is_measured_ = true;                                     // how far surfaces move, of those
+  std::shared_ptr<const RangeCache::Measurement> measurement_;  // of shown_; nullptr if there is no need
+  bool waits_ = false;                                          // nothing more can be sent before measurement_ is ready
+  std::function<void()> wake_ = [] {};
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding
   std::uint64_t last_grant_ = 0;

@@ -67,6 +67,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     const auto endpoint = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
     log_session(id_, spdlog::level::info, "from {}:{}", endpoint.address().to_string(), endpoint.port());
     registration_ = context_.connections.add(shared_from_this());
+    state_.set_wake([weak = weak_from_this()] {
+      if (const auto self = weak.lock()) asio::post(self->ws_.get_executor(), [self] { self->writer_wakeup_.cancel(); });
+    });
     spawn(run(shared_from_this(), request));
   }
 

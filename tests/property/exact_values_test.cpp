@@ -135,7 +135,7 @@ TEST_P(ExactValues, MeshesAreThoseOfTheSamplesInBothScopesAndThroughStreams) {
     ASSERT_TRUE(expected);
     expect_naive(*expected, range, *one);
     const auto digest = mesh_digest(expected->front.mesh());
-    const auto extracted = extract(*every, *find_relevant_updates(every, {range, refine}, true), {});
+    const auto extracted = extract(*every, *find_relevant_updates(every, {{range, refine}}, Distances::measured), {});
     ASSERT_TRUE(extracted);
     EXPECT_EQ(mesh_digest(extracted->front.mesh()), digest);
     ViewRequest view;

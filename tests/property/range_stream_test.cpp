@@ -52,6 +52,7 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
   [[nodiscard]] ViewRequest random_view() {
     ViewRequest view;
     view.shown = random_request();
+    view.early = random() % 2 == 0;
     if (random() % 2 == 0) view.lod.error_percent = double(random() % 40);
     if (random() % 3 == 0) view.lod.max_updates = random() % (volume->size() + 10);
     if (random() % 3 == 0) {
@@ -68,7 +69,7 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
     ASSERT_EQ(session.mesh()->fronts().size(), shown.size());
     std::uint64_t updates = 0;
     for (std::size_t i = 0; i < shown.size(); ++i) {
-      const auto expected = extract(*volume, *find_relevant_updates(volume, shown[i], false), view.lod);
+      const auto expected = extract(*volume, *find_relevant_updates(volume, {shown[i]}, Distances::none), view.lod);
       ASSERT_TRUE(expected);
       EXPECT_EQ(mesh_digest(session.mesh()->fronts()[i].mesh()), mesh_digest(expected->front.mesh())) << "range " << i << " of " << shown.size();
       updates += expected->updates;
@@ -162,6 +163,7 @@ TEST_P(RangeStream, AFreshClientHasTheMeshesOfItsRanges) {
     const ViewRequest seen = [&] {
       ViewRequest with = random_view();
       with.shown = view.shown;
+      with.early = false;
       return with;
     }();
     ClientSession other({.dataset = "made", .client = "test"});
@@ -169,7 +171,7 @@ TEST_P(RangeStream, AFreshClientHasTheMeshesOfItsRanges) {
     testing::SessionServer again(volume, other);
     again.run();
     const ShownRanges shown = resolve(volume->description(), seen.shown);
-    const auto expected = extract(*volume, *find_relevant_updates(volume, shown, true), shown, seen.lod);
+    const auto expected = extract(*volume, *find_relevant_updates(volume, shown, Distances::measured), shown, seen.lod);
     ASSERT_TRUE(expected);
     for (std::size_t i = 0; i < shown.size(); ++i)
       EXPECT_EQ(mesh_digest(other.mesh()->fronts()[i].mesh()), mesh_digest((*expected)[i].front.mesh())) << "range " << i;
@@ -179,6 +181,7 @@ TEST_P(RangeStream, AFreshClientHasTheMeshesOfItsRanges) {
 // What is on its way is the same for ranges in another order, and with one of them twice.
 TEST_P(RangeStream, OrderAndRepetitionDoNotMatterToTheServer) {
   ViewRequest view = random_view();
+  view.early = false;
   ClientSession one({.dataset = "made", .client = "test"}), other({.dataset = "made", .client = "test"});
   ASSERT_TRUE(one.look(view));
   std::shuffle(view.shown.ranges.begin(), view.shown.ranges.end(), random);
@@ -189,6 +192,26 @@ TEST_P(RangeStream, OrderAndRepetitionDoNotMatterToTheServer) {
   b.run();
   EXPECT_EQ(one.stats().bytes, other.stats().bytes);
   EXPECT_EQ(one.mesh()->updates(), other.mesh()->updates());
+}
+
+// What an early view ends with has everything that the same view wants otherwise.
+TEST_P(RangeStream, AnEarlyViewIsNoCoarser) {
+  ClientSession session({.dataset = "made", .client = "test"});
+  session.look({});
+  testing::SessionServer server(volume, session);
+  server.run(1);
+  for (int i = 0; i < 4; ++i) {
+    ViewRequest view = random_view();
+    view.early = true;
+    ASSERT_TRUE(session.look(view));
+    server.run();
+    expect_valid(session);
+    const std::uint64_t updates = session.mesh()->updates();
+    view.early = false;
+    ASSERT_TRUE(session.look(view));
+    server.run();
+    EXPECT_EQ(session.mesh()->updates(), updates);
+  }
 }
 
 TEST_P(RangeStream, RefusesMoreRangesThanCanBeShown) {

@@ -5,12 +5,12 @@
 
 #include <chrono>
 #include <memory>
+#include <semaphore>
 #include <utility>
 #include <vector>
 
 #include "client/core/client_session.h"
 #include "protocol/codec.h"
-#include "server/builder/find_relevant_updates.h"
 #include "server/serve/access.h"
 #include "server/serve/atomic_shared_ptr.h"
 #include "server/serve/catalogue.h"
@@ -22,19 +22,27 @@ namespace intervale::testing {
 template <class Client>
 class SessionServer {
  public:
-  SessionServer(const std::shared_ptr<const IntervalVolume>& volume, Client& client) : client_(client) {
+  // find: as of RangeCache.
+  SessionServer(const std::shared_ptr<const IntervalVolume>& volume, Client& client, RangeCache::Find find = find_relevant_part)
+      : ranges_(std::move(find)), client_(client) {
     Catalogue catalogue;
     EXPECT_TRUE(catalogue.add(volume));
     catalogue_.store(std::make_shared<const Catalogue>(std::move(catalogue)));
+    state_.set_wake([this] { woken_.release(); });
     client_.connected(now_);
   }
 
-  // Until neither side has anything to send, or so many messages were sent to the client.
-  void run(int messages = 1 << 20) {
+  // Until neither side has anything to send, or so many messages were sent to the client. may_wait: for the server's
+  // measuring of distances; otherwise that is an end, too.
+  void run(int messages = 1 << 20, bool may_wait = true) {
     while (messages > 0) {
       ASSERT_NO_FATAL_FAILURE(take_messages());
       auto message = state_.next(2048);
       if (!message && state_.has_work()) continue;
+      if (!message && state_.waits() && may_wait) {
+        woken_.acquire();
+        continue;
+      }
       if (!message) return;
       now_ += std::chrono::milliseconds(1);
       const auto event = client_.receive(protocol::encode(*message), now_);
@@ -59,7 +67,8 @@ class SessionServer {
   }
 
   AtomicSharedPtr<Catalogue> catalogue_;
-  RangeCache ranges_{[](const RangeCache::Volume& of, const ShownRange& shown) { return find_relevant_updates(of, shown, true); }};
+  std::counting_semaphore<> woken_{0};
+  RangeCache ranges_;
   SessionState state_{catalogue_, ranges_, Scope::everything()};
   Client& client_;
   std::vector<protocol::ClientMessage> received_;

@@ -135,26 +135,6 @@ TEST(ClientSession, TellsBothVersionsOfBatches) {
   }
 }
 
-// The server's side of the same.
-TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
-  const AtomicSharedPtr<Catalogue> catalogue;
-  RangeCache ranges({});
-  const struct {
-    std::uint32_t payload;
-    const char* text;
-  } cases[] = {{0, "the client reads batches of version 1, and this server sends version 3: update the client"},
-               {1, "the client reads batches of version 1, and this server sends version 3: update the client"},
-               {4, "the client reads batches of version 4, and this server sends version 3: update the server"}};
-  for (const auto& c : cases) {
-    SessionState state(catalogue, ranges, Scope::everything());
-    const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});
-    ASSERT_TRUE(fault);
-    EXPECT_EQ(fault->code, CloseCode::other_version);
-    EXPECT_EQ(fault->text, c.text);
-    EXPECT_FALSE(state.opened());
-  }
-}
-
 // A session that has received Opened, all within a credit of 5120 bytes.
 struct ClientSessionRefuses : ::testing::Test {
   std::shared_ptr<const IntervalVolume> volume = volume_of(9);

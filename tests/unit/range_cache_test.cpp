@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <limits>
+#include <semaphore>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "server/builder/find_relevant_updates.h"
@@ -16,11 +19,17 @@ namespace {
 struct RangeCacheTest : ::testing::Test {
   std::shared_ptr<const IntervalVolume> volume = testing::build_shared(testing::gyroid({9, 9, 9}), {.range = {-1, 1}, .refine = Refine::uniform});
   std::atomic<int> found = 0;
-  RangeCache::Find find = [this](const RangeCache::Volume& of, const ShownRange& shown) {
+  RangeCache::Find find = [this](const IntervalVolume& of, const ShownRange& part, Distances distances) {
     ++found;
-    return find_relevant_updates(of, shown, false);
+    return find_relevant_part(of, part, distances);
   };
-  static ShownRanges shown(int number) { return {{{0, 0.01 * number}, Refine::boundary}}; }
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  // A range with one surface.
+  static ShownRanges above(int number) { return {{{0.01 * number, kInfinity}, Refine::boundary}}; }
+  static ShownRanges between(double low, double high) { return {{{low, high}, Refine::boundary}}; }
+  [[nodiscard]] static RangeCache::Relevant get(RangeCache& cache, const RangeCache::Volume& of, const ShownRanges& shown) {
+    return cache.get(of, shown, Distances::estimated);
+  }
 };
 
 TEST_F(RangeCacheTest, FindsEachRangeOnceForAllThreads) {
@@ -28,65 +37,114 @@ TEST_F(RangeCacheTest, FindsEachRangeOnceForAllThreads) {
   std::vector<std::thread> threads;
   threads.reserve(4);
   std::atomic<int> same = 0;
-  const auto first = cache.get(volume, shown(0));
+  const auto first = get(cache, volume, above(0));
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&] {
-      for (int i = 0; i < 40; ++i) (void)cache.get(volume, shown(i % 8));
-      same += cache.get(volume, shown(0)) == first ? 1 : 0;
+      for (int i = 0; i < 40; ++i) (void)get(cache, volume, above(i % 8));
+      same += get(cache, volume, above(0)) == first ? 1 : 0;
     });
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(found, 8);
   EXPECT_EQ(same, 4);
-  EXPECT_EQ(cache.get(volume, {volume->description().whole()}).get(), &volume->relevant()) << "nothing has to be found";
+  EXPECT_EQ(get(cache, volume, {volume->description().whole()}).get(), &volume->relevant()) << "nothing has to be found";
   EXPECT_EQ(found, 8);
 }
 
+// Whoever drags one end of a range needs nothing new of the other.
+TEST_F(RangeCacheTest, EachSurfaceIsFoundOnce) {
+  RangeCache cache(find);
+  const auto first = get(cache, volume, between(-0.5, 0.5));
+  EXPECT_EQ(found, 2);
+  (void)get(cache, volume, between(-0.5, 0.25));
+  EXPECT_EQ(found, 3);
+  (void)get(cache, volume, between(0, 0.25));
+  EXPECT_EQ(found, 4);
+  (void)get(cache, volume, {{{-0.5, 0.25}, Refine::uniform}});
+  EXPECT_EQ(found, 5) << "the inside";
+  EXPECT_EQ(get(cache, volume, between(-0.5, 0.5)), first);
+  EXPECT_EQ(first->shown(), between(-0.5, 0.5));
+  EXPECT_EQ(found, 5);
+}
+
 TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
-  const std::size_t bytes = find(volume, shown(1).front())->memory_bytes();
+  const std::size_t bytes = find(*volume, above(1).front(), Distances::none)->memory_bytes();
   found = 0;
   RangeCache cache(find, 2 * bytes + bytes / 2);
-  (void)cache.get(volume, shown(1));
-  (void)cache.get(volume, shown(2));
-  (void)cache.get(volume, shown(1));
-  (void)cache.get(volume, shown(3));  // drops 2
+  (void)get(cache, volume, above(1));
+  (void)get(cache, volume, above(2));
+  (void)get(cache, volume, above(1));
+  (void)get(cache, volume, above(3));  // drops 2
   EXPECT_EQ(found, 3);
-  (void)cache.get(volume, shown(1));
+  (void)get(cache, volume, above(1));
   EXPECT_EQ(found, 3);
-  (void)cache.get(volume, shown(2));
+  (void)get(cache, volume, above(2));
   EXPECT_EQ(found, 4);
 }
 
 TEST_F(RangeCacheTest, DropsWhatBelongsToDataSetsThatAreGone) {
   RangeCache cache(find);
-  std::weak_ptr<const RelevantUpdates> old = cache.get(volume, shown(1));
+  std::weak_ptr<const RelevantUpdates> old = get(cache, volume, above(1));
   EXPECT_FALSE(old.expired());
   volume = testing::build_shared(testing::gyroid({9, 9, 9}), {.range = {-1, 1}, .refine = Refine::uniform});
-  (void)cache.get(volume, shown(1));
+  (void)get(cache, volume, above(1));
   EXPECT_TRUE(old.expired());
   EXPECT_EQ(found, 2);
 }
 
 TEST_F(RangeCacheTest, SeveralRangesAreUnitedOnceOfWhatEachNeeds) {
   RangeCache cache(find);
-  const ShownRanges both = distinct({shown(2).front(), shown(1).front(), shown(2).front()});
+  const ShownRanges both = distinct({above(2).front(), between(-1, 0.02).front(), above(2).front()});
   ASSERT_EQ(both.size(), 2u);
-  const auto first = cache.get(volume, shown(1)), all = cache.get(volume, both);
-  EXPECT_EQ(found, 2);
+  const auto first = get(cache, volume, above(2)), all = get(cache, volume, both);
+  EXPECT_EQ(found, 3);
   EXPECT_EQ(all->shown(), both);
-  EXPECT_EQ(cache.get(volume, both), all);
-  EXPECT_EQ(cache.get(volume, shown(1)), first);
-  EXPECT_EQ(found, 2);
+  EXPECT_EQ(get(cache, volume, both), all);
+  EXPECT_EQ(get(cache, volume, above(2)), first);
+  EXPECT_EQ(found, 3);
 }
 
 TEST_F(RangeCacheTest, TriesAgainAfterAFailure) {
   bool fails = true;
-  RangeCache cache([&](const RangeCache::Volume& of, const ShownRange& range) {
+  RangeCache cache([&](const IntervalVolume& of, const ShownRange& part, Distances distances) {
     if (std::exchange(fails, false)) throw std::runtime_error("no memory");
-    return find(of, range);
+    return find(of, part, distances);
   });
-  EXPECT_THROW((void)cache.get(volume, shown(1)), std::runtime_error);
-  EXPECT_NE(cache.get(volume, shown(1)), nullptr);
+  EXPECT_THROW((void)get(cache, volume, above(1)), std::runtime_error);
+  EXPECT_NE(get(cache, volume, above(1)), nullptr);
+  fails = true;
+  std::counting_semaphore<> ready(0);
+  const auto failed = cache.measure(volume, above(1), [&] { ready.release(); });
+  ready.acquire();
+  EXPECT_THROW((void)failed->result(), std::runtime_error);
+}
+
+// A request that is released while another is measured is not measured; of the others the newest is the first.
+TEST_F(RangeCacheTest, MeasuresTheNewestThatIsStillWanted) {
+  std::counting_semaphore<> may_go(0), began(0);
+  std::vector<double> measured;
+  const auto whole = ShownRanges{volume->description().whole()};
+  std::counting_semaphore<> ready(0);
+  RangeCache cache([&](const IntervalVolume& of, const ShownRange& part, Distances distances) {
+    measured.push_back(part.range.alpha);
+    began.release();
+    may_go.acquire();
+    return find(of, part, distances);
+  });
+  const auto request = [&](int number) { return cache.measure(volume, above(number), [&] { ready.release(); }); };
+  const auto first = request(1);
+  began.acquire();
+  const auto second = request(2);
+  auto third = request(3);
+  const auto fourth = request(4);
+  third.reset();
+  EXPECT_FALSE(first->is_ready() || second->is_ready());
+  may_go.release(3);
+  for (int i = 0; i < 3; ++i) ready.acquire();
+  EXPECT_EQ(measured, (std::vector{0.01, 0.04, 0.02}));
+  EXPECT_EQ(first->result(), cache.get(volume, above(1), Distances::measured));
+  EXPECT_TRUE(request(2)->is_ready()) << "it is known";
+  EXPECT_EQ(cache.measure(volume, whole, [] {})->result().get(), &volume->relevant());
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <random>
 #include <vector>
@@ -28,9 +30,15 @@ class United : public ::testing::TestWithParam<unsigned> {
       double low = std::uniform_real_distribution(-1.5, 1.5)(random_), high = std::uniform_real_distribution(-1.5, 1.5)(random_);
       if (low > high) std::swap(low, high);
       const ShownRange shown{{low, high}, Refine(random_() % 2)};
-      each.push_back(find_relevant_updates(volume_, random_() % 5 == 0 ? volume_->description().whole() : shown, random_() % 4 != 0));
+      each.push_back(find_relevant_updates(volume_, {random_() % 5 == 0 ? volume_->description().whole() : shown}, Distances(random_() % 3)));
     }
     return each;
+  }
+
+  [[nodiscard]] static ShownRanges shown_by(const Each& each) {
+    ShownRanges shown;
+    for (const auto& one : each) shown.insert(shown.end(), one->shown().begin(), one->shown().end());
+    return distinct(shown);
   }
 
   std::mt19937 random_{GetParam()};
@@ -42,7 +50,7 @@ TEST_P(United, IsWhatEachRangeNeeds) {
   const SupercubeSet& set = volume_->set();
   for (int trial = 0; trial < 4; ++trial) {
     const Each each = random_ranges();
-    const RelevantUpdates all = united(*volume_, each);
+    const RelevantUpdates all = united(*volume_, each, shown_by(each));
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
       unsigned brick_step = 0;
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
@@ -70,16 +78,40 @@ TEST_P(United, IsWhatEachRangeNeeds) {
 
 TEST_P(United, OrderAndRepetitionDoNotMatter) {
   Each each = random_ranges();
-  const RelevantUpdates one = united(*volume_, each);
+  const RelevantUpdates one = united(*volume_, each, shown_by(each));
   std::shuffle(each.begin(), each.end(), random_);
   each.push_back(each.front());
-  const RelevantUpdates other = united(*volume_, each);
+  const RelevantUpdates other = united(*volume_, each, shown_by(each));
   EXPECT_EQ(one.shown(), other.shown());
   for (SupercubeIndex s{0}; s < volume_->set().supercubes(); ++s) {
     const std::uint64_t occupancy = volume_->set().occupancy()[s];
     ASSERT_EQ(one.slots(s, occupancy), other.slots(s, occupancy));
     ASSERT_EQ(one.error_to_distance()[s].code(), other.error_to_distance()[s].code());
   }
+}
+
+// Of the same updates, whatever is known of distances; estimates are mostly near what is measured.
+TEST(FindRelevantUpdates, EstimatesDistances) {
+  std::vector<double> octaves;
+  for (const double alpha : {-0.8, -0.2, 0.1, 0.5}) {
+    const auto volume = testing::build_shared(testing::gyroid({40, 33, 36}), {.range = {-1.5, 1.5}, .refine = Refine::uniform});
+    const ShownRange part{{alpha, std::numeric_limits<double>::infinity()}, Refine::boundary};
+    const auto measured = find_relevant_part(*volume, part, Distances::measured), estimated = find_relevant_part(*volume, part, Distances::estimated);
+    const SupercubeSet& set = volume->set();
+    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+        ASSERT_EQ(estimated->slots(s, set.occupancy()[s]), measured->slots(s, set.occupancy()[s]));
+        if (scale_of_key(key) != 0) return;
+        const unsigned step = measured->supercube_error_steps()[s];
+        const float as_estimated = estimated->object_error(s, 0, step), as_measured = measured->object_error(s, 0, step);
+        if (as_measured > 0 && as_estimated > 0) octaves.push_back(std::log2(as_estimated / as_measured));
+      });
+    }
+  }
+  std::sort(octaves.begin(), octaves.end());
+  ASSERT_GT(octaves.size(), 1000u);
+  EXPECT_NEAR(octaves[octaves.size() / 2], 0, 1);
+  EXPECT_LT(octaves[octaves.size() * 99 / 100], 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(Random, United, ::testing::Range(0u, 8u));

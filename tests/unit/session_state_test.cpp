@@ -1,0 +1,96 @@
+// The server's side of a session; its client's side and what both do together: client_session_test.cpp.
+#include "server/serve/session_state.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <semaphore>
+
+#include "client/core/client_session.h"
+#include "tests/support/interval_volumes.h"
+#include "tests/support/session_server.h"
+
+namespace intervale {
+namespace {
+
+using protocol::CloseCode;
+
+TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
+  const AtomicSharedPtr<Catalogue> catalogue;
+  RangeCache ranges;
+  const struct {
+    std::uint32_t payload;
+    const char* text;
+  } cases[] = {{0, "the client reads batches of version 1, and this server sends version 3: update the client"},
+               {1, "the client reads batches of version 1, and this server sends version 3: update the client"},
+               {4, "the client reads batches of version 4, and this server sends version 3: update the server"}};
+  for (const auto& c : cases) {
+    SessionState state(catalogue, ranges, Scope::everything());
+    const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});
+    ASSERT_TRUE(fault);
+    EXPECT_EQ(fault->code, CloseCode::other_version);
+    EXPECT_EQ(fault->text, c.text);
+    EXPECT_FALSE(state.opened());
+  }
+}
+
+// A client that looks through a camera at a range of a data set, while the server's measuring of distances waits.
+struct MeasuredLate : ::testing::Test {
+  std::shared_ptr<const IntervalVolume> volume = testing::build_shared(testing::gyroid({33, 33, 33}), {.range = {-1, 1}, .refine = Refine::uniform});
+  std::counting_semaphore<> may_measure{0};
+  ClientSession session{{.dataset = "made", .client = "test"}};
+  testing::SessionServer<ClientSession> server{volume, session, [this](const IntervalVolume& of, const ShownRange& part, Distances distances) {
+                                                 if (distances == Distances::measured) may_measure.acquire();
+                                                 return find_relevant_part(of, part, distances);
+                                               }};
+  static ViewRequest view_of(Range range, bool early) {
+    ViewRequest view;
+    view.lod.camera = Camera{.eye = {80, 60, 50}, .look_at = {16, 16, 16}, .viewport = {640, 480}, .pixel_error = 1};
+    view.shown = {{range}, Refine::boundary};
+    view.early = early;
+    return view;
+  }
+  void run_while_it_waits() { server.run(1 << 20, false); }
+};
+
+TEST_F(MeasuredLate, AnEarlyViewBeginsWithEstimatesAndEndsWhenAllIsKnown) {
+  ASSERT_TRUE(session.look(view_of({-0.3, 0.2}, true)));
+  run_while_it_waits();
+  const std::uint64_t early = session.mesh()->updates();
+  EXPECT_GT(early, 100u);
+  EXPECT_EQ(session.state(), ClientSession::State::viewing) << "Done comes from what is measured";
+  may_measure.release(2);
+  server.run();
+  EXPECT_EQ(session.state(), ClientSession::State::idle);
+  EXPECT_GT(session.mesh()->updates(), early);
+  ASSERT_TRUE(session.look(view_of({-0.3, 0.2}, true)));
+  run_while_it_waits();
+  EXPECT_EQ(session.state(), ClientSession::State::idle) << "it is known by now";
+}
+
+TEST_F(MeasuredLate, OtherViewsWait) {
+  ASSERT_TRUE(session.look(view_of({-0.3, 0.2}, false)));
+  run_while_it_waits();
+  EXPECT_EQ(session.mesh()->updates(), 0u);
+  ViewRequest all = view_of({-0.3, 0.2}, false);
+  all.lod = {.error_percent = 50};
+  ASSERT_TRUE(session.look(all));
+  run_while_it_waits();
+  EXPECT_EQ(session.state(), ClientSession::State::idle) << "without a camera nothing has to be measured";
+  may_measure.release(2);
+}
+
+// A range that was left is not measured, if its turn had not come; the end that was not dragged is known.
+TEST_F(MeasuredLate, ADragIsMeasuredWhereItRests) {
+  for (const double alpha : {-0.4, -0.35, -0.3, -0.25}) {
+    ASSERT_TRUE(session.look(view_of({alpha, 0.2}, true)));
+    run_while_it_waits();
+  }
+  may_measure.release(2 + 1);
+  server.run();
+  EXPECT_EQ(session.state(), ClientSession::State::idle);
+  EXPECT_FALSE(may_measure.try_acquire()) << "the first range was being measured, and then the lower surface of the last";
+}
+
+}  // namespace
+}  // namespace intervale
