@@ -16,10 +16,5 @@ namespace intervale {
 // batch; the fronts must then not be used any more.
 [[nodiscard]] Result<std::uint64_t> apply_batch(std::span<Front> fronts, const Description& description, const ShownRanges& shown,
                                                 std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0));
-// The same for one front and one range.
-[[nodiscard]] inline Result<std::uint64_t> apply_batch(Front& front, const Description& description, const ShownRange& shown,
-                                                       std::span<const std::uint8_t> bytes, std::uint64_t max_tets = ~std::uint64_t(0)) {
-  return apply_batch(std::span(&front, 1), description, ShownRanges{shown}, bytes, max_tets);
-}
 
 }  // namespace intervale

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "common/codec/value_coder.h"
-#include "common/front/batch_decoder.h"
 #include "common/ivm/batch_encoder.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
@@ -16,6 +15,7 @@
 #include "server/builder/field_hierarchy.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/delta.h"
+#include "tests/support/batches.h"
 
 namespace intervale::bench {
 namespace {
@@ -111,8 +111,7 @@ void apply_batches(benchmark::State& state) {
   const auto& f = fixture();
   for (auto _ : state) {
     Front front = root_front(f.sigma->description());
-    for (const auto& payload : f.payloads)
-      benchmark::DoNotOptimize(apply_batch(front, f.sigma->description(), f.sigma->description().whole(), payload).has_value());
+    for (const auto& payload : f.payloads) benchmark::DoNotOptimize(testing::apply_to(front, f.sigma->description(), payload).has_value());
   }
   count_items(state, f.places.size());
 }

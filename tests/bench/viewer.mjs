@@ -1,6 +1,6 @@
 // What the viewer does in a browser, in figures, as a table: node viewer.mjs FILE.ivm BUCKYBALL.ivm EVERY.ivm [RUNS]
-// FILE: large, for everything but the first mesh. EVERY: the buckyball's field for every range, for changes of the range. The environment is that of tests/web/support.mjs. Best on an idle
-// machine.
+// FILE: large, for everything but the first mesh. EVERY: the buckyball's field for every range, for changes of the
+// range. The environment is that of tests/web/support.mjs. Best on an idle machine.
 import { copyFileSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { basename, join } from 'node:path';

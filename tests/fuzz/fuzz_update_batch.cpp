@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "common/front/batch_decoder.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/refinement.h"
 #include "tests/fuzz/small_volumes.h"
@@ -24,9 +23,7 @@ const std::vector<std::vector<Front>>& clients() {
       auto& stages = made.emplace_back();
       for (std::size_t stage = 0; stage < kStages; ++stage) {
         Front& front = stages.emplace_back(root_front(v.description()));
-        if (!apply_batch(front, v.description(), v.description().whole(),
-                         testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages))))
-          std::abort();
+        if (!testing::apply_to(front, v.description(), testing::batch_of(v, std::span(queue).first(queue.size() * stage / kStages)))) std::abort();
       }
     }
     return made;
@@ -43,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::uint64_t max_tets = ~std::uint64_t(0);
   if (data[1] & 0x80) max_tets = front.tet_count() + (data[1] >> 3 & 15);
   const Description& description = testing::small_volumes()[volume].description();
-  const auto applied = apply_batch(front, description, description.whole(), {data + 2, size - 2}, max_tets);
+  const auto applied = testing::apply_to(front, description, {data + 2, size - 2}, max_tets);
   if (!applied) {
     if (applied.error().message.empty()) std::abort();
     return 0;

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <span>
 #include <vector>
 
+#include "common/front/batch_decoder.h"
 #include "common/ivm/batch_encoder.h"
 
 namespace intervale::testing {
@@ -24,6 +26,12 @@ inline std::vector<std::uint8_t> batch_of(const IntervalVolume& volume, std::spa
     groups.back().slots |= std::uint64_t(1) << p.slot;
   }
   return encode_batch(volume, {volume.description().whole()}, split, groups);
+}
+
+// Applies a batch for the data set's own range.
+inline Result<std::uint64_t> apply_to(Front& front, const Description& description, std::span<const std::uint8_t> batch,
+                                      std::uint64_t max_tets = ~std::uint64_t(0)) {
+  return apply_batch(std::span(&front, 1), description, {description.whole()}, batch, max_tets);
 }
 
 }  // namespace intervale::testing

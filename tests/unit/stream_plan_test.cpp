@@ -6,10 +6,10 @@
 #include <random>
 #include <vector>
 
-#include "common/front/batch_decoder.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
+#include "tests/support/batches.h"
 #include "tests/support/interval_volumes.h"
 
 namespace intervale {
@@ -61,7 +61,7 @@ class Receiver {
   }
   // Takes a batch; what was sent before, or before its parents, is refused.
   Result<std::uint64_t> take(const Batch& batch) {
-    auto applied = apply_batch(front_, volume_->description(), volume_->description().whole(), batch.payload);
+    auto applied = testing::apply_to(front_, volume_->description(), batch.payload);
     // A diamond whose parents are all split is in the front, or split.
     volume_->set().for_each_down([&](const Place& p) {
       if (sent_[p.index]) return;

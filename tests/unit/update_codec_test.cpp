@@ -45,7 +45,7 @@ std::vector<UpdateIndex> queue_of(const IntervalVolume& v, const Lod& lod = {}) 
 Front after(const IntervalVolume& v, std::size_t n) {
   Front front = root_of(v);
   const auto queue = queue_of(v);
-  const auto applied = apply_batch(front, v.description(), v.description().whole(), batch_of(v, std::span(queue).first(n)));
+  const auto applied = testing::apply_to(front, v.description(), batch_of(v, std::span(queue).first(n)));
   EXPECT_TRUE(applied && *applied == n);
   return front;
 }
@@ -55,7 +55,7 @@ Result<std::uint64_t> apply_exact(Front& front, const IntervalVolume& v, std::sp
                                   std::uint64_t max_tets = ~std::uint64_t(0)) {
   const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
   std::copy(bytes.begin(), bytes.end(), exact.get());
-  return apply_batch(front, v.description(), v.description().whole(), {exact.get(), bytes.size()}, max_tets);
+  return testing::apply_to(front, v.description(), {exact.get(), bytes.size()}, max_tets);
 }
 
 // All updates, those of an error, and those of a box.
