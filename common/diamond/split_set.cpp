@@ -33,6 +33,34 @@ std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return extract_p
 
 }  // namespace
 
+void SplitSet::insert_bits(std::uint32_t w, std::uint64_t bits) {
+  std::uint32_t& page = page_[w / kPageWords];
+  if (page == 0) {
+    page = std::uint32_t(words_.size() / kPageWords);
+    words_.resize(words_.size() + kPageWords);
+  }
+  words_[std::size_t(page) * kPageWords + w % kPageWords] |= bits;
+}
+
+void SplitSet::erase_bits(std::uint32_t w, std::uint64_t bits) {
+  const std::uint32_t page = page_[w / kPageWords];
+  if (page != 0) words_[std::size_t(page) * kPageWords + w % kPageWords] &= ~bits;
+}
+
+void SplitSet::insert_all() {
+  words_.assign((page_.size() + 1) * kPageWords, ~std::uint64_t(0));
+  std::fill_n(words_.begin(), kPageWords, 0);
+  for (std::uint32_t page = 0; page < page_.size(); ++page) page_[page] = page + 1;
+}
+
+bool operator==(const SplitSet& a, const SplitSet& b) {
+  if (a.page_.size() != b.page_.size()) return false;
+  for (std::uint32_t w = 0; w < a.page_.size() * SplitSet::kPageWords; ++w) {
+    if (a.word(w) != b.word(w)) return false;
+  }
+  return true;
+}
+
 std::uint64_t SplitSet::count() const {
   std::uint64_t n = 0;
   for (std::uint64_t w : words_) n += std::uint64_t(std::popcount(w));
@@ -49,15 +77,15 @@ std::uint64_t SplitSet::deposit(std::uint64_t bits, std::uint64_t mask) {
 void SplitSet::insert(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {
   const std::uint64_t bits = extract(slots, occupancy);
   const unsigned shift = first % 64;
-  words_[first / 64] |= bits << shift;
-  if (shift != 0 && bits >> (64 - shift) != 0) words_[first / 64 + 1] |= bits >> (64 - shift);
+  insert_bits(first / 64, bits << shift);
+  if (shift != 0 && bits >> (64 - shift) != 0) insert_bits(first / 64 + 1, bits >> (64 - shift));
 }
 
 void SplitSet::erase(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {
   const std::uint64_t bits = extract(slots, occupancy);
   const unsigned shift = first % 64;
-  words_[first / 64] &= ~(bits << shift);
-  if (shift != 0 && bits >> (64 - shift) != 0) words_[first / 64 + 1] &= ~(bits >> (64 - shift));
+  erase_bits(first / 64, bits << shift);
+  if (shift != 0 && bits >> (64 - shift) != 0) erase_bits(first / 64 + 1, bits >> (64 - shift));
 }
 
 std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {
@@ -65,8 +93,9 @@ std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {
   const auto bricks = set.bricks();
   for (BrickIndex b{0}; b < bricks.size(); ++b) {
     const std::uint32_t first = bricks[b].first, end = b + 1 < bricks.size() ? bricks[b + 1].first : set.size();
-    const auto from = words_.begin() + first / 64, to = words_.begin() + (end + 63) / 64;
-    if (std::all_of(from, to, [](std::uint64_t w) { return w == 0; })) continue;
+    bool is_empty = true;
+    for (std::uint32_t w = first / 64; w < (end + 63) / 64 && is_empty; ++w) is_empty = word(w) == 0;
+    if (is_empty) continue;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       if (const std::uint64_t some = slots(set.first(b, s), set.occupancy()[s])) groups.push_back({b, s, key, some});
     });

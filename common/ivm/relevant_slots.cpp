@@ -30,7 +30,7 @@ class Finder {
       const BrickIndex brick{std::uint32_t(b)};
       set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) { find_coarse(brick, s); });
     });
-    std::fill(all_.words().begin(), all_.words().end(), ~std::uint64_t(0));
+    all_.insert_all();
     parallel_(end - first, [&, first = first](std::size_t piece) { find_fine(BrickIndex(first + std::uint32_t(piece))); });
     for (const std::size_t cls : {2, 1}) {
       parallel_(end - first, [&, first = first](std::size_t piece) { add_parents(BrickIndex(first + std::uint32_t(piece)), cls); });

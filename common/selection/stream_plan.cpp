@@ -74,8 +74,25 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant) {
     pending.error_step = std::uint16_t(relevant_->brick_error_step(b));
     pending.object_error = Up16(relevant_->brick_object_error(b));
   }
-  const auto steps = relevant_->supercube_error_steps();
-  supercube_steps_.assign(steps.begin(), steps.end());
+  steps_page_.assign(set.supercubes() / kStepsPage + 1, 0);
+  steps_.assign(kStepsPage, 0);
+}
+
+unsigned StreamPlan::error_step(SupercubeIndex s) const {
+  const std::uint32_t page = steps_page_[s / kStepsPage];
+  return page == 0 ? relevant_->supercube_error_steps()[s] : steps_[std::size_t(page) * kStepsPage + s % kStepsPage];
+}
+
+void StreamPlan::set_error_step(SupercubeIndex s, unsigned step) {
+  if (step == error_step(s)) return;
+  std::uint32_t& page = steps_page_[s / kStepsPage];
+  if (page == 0) {
+    page = std::uint32_t(steps_.size() / kStepsPage);
+    const auto all = relevant_->supercube_error_steps().subspan(s - s % kStepsPage);
+    steps_.insert(steps_.end(), all.begin(), all.begin() + std::ptrdiff_t(std::min<std::size_t>(all.size(), kStepsPage)));
+    steps_.resize((page + 1) * std::size_t(kStepsPage));
+  }
+  steps_[std::size_t(page) * kStepsPage + s % kStepsPage] = std::uint8_t(step);
 }
 
 bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
@@ -112,7 +129,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const unsigned error_step = volume_->error_step(i);
     pending.error_step = std::max(pending.error_step, std::uint16_t(error_step));
     pending.object_error = Up16(std::max(float(pending.object_error), relevant_->object_error(here.supercube, scale_of_key(g.key), error_step)));
-    supercube_steps_[here.supercube] = std::max(supercube_steps_[here.supercube], std::uint8_t(error_step));
+    set_error_step(here.supercube, std::max(this->error_step(here.supercube), error_step));
   });
   return true;
 }
@@ -266,7 +283,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const SupercubeIndex s = first.supercube;
   const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
-  Unsent rest{.error_step = supercube_steps_[s]};
+  Unsent rest{.error_step = error_step(s)};
   if (candidates == 0) return rest;
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
@@ -282,7 +299,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
     rest.error_step = std::max(rest.error_step, volume_->error_step(first.index + std::countr_zero(others)));
   }
-  supercube_steps_[s] = std::uint8_t(rest.error_step);
+  set_error_step(s, rest.error_step);
   return rest;
 }
 

@@ -34,8 +34,8 @@ struct Batch {
 // large, up to protocol::kMaxBatchPayload.
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
-// The stream of one session over one data set. One thread at a time. Memory besides the data set: one bit for each
-// update (two with max_updates), a byte for each supercube and ten bytes for each brick.
+// The stream of one session over one data set. One thread at a time. Memory besides the data set: ten bytes for each
+// brick, and where something was sent a bit for each update (two with max_updates) and a byte for each supercube.
 class StreamPlan {
  public:
   // At first everything that the range of the data set needs is relevant.
@@ -96,6 +96,8 @@ class StreamPlan {
     Up16 object_error;
   };
   void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
+  [[nodiscard]] unsigned error_step(SupercubeIndex s) const;
+  void set_error_step(SupercubeIndex s, unsigned step);
   void begin_band();
   // Upper bounds over updates that were visited and not sent.
   struct Unsent {
@@ -114,8 +116,11 @@ class StreamPlan {
   std::shared_ptr<const IntervalVolume> volume_;
   std::shared_ptr<const RelevantUpdates> relevant_;  // not null
   SplitSet sent_;
-  std::vector<Pending> pending_;               // by brick
-  std::vector<std::uint8_t> supercube_steps_;  // by supercube: bound on the error step of the unsent updates
+  std::vector<Pending> pending_;  // by brick
+  // By supercube: bound on the error step of the unsent updates, in pages of 64 supercubes. Page 0: as if none were sent.
+  static constexpr std::uint32_t kStepsPage = 64;
+  std::vector<std::uint32_t> steps_page_;
+  std::vector<std::uint8_t> steps_;
   std::optional<Ranking> ranking_;
   std::optional<SplitSet> budget_;  // with max_updates: the updates within the budget
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);

@@ -21,7 +21,7 @@ class Estimator {
         slots_(slots),
         all_(volume.set().size()),
         unit_(error_to_distance_unit(volume.description().grid, volume.description().max_error)) {
-    std::fill(all_.words().begin(), all_.words().end(), ~std::uint64_t(0));
+    all_.insert_all();
   }
 
   void estimate(BrickIndex brick, std::vector<ErrorToDistance>& result) const {

@@ -104,7 +104,7 @@ TEST_P(SplitSets, AncestorsAreInsertedBeforeTheirDescendants) {
     const std::uint64_t occupancy = set.occupancy()[place.supercube];
     const std::uint64_t slots = occupancy & random_() * 0x100000001u & ~split.slots(set.first(place.brick, place.supercube), occupancy);
     if (slots == 0) continue;
-    const std::vector<std::uint64_t> before = split.words();
+    const SplitSet before = split;
     SplitSet expected = split;
     const SplitSet closed = select(set, [&](const Place& p) { return p.supercube == place.supercube && (slots >> p.slot & 1) != 0; });
     for (UpdateIndex i{0}; i < set.size(); ++i) {
@@ -123,7 +123,7 @@ TEST_P(SplitSets, AncestorsAreInsertedBeforeTheirDescendants) {
     ASSERT_EQ(split, expected);
     if (trial % 2 != 0) continue;
     inserter.take_back();
-    ASSERT_EQ(split.words(), before);
+    ASSERT_EQ(split, before);
   }
 }
 
