@@ -100,6 +100,7 @@ Lod view_of(const CameraPath& path, std::uint64_t number) {
   if (path.scenario == Scenario::orbit) orbit(camera, path, ball, seconds);
   if (path.scenario == Scenario::zoom) zoom(camera, path, ball, seconds);
   if (path.scenario == Scenario::jump) jump(camera, path, ball, number);
+  if (path.scenario == Scenario::range) orbit(camera, path, ball, 0);
   Lod lod;
   lod.camera = camera;
   return lod;

@@ -14,10 +14,11 @@ enum class Scenario : std::uint8_t {
   orbit,  // around the centre of the box at a seeded height, with the whole box in the picture: one turn in 20 s
   zoom,   // from where the whole box is in the picture to a seeded point on its surface and back, in 10 s
   jump,   // with each view to a random place outside, far or near, looking at a random point of the box
+  range,  // where an orbit begins, for all views: their ranges differ, see range_path.h
 };
 
 // Their names, in the same order.
-inline constexpr std::array<std::string_view, 4> kScenarios{"full", "orbit", "zoom", "jump"};
+inline constexpr std::array<std::string_view, 5> kScenarios{"full", "orbit", "zoom", "jump", "range"};
 
 struct CameraPath {
   Scenario scenario = Scenario::orbit;

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <future>
+#include <span>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "client/load/range_path.h"
 #include "client/load/run_clients.h"
 #include "client/load/verify_meshes.h"
 #include "client/net/blocking_connection.h"
@@ -70,7 +72,7 @@ struct Share {
 };
 
 // Runs the clients on threads. Shows the progress on a terminal once a second, until all threads have ended.
-Share run_threads(const LoadPlan& plan, unsigned threads, std::vector<std::optional<StreamClient>>& meshes) {
+Share run_threads(const LoadPlan& plan, unsigned threads, std::vector<std::optional<LoadedMesh>>& meshes) {
   LoadProgress progress;
   std::vector<std::future<Share>> running;
   for (unsigned first = 0; first < threads; ++first) {
@@ -97,45 +99,89 @@ Share run_threads(const LoadPlan& plan, unsigned threads, std::vector<std::optio
   return all;
 }
 
+// What the clients show, at first if they drag it.
+Result<RangeRequest> shown_by(const ServerUrl& url, const LoadOptions& options, const Description& description) {
+  RangeRequest shown = options.shown;
+  if (options.scenario == Scenario::range) {
+    if (!description.has_every_range) return misuse("'" + url.name + "' has one range, and --scenario range needs a data set of every range");
+    if (shown.ranges.size() > 1) return misuse("--range: the clients of --scenario range show one range each");
+    if (shown.ranges.empty()) shown.ranges = {upper_half(values_of(description))};
+  }
+  if (description.has_every_range && shown.ranges.empty()) return misuse("'" + url.name + "' has every range: say which with --range LO HI");
+  if (auto held = check_held(description, resolve(description, shown)); !held) return tl::unexpected(held.error());
+  return shown;
+}
+
+Result<StreamClient> fetch_mesh(const ServerUrl& url, const Lod& lod, const RangeRequest& shown) {
+  FetchOptions options;
+  options.lod = lod;
+  options.shown = shown;
+  options.reconnect = std::chrono::seconds(0);
+  auto fetched = fetch(url, options, {});
+  if (!fetched) return tl::unexpected(fetched.error());
+  return std::move(fetched->client);
+}
+
+// Each in the range that it shows now, one after the other: see is_mesh_of_range.
+Result<Verified> verify_last_ranges(const ServerUrl& url, std::span<const std::optional<LoadedMesh>> meshes) {
+  Verified verified;
+  for (const auto& mesh : meshes) {
+    if (!mesh) continue;
+    const Front& front = mesh->client.front();
+    const RangeRequest shown{{front.range()}, front.refine()};
+    const auto whole = fetch_mesh(url, {}, shown);
+    if (!whole) return tl::unexpected(whole.error());
+    const auto fresh = fetch_mesh(url, mesh->view, shown);
+    if (!fresh) return tl::unexpected(fresh.error());
+    ++verified.compared;
+    if (!is_mesh_of_range(whole->front(), mesh->is_complete ? &fresh->front() : nullptr, front)) ++verified.differing;
+  }
+  return verified;
+}
+
+// What the run took of the machine, and the figures of all clients.
+LoadReport run_plan(const LoadPlan& plan, std::vector<std::optional<LoadedMesh>>& meshes) {
+  LoadReport report;
+  report.scenario = kScenarios[std::size_t(plan.scenario)];
+  report.clients = plan.clients;
+  report.threads = std::min(plan.threads, plan.clients);
+  const double cpu_before = cpu_seconds(RUSAGE_SELF);
+  Share all = run_threads(plan, report.threads, meshes);
+  report.stats = std::move(all.stats);
+  const std::chrono::duration<double> wall = LoadClock::now() - plan.start;
+  report.seconds = std::min<std::chrono::duration<double>>(wall, plan.duration).count();
+  report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));
+  report.busiest_thread = all.cpu_seconds / wall.count();
+  return report;
+}
+
 }  // namespace
 
 Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options) {
   if (auto allowed = allow_files(options.clients); !allowed) return tl::unexpected(allowed.error());
   const auto description = describe(url);
   if (!description) return tl::unexpected(description.error());
-  if (description->has_every_range && options.shown.ranges.empty()) return misuse("'" + url.name + "' has every range: say which with --range LO HI");
-  if (auto held = check_held(*description, resolve(*description, options.shown)); !held) return tl::unexpected(held.error());
-  std::optional<StreamClient> reference;
-  if (options.verify) {
-    FetchOptions everything;
-    everything.shown = options.shown;
-    everything.reconnect = std::chrono::seconds(0);
-    auto fetched = fetch(url, everything, {});
-    if (!fetched) return tl::unexpected(fetched.error());
-    reference = std::move(fetched->client);
+  const auto shown = shown_by(url, options, *description);
+  if (!shown) return tl::unexpected(shown.error());
+  const bool drags = options.scenario == Scenario::range;
+  std::optional<StreamClient> reference;  // of all clients, if they have one range
+  if (options.verify && !drags) {
+    auto whole = fetch_mesh(url, {}, *shown);
+    if (!whole) return tl::unexpected(whole.error());
+    reference = std::move(*whole);
   }
-
-  LoadReport report;
-  report.scenario = kScenarios[std::size_t(options.scenario)];
-  report.clients = options.clients;
-  report.threads = std::min(options.threads, options.clients);
   auto tls = tls_for(url);
   if (!tls) return tl::unexpected(tls.error());
-  const double cpu_before = cpu_seconds(RUSAGE_SELF);
   LoadPlan plan{options, url, std::move(*tls), *description, LoadClock::now() + kStartTime};
+  plan.shown = *shown;
   plan.ramp = std::min(plan.ramp, plan.duration);
-  std::vector<std::optional<StreamClient>> meshes(plan.clients);
-  Share all = run_threads(plan, report.threads, meshes);
-  report.stats = std::move(all.stats);
-  const std::chrono::duration<double> wall = LoadClock::now() - plan.start;
-  report.seconds = std::min<std::chrono::duration<double>>(wall, options.duration).count();
-  report.own_cpu_share = (cpu_seconds(RUSAGE_SELF) - cpu_before) / (wall.count() * std::max(1u, std::thread::hardware_concurrency()));
-  report.busiest_thread = all.cpu_seconds / wall.count();
-  if (reference) {
-    const auto [compared, differing] = verify_meshes(reference->fronts(), meshes, options.seed);
-    report.verified = compared;
-    report.differing = differing;
-  }
+  std::vector<std::optional<LoadedMesh>> meshes(plan.clients);
+  LoadReport report = run_plan(plan, meshes);
+  if (!options.verify) return report;
+  const Result<Verified> verified = drags ? verify_last_ranges(url, meshes) : verify_meshes(reference->fronts(), meshes, options.seed);
+  if (!verified) return tl::unexpected(verified.error());
+  report.verified = verified->compared;
+  report.differing = verified->differing;
   return report;
 }
 

@@ -9,8 +9,9 @@
 namespace intervale {
 
 // Asks the server for the description, runs the clients, and compares meshes. Blocks for the duration and up to kGrace
-// and the patience. Fails if the run is not possible: no server, no such data set, too few open files allowed. Clients
-// that fail later and meshes that differ are in the report.
+// and the patience; to compare meshes of a range each, also for two streams for each client. Fails if the run is not
+// possible: no server, no such data set, a range or scenario that the data set is not for (misuse), too few open files
+// allowed; and if those streams cannot be had. Clients that fail later and meshes that differ are in the report.
 [[nodiscard]] Result<LoadReport> run_load(const ServerUrl& url, const LoadOptions& options);
 
 }  // namespace intervale

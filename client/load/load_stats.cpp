@@ -60,8 +60,8 @@ void LoadStats::add(LoadStats&& other) {
         &LoadStats::repeated_updates, &LoadStats::repeated_bytes, &LoadStats::resume_bytes}) {
     this->*member += other.*member;
   }
-  for (const auto member :
-       {&LoadStats::first_mesh_ms, &LoadStats::first_mesh_bytes, &LoadStats::view_change_ms, &LoadStats::stale_bytes, &LoadStats::resume_ms}) {
+  for (const auto member : {&LoadStats::first_mesh_ms, &LoadStats::first_mesh_bytes, &LoadStats::view_change_ms, &LoadStats::view_done_ms,
+                            &LoadStats::view_bytes, &LoadStats::stale_bytes, &LoadStats::set_range_ms, &LoadStats::resume_ms}) {
     append(this->*member, std::move(other.*member));
   }
   for (const auto& [text, count] : other.errors) errors[text] += count;
@@ -82,7 +82,10 @@ Json to_json(const LoadReport& report) {
             {"first_mesh_ms", to_json(f.first_mesh_ms)},
             {"first_mesh_bytes", to_json(f.first_mesh_bytes)},
             {"view_change_ms", to_json(f.view_change_ms)},
+            {"view_done_ms", to_json(f.view_done_ms)},
+            {"view_bytes", to_json(f.view_bytes)},
             {"stale_bytes", to_json(f.stale_bytes)},
+            {"set_range_ms", to_json(f.set_range_ms)},
             {"views", f.views},
             {"done_views", f.done_views},
             {"late_views", f.late_views},
@@ -114,7 +117,10 @@ std::string to_text(const LoadReport& report) {
   text += line_of("first mesh", f.first_mesh_ms, "ms");
   text += line_of("its bytes", f.first_mesh_bytes, "B");
   text += line_of("view change", f.view_change_ms, "ms");
+  text += line_of("view done", f.view_done_ms, "ms");
+  text += line_of("bytes of a view", f.view_bytes, "B");
   text += line_of("stale bytes of a view", f.stale_bytes, "B");
+  if (!f.set_range_ms.empty()) text += line_of("range of a mesh set", f.set_range_ms, "ms");
   text += fmt::format(
       "{} views, {} served to the end, {} sent late, {} unanswered; this harness took {:.0f} % of the machine, and its busiest thread {:.0f} % of a "
       "core\n",

@@ -37,8 +37,11 @@ struct LoadStats {
   std::uint64_t resume_bytes = 0;      // of the Have messages that were sent
   std::vector<double> first_mesh_ms;
   std::vector<double> first_mesh_bytes;
-  std::vector<double> view_change_ms;
-  std::vector<double> stale_bytes;  // of each view: what came of older ones before it was served
+  std::vector<double> view_change_ms;  // to the first Batch or Done for a view, or for a newer one
+  std::vector<double> view_done_ms;    // to the Done
+  std::vector<double> view_bytes;      // of each view that was answered: of its batches
+  std::vector<double> stale_bytes;     // of each view: what came of older ones before it was served
+  std::vector<double> set_range_ms;    // that a client took to change the range of its mesh
   // Of each reconnect: from when the loss of the server was noticed to the first Batch or Done after it.
   std::vector<double> resume_ms;
   std::map<std::string, std::uint64_t> errors;

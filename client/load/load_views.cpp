@@ -4,6 +4,8 @@
 #include <chrono>
 #include <utility>
 
+#include "client/load/range_path.h"
+
 namespace intervale {
 namespace {
 
@@ -14,12 +16,13 @@ double milliseconds(LoadClock::duration time) { return std::chrono::duration<dou
 void LoadViews::begin(Time now) {
   first_ = now;
   ++stats_.views;
-  if (is_only_one()) pending_.push_back({now});
+  if (is_only_one()) open_.push_back({now});
 }
 
 LoadViews::Time LoadViews::next_due() const {
   if (is_only_one() || over_) return Time::max();
-  const std::chrono::duration<double> after(double(view_ + 1) / path_.views_per_second);
+  const double rests = path_.scenario == Scenario::range ? rests_before(view_ + 1) : 0;
+  const std::chrono::duration<double> after(double(view_ + 1) / path_.views_per_second + rests);
   return first_ + std::chrono::duration_cast<LoadClock::duration>(after);
 }
 
@@ -29,27 +32,37 @@ bool LoadViews::advance(Time now) {
     ++view_;
     ++stats_.views;
     if (now - due > kLate) ++stats_.late_views;
-    pending_.push_back({due});
+    open_.push_back({due});
   }
   is_complete_ = false;
   return true;
 }
 
 void LoadViews::asked(std::uint64_t epoch) {
+  if (first_epoch_ == 0) first_epoch_ = epoch;
   epoch_ = epoch;
-  for (Pending& view : pending_) view.epoch = std::min(view.epoch, epoch);
+  for (Open& view : open_) view.epoch = std::min(view.epoch, epoch);
 }
 
 void LoadViews::note_bytes(std::size_t bytes) {
-  for (Pending& view : pending_) view.stale_bytes += bytes;
+  served_->bytes += bytes;
+  for (std::size_t i = answered_; i < open_.size(); ++i) open_[i].stale_bytes += bytes;
 }
 
 void LoadViews::serve(std::uint64_t epoch, Time now) {
+  if (!served_ || served_->epoch != epoch) {
+    count_bytes();
+    served_ = {epoch};
+  }
+  answer(epoch, now);
+}
+
+void LoadViews::answer(std::uint64_t epoch, Time now) {
   if (lost_at_) stats_.resume_ms.push_back(milliseconds(now - *std::exchange(lost_at_, {})));
-  for (; !pending_.empty() && pending_.front().epoch <= epoch; pending_.pop_front()) {
-    stats_.view_change_ms.push_back(milliseconds(now - pending_.front().due));
+  for (; answered_ < open_.size() && open_[answered_].epoch <= epoch; ++answered_) {
+    stats_.view_change_ms.push_back(milliseconds(now - open_[answered_].due));
     // The first one replaces none.
-    if (!is_only_one()) stats_.stale_bytes.push_back(double(pending_.front().stale_bytes));
+    if (!is_only_one()) stats_.stale_bytes.push_back(double(open_[answered_].stale_bytes));
   }
 }
 
@@ -58,6 +71,14 @@ void LoadViews::finish(std::uint64_t epoch, bool is_all, Time now) {
   has_mesh_ = true;  // if it is empty now, it stays so
   is_complete_ = is_all && epoch == epoch_;
   serve(epoch, now);
+  for (; !open_.empty() && open_.front().epoch <= epoch; open_.pop_front(), --answered_) {
+    stats_.view_done_ms.push_back(milliseconds(now - open_.front().due));
+  }
+}
+
+// Of the view served last. What a client's first view brings is no change.
+void LoadViews::count_bytes() {
+  if (served_ && (is_only_one() || served_->epoch != first_epoch_)) stats_.view_bytes.push_back(double(served_->bytes));
 }
 
 void LoadViews::note_mesh(std::uint64_t bytes, Time now) {
@@ -72,11 +93,13 @@ void LoadViews::lose(Time now) {
 }
 
 void LoadViews::report_rest(bool failed, Time now) {
-  stats_.unanswered_views += pending_.size();
+  stats_.unanswered_views += open_.size() - answered_;
   if (failed) return;
+  count_bytes();
   if (is_complete_) ++stats_.complete;
   if (!has_mesh_) stats_.first_mesh_ms.push_back(milliseconds(now - start_));
-  if (!pending_.empty() || lost_at_) serve(UINT64_MAX, now);
+  if (answered_ < open_.size() || lost_at_) answer(UINT64_MAX, now);
+  for (const Open& view : open_) stats_.view_done_ms.push_back(milliseconds(now - view.due));
 }
 
 }  // namespace intervale

@@ -76,11 +76,13 @@ void add_view_options(CLI::App& app, LoadOptions& load) {
   app.add_option_function<std::string>(
          "--scenario", [&load, number_of](const std::string& name) { load.scenario = Scenario(number_of(name)); },
          "full: the whole stream, once; orbit (default): around the box; zoom: to a point on the box and back; jump: to a random place with "
-         "each view")
-      ->check([=](const std::string& name) { return std::string(number_of(name) < kScenarios.size() ? "" : "must be full, orbit, zoom or jump"); })
-      ->type_name("full|orbit|zoom|jump")
+         "each view; range: drags the ends of the range, in a data set of every range")
+      ->check(
+          [=](const std::string& name) { return std::string(number_of(name) < kScenarios.size() ? "" : "must be full, orbit, zoom, jump or range"); })
+      ->type_name("full|orbit|zoom|jump|range")
       ->group(group);
-  within(app.add_option("--views-per-second", load.views_per_second, "Views that each client sends a second; not for full")->capture_default_str(),
+  within(app.add_option("--views-per-second", load.views_per_second, "Views that each client sends a second; in range while it drags; not for full")
+             ->capture_default_str(),
          0.001, 1000, "N")
       ->group(group);
   within(app.add_option("--pixel-error", load.pixel_error,
@@ -88,7 +90,8 @@ void add_view_options(CLI::App& app, LoadOptions& load) {
              ->capture_default_str(),
          0.001, 10000, "PX")
       ->group(group);
-  within(app.add_option("--seed", load.seed, "Seed of the cameras: equal seeds give equal views")->capture_default_str(), 0, 9007199254740992.0, "N")
+  within(app.add_option("--seed", load.seed, "Seed of the cameras and of the drags: equal seeds give equal views")->capture_default_str(), 0,
+         9007199254740992.0, "N")
       ->group(group);
 }
 
@@ -114,12 +117,14 @@ void add_options(CLI::App& app, LoadCommand& options) {
   app.add_option("URL", options.url, "ws://host:port/NAME, or wss://")->required();
   within(app.add_option("--clients", load.clients, "Number of clients that run at once")->required(), 1, 1e6, "N");
   add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent; answers may arrive up to 2 s later")->required();
-  add_ranges_option(app, options.range, kShownRangeHelp)->group("Views");
+  add_ranges_option(app, options.range, std::string(kShownRangeHelp) + ". Scenario range: where drags begin (default: the upper half of the values)")
+      ->group("Views");
   add_refine_option(app, options.refine, kShownRefineHelp)->group("Views");
   add_view_options(app, load);
   add_connection_options(app, load);
-  const auto verify = app.add_flag(
-      "--verify", load.verify, "Apply the batches, and compare every mesh with that of the whole stream; takes the memory of a mesh for each client");
+  const auto verify = app.add_flag("--verify", load.verify,
+                                   "Apply the batches, and compare every mesh with that of the whole stream, or in range of the stream of its last "
+                                   "range; takes the memory of a mesh for each client");
   within(app.add_option("--max-tets", load.budget.max_tets,
                         "With --verify: most tetrahedra of each mesh; it keeps what is largest on the client's screen"),
          0, 1e15, "N")

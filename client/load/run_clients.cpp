@@ -17,6 +17,7 @@
 #include "client/core/client_session.h"
 #include "client/load/load_connection.h"
 #include "client/load/load_views.h"
+#include "client/load/range_path.h"
 #include "protocol/transport/await.h"
 
 namespace intervale {
@@ -49,6 +50,7 @@ class LoadClient {
         progress_(progress),
         start_(start),
         connection_(io, endpoints, plan, path.seed),
+        drags_{plan.shown.ranges.empty() ? Range{} : plan.shown.ranges[0], values_of(plan.description), path.seed},
         views_(path, start, stats),
         session_({.dataset = plan.url.name, .client = "intervale-load " INTERVALE_VERSION, .window = plan.window, .has_mesh = plan.verify}),
         wake_(io),
@@ -91,11 +93,13 @@ class LoadClient {
   }
 
   // After run(). Nothing if the plan wants none, or if it may be damaged.
-  [[nodiscard]] std::optional<StreamClient> take_mesh() {
+  [[nodiscard]] std::optional<LoadedMesh> take_mesh() {
     const Description* description = session_.description();
     // Nothing to compare it with.
     if (description && description->content_hash != plan_.description.content_hash) return {};
-    return std::move(session_).take_mesh();
+    auto mesh = std::move(session_).take_mesh();
+    if (!mesh) return {};
+    return LoadedMesh{*std::move(mesh), views_.lod(), views_.is_complete()};
   }
 
  private:
@@ -148,7 +152,18 @@ class LoadClient {
 
   void look() {
     const Lod lod = views_.lod();
-    (void)session_.look({lod, lod.camera, plan_.budget, plan_.shown});  // the plan's range is one of the data set
+    const bool sets_range = plan_.scenario == Scenario::range && session_.mesh();
+    const Time before = LoadClock::now();
+    (void)session_.look({lod, lod.camera, plan_.budget, shown()});  // these ranges are of the data set
+    const std::chrono::duration<double, std::milli> took = LoadClock::now() - before;
+    if (sets_range) stats_.set_range_ms.push_back(took.count());
+  }
+
+  // By the newest view that is due.
+  [[nodiscard]] RangeRequest shown() const {
+    RangeRequest shown = plan_.shown;
+    if (plan_.scenario == Scenario::range) shown.ranges = {range_of(drags_, views_.number())};
+    return shown;
   }
 
   asio::awaitable<void> read_messages() {
@@ -193,11 +208,13 @@ class LoadClient {
     if (session_.has_messages()) wake_.cancel();
   }
 
+  // Of the mesh without any update: no budget makes it smaller.
+  [[nodiscard]] std::uint64_t root_tets() const { return StreamClient::start(plan_.description, {}, shown())->tet_count(); }
+
   void take_opened(bool resumes, bool is_new_mesh, std::size_t size) {
     if (session_.description()->content_hash != plan_.description.content_hash) return fail("the server sent another volume than before");
     if (resumes && is_new_mesh) return fail("the server has the same volume, but does not resume");
     if (resumes) stats_.repeated_bytes += size;
-    if (session_.mesh() && is_new_mesh) root_tets_ = session_.mesh()->tet_count();
   }
 
   void take_batch(const ClientSession::Event& batch, std::size_t size, Time now) {
@@ -208,7 +225,7 @@ class LoadClient {
     views_.serve(batch.epoch, now);
     views_.note_bytes(size);
     const StreamClient* mesh = session_.mesh();
-    if (mesh && mesh->tet_count() > std::max(plan_.budget.max_tets, root_tets_)) return fail("a mesh exceeds its budget");
+    if (mesh && mesh->tet_count() > plan_.budget.max_tets && mesh->tet_count() > root_tets()) return fail("a mesh exceeds its budget");
     const bool is_seen = batch.updates > 0 && (!mesh || mesh->tet_count() > 0);
     if (is_seen) views_.note_mesh(session_.stats().bytes, mesh ? LoadClock::now() : now);
     leave_if_answered();
@@ -271,9 +288,9 @@ class LoadClient {
   Time start_;  // when it is to connect
   State state_ = State::connecting;
   LoadConnection connection_;
+  RangePath drags_;  // in the scenario range
   LoadViews views_;
   ClientSession session_;
-  std::uint64_t root_tets_ = 0;  // of the mesh without any update: no budget makes it smaller
   beast::flat_buffer buffer_;
   asio::steady_timer wake_;        // the writer sleeps on it
   asio::steady_timer rate_timer_;  // the reader does, where the rate is limited
@@ -295,7 +312,7 @@ asio::awaitable<void> end_on_time(asio::steady_timer& timer, const LoadPlan& pla
 
 }  // namespace
 
-LoadStats run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<StreamClient>> meshes, LoadProgress& progress) {
+LoadStats run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<LoadedMesh>> meshes, LoadProgress& progress) {
   asio::io_context io(1);
   const auto endpoints = tcp::resolver(io).resolve(plan.url.host, plan.url.port);
   LoadStats stats;

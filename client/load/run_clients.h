@@ -4,9 +4,9 @@
 #include <optional>
 #include <span>
 
-#include "client/core/stream_client.h"
 #include "client/load/load_plan.h"
 #include "client/load/load_stats.h"
+#include "client/load/verify_meshes.h"
 
 namespace intervale {
 
@@ -14,7 +14,7 @@ namespace intervale {
 // kGrace and the plan's patience after the end of the plan. meshes: a place for each of the plan's clients, filled if
 // the plan says verify, left empty if a batch was invalid; other threads may fill other places meanwhile. Throws on
 // failures of the machine, and if the host is not found.
-[[nodiscard]] LoadStats run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<StreamClient>> meshes,
+[[nodiscard]] LoadStats run_clients(const LoadPlan& plan, unsigned first, unsigned step, std::span<std::optional<LoadedMesh>> meshes,
                                     LoadProgress& progress);
 
 }  // namespace intervale

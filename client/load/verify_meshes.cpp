@@ -56,10 +56,10 @@ bool are_equal(const Mesh& a, const Mesh& b) {
   return Canonical(a) == Canonical(b);
 }
 
-Verified verify_meshes(std::span<const Front> reference, std::span<const std::optional<StreamClient>> clients, std::uint64_t seed) {
+Verified verify_meshes(std::span<const Front> reference, std::span<const std::optional<LoadedMesh>> clients, std::uint64_t seed) {
   std::vector<const StreamClient*> meshes;
   for (const auto& client : clients) {
-    if (client) meshes.push_back(&*client);
+    if (client) meshes.push_back(&client->client);
   }
   std::shuffle(meshes.begin(), meshes.end(), std::mt19937_64(seed));
   Verified verified;
@@ -70,6 +70,10 @@ Verified verify_meshes(std::span<const Front> reference, std::span<const std::op
     if (!equal) ++verified.differing;
   }
   return verified;
+}
+
+bool is_mesh_of_range(Front whole, const Front* fresh, const Front& front) {
+  return (fresh == nullptr || fresh->is_part_of(front)) && has_mesh_of(std::move(whole), front);
 }
 
 }  // namespace intervale

@@ -11,6 +11,7 @@
 
 #include "tests/support/peers.h"
 #include "tests/support/programs.h"
+#include "tests/support/temp_dir.h"
 
 namespace intervale {
 namespace {
@@ -80,6 +81,54 @@ TEST_P(LoadScenarios, EveryViewIsAnswered) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Load, LoadScenarios, testing::Values("orbit", "zoom", "jump"));
+
+// A gyroid of every range, 20 samples a side.
+struct EveryRangeFolder {
+  const TempDir folder;
+  const std::string file = folder / "every.ivm";
+  EveryRangeFolder() {
+    EXPECT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "20", "-o", folder / "gyroid.nrrd"}).status, 0);
+    EXPECT_EQ(run({program("intervale"), "build", folder / "gyroid.nrrd", "-o", file, "--step", "0.001"}).status, 0);
+  }
+};
+
+// The first drag, and the begin of the second one.
+TEST(Load, ADraggedRangeIsAnsweredWithItsMesh) {
+  const EveryRangeFolder every;
+  ServerProgram server(every.file);
+  const std::vector<std::string> options{"--clients",          "4",  "--duration", "1.8", "--ramp",    "0.2", "--scenario", "range",
+                                         "--views-per-second", "20", "--seed",     "3",   "--threads", "2",   "--verify"};
+  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
+           {}, {"--range", "-0.2", "0.4"}, {"--range", "0.5", "inf", "--refine", "uniform"}, {"--max-tets", "3000", "--max-kept", "2500"}}) {
+    std::vector<std::string> all = options;
+    all.insert(all.end(), more.begin(), more.end());
+    const auto figures = load(server.url("every"), all);
+    EXPECT_EQ(figures.at("scenario"), "range");
+    EXPECT_EQ(figures.at("connected"), 4);
+    EXPECT_EQ(figures.at("verified"), 4);
+    EXPECT_EQ(figures.at("differing"), 0);
+    EXPECT_GT(figures.at("views"), 4 * 11);
+    EXPECT_EQ(figures.at("unanswered_views"), 0);
+    EXPECT_GE(figures.at("view_done_ms").at("p99"), figures.at("view_change_ms").at("p99"));
+    EXPECT_GT(figures.at("view_bytes").at("max"), 0.0);
+    EXPECT_GT(figures.at("set_range_ms").at("p50"), 0.0);
+    const bool keeps_all = std::ranges::find(more, "--max-kept") == more.end();
+    if (keeps_all) {
+      EXPECT_EQ(figures.at("complete"), 4);
+    }
+  }
+}
+
+TEST(Load, ARangeIsDraggedInADataSetOfEveryRangeOnly) {
+  const std::vector<std::string> options{"--clients", "1", "--duration", "1", "--scenario", "range"};
+  ServerProgram one;
+  expect_complaint(run(command(one.url("buckyball"), options)), 2, "needs a data set of every range");
+  const EveryRangeFolder every;
+  ServerProgram server(every.file);
+  std::vector<std::string> two = options;
+  two.insert(two.end(), {"--range", "0", "1", "--range", "0.5", "1"});
+  expect_complaint(run(command(server.url("every"), two)), 2, "one range each");
+}
 
 // A client whose mesh is ever larger fails; what it shows is compared with what extract gives for that.
 TEST(Load, ABudgetIsKeptWhereverClientsLook) {

@@ -50,8 +50,9 @@ def start_server(bin, data, log):
 
 def start_clients(bin, address, seed):
     choice = random.Random(seed)
-    scenario = choice.choice(["full", "orbit", "zoom", "jump"])
-    command = [f"{bin}/intervale-load", f"ws://{address}/{choice.choice(['buckyball', 'gyroid'])}", "--scenario", scenario, "--seed", str(seed), "--json"]
+    scenario = choice.choice(["full", "orbit", "zoom", "jump", "range"])
+    name = "every" if scenario == "range" else choice.choice(["buckyball", "gyroid"])
+    command = [f"{bin}/intervale-load", f"ws://{address}/{name}", "--scenario", scenario, "--seed", str(seed), "--json"]
     command += ["--clients", str(choice.randint(1, 12)), "--duration", str(choice.randint(3, 20)), "--verify"]
     if scenario != "full" and choice.random() < 0.5:
         command += ["--max-tets", str(choice.choice([5000, 50000]))]
@@ -67,6 +68,8 @@ def main():
             subprocess.run([f"{bin}/intervale", "sample", name, "--size", str(size), "-o", f"{data}/{name}.nrrd"], check=True, stdout=subprocess.DEVNULL)
             built = [f"{bin}/intervale", "build", f"{data}/{name}.nrrd", "-o", f"{data}/{name}.ivm", "--range", str(low), str(high)]
             subprocess.run(built, check=True, stdout=subprocess.DEVNULL)
+        every = [f"{bin}/intervale", "build", f"{data}/gyroid.nrrd", "-o", f"{data}/every.ivm"]
+        subprocess.run(every, check=True, stdout=subprocess.DEVNULL)
         server, address = start_server(bin, data, f"{data}/log")
         try:
             return soak(bin, server, address, minutes)

@@ -85,6 +85,12 @@ TEST_P(Paths, ViewsDependOnSeedAndNumberOnly) {
 
 INSTANTIATE_TEST_SUITE_P(CameraPaths, Paths, testing::Values(Scenario::orbit, Scenario::zoom, Scenario::jump));
 
+TEST(CameraPaths, WhileTheRangeIsDraggedTheCameraStaysWhereAnOrbitBegins) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    for (std::uint64_t number : {0, 1, 100}) EXPECT_EQ(view_of(path_of(Scenario::range, seed), number), view_of(path_of(Scenario::orbit, seed), 0));
+  }
+}
+
 TEST(CameraPaths, AnOrbitSeesTheWholeBoxAndTurnsIn20Seconds) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     CameraPath path = path_of(Scenario::orbit, seed);

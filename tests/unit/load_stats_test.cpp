@@ -45,6 +45,9 @@ TEST(LoadStats, AddUp) {
   a.errors = {{"lost", 1}};
   LoadStats b = a;
   b.view_change_ms = {7};
+  b.view_done_ms = {9};
+  b.view_bytes = {100};
+  b.set_range_ms = {3};
   b.errors = {{"lost", 2}, {"late", 1}};
   a.add(std::move(b));
   EXPECT_EQ(a.connected, 4u);
@@ -52,6 +55,9 @@ TEST(LoadStats, AddUp) {
   EXPECT_EQ(a.updates, 20u);
   EXPECT_EQ(a.first_mesh_ms, (std::vector<double>{1, 2, 1, 2}));
   EXPECT_EQ(a.view_change_ms, std::vector<double>{7});
+  EXPECT_EQ(a.view_done_ms, std::vector<double>{9});
+  EXPECT_EQ(a.view_bytes, std::vector<double>{100});
+  EXPECT_EQ(a.set_range_ms, std::vector<double>{3});
   EXPECT_EQ(a.errors, (std::map<std::string, std::uint64_t>{{"lost", 3}, {"late", 1}}));
 }
 
@@ -65,7 +71,7 @@ TEST(LoadReport, JsonHasItsKeys) {
   report.stats.errors = {{"lost", 2}};
   auto json = to_json(report);
   for (const char* key : {"clients", "connected", "failed", "updates", "bytes", "updates_per_s", "bytes_per_s", "first_mesh_ms", "first_mesh_bytes",
-                          "view_change_ms", "stale_bytes", "errors"}) {
+                          "view_change_ms", "view_done_ms", "view_bytes", "stale_bytes", "set_range_ms", "errors"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
   EXPECT_EQ(json.at("updates_per_s"), 2.5);

@@ -38,7 +38,7 @@ TEST(LoadViews, WaitSinceTheyWereDueHoweverLateTheyAreSent) {
   EXPECT_EQ(c.stats.late_views, 3u);
 }
 
-TEST(LoadViews, AreOverOnceAllAreAnsweredAndThereIsAMesh) {
+TEST(LoadViews, AreOverOnceAllAreDoneAndThereIsAMesh) {
   Client c;
   c.views.begin(at(0));
   EXPECT_TRUE(c.views.advance(at(200)));
@@ -47,10 +47,73 @@ TEST(LoadViews, AreOverOnceAllAreAnsweredAndThereIsAMesh) {
   EXPECT_EQ(c.views.next_due(), LoadViews::Time::max());
   EXPECT_FALSE(c.views.advance(at(1000)));
   c.views.serve(2, at(1000));
-  EXPECT_FALSE(c.views.are_over());
   c.views.note_mesh(300, at(1010));
+  EXPECT_FALSE(c.views.are_over());
+  EXPECT_FALSE(c.views.is_complete());
+  c.views.finish(2, true, at(1020));
   EXPECT_TRUE(c.views.are_over());
+  EXPECT_TRUE(c.views.is_complete());
   EXPECT_EQ(c.stats.first_mesh_ms, (std::vector<double>{1010}));
+}
+
+TEST(LoadViews, AreDoneWithTheDoneForThemOrForANewerOne) {
+  Client c;
+  c.views.begin(at(0));
+  c.views.asked(1);
+  c.views.finish(1, true, at(100));
+  EXPECT_TRUE(c.views.advance(at(200)));
+  c.views.asked(2);
+  c.views.serve(2, at(210));
+  EXPECT_TRUE(c.views.advance(at(400)));
+  c.views.asked(3);
+  c.views.serve(3, at(450));
+  EXPECT_EQ(c.stats.view_done_ms, std::vector<double>{});
+  c.views.finish(3, true, at(500));
+  EXPECT_EQ(c.stats.view_change_ms, (std::vector<double>{10, 50}));
+  EXPECT_EQ(c.stats.view_done_ms, (std::vector<double>{300, 100}));
+  EXPECT_TRUE(c.views.advance(at(600)));
+  c.views.asked(4);
+  c.views.serve(4, at(605));
+  c.views.report_rest(false, at(1000));
+  EXPECT_EQ(c.stats.view_change_ms.back(), 5);
+  EXPECT_EQ(c.stats.view_done_ms.back(), 400) << "so far";
+  EXPECT_EQ(c.stats.unanswered_views, 0u);
+}
+
+// The first view brings the mesh, and later ones change it.
+TEST(LoadViews, TheBytesOfEachAnsweredViewButTheFirstCount) {
+  Client c;
+  c.views.begin(at(0));
+  c.views.asked(1);
+  c.views.serve(1, at(10));
+  c.views.note_bytes(5000);
+  EXPECT_TRUE(c.views.advance(at(600)));
+  c.views.asked(2);
+  c.views.serve(1, at(610));
+  c.views.note_bytes(700);
+  c.views.serve(2, at(620));
+  c.views.note_bytes(30);
+  c.views.serve(2, at(630));
+  c.views.note_bytes(40);
+  c.views.finish(2, true, at(640));
+  EXPECT_TRUE(c.views.advance(at(1000)));
+  c.views.asked(3);
+  c.views.finish(3, true, at(1010));  // nothing was missing
+  c.views.report_rest(false, at(2000));
+  EXPECT_EQ(c.stats.view_bytes, (std::vector<double>{70, 0}));
+  EXPECT_EQ(c.stats.stale_bytes, (std::vector<double>{700, 700, 700, 0, 0}));
+}
+
+TEST(LoadViews, OfDragsOfTheRangeAreTenAndThenARest) {
+  Client c(Scenario::range);
+  c.views.begin(at(0));
+  for (int move = 1; move <= 25; ++move) {
+    const auto due = at(200 * move + 1000 * ((move - 1) / 10));
+    EXPECT_EQ(c.views.next_due(), due);
+    EXPECT_TRUE(c.views.advance(due));
+  }
+  EXPECT_EQ(c.stats.late_views, 0u);
+  EXPECT_EQ(c.views.number(), 25u);
 }
 
 TEST(LoadViews, WhatIsUnansweredCountsWithItsTimeUnlessTheClientFailed) {
@@ -62,6 +125,7 @@ TEST(LoadViews, WhatIsUnansweredCountsWithItsTimeUnlessTheClientFailed) {
     c.views.report_rest(failed, at(1000));
     EXPECT_EQ(c.stats.unanswered_views, 2u);
     EXPECT_EQ(c.stats.view_change_ms, failed ? std::vector<double>{} : (std::vector<double>{800, 600}));
+    EXPECT_EQ(c.stats.view_done_ms, c.stats.view_change_ms);
     EXPECT_EQ(c.stats.first_mesh_ms, failed ? std::vector<double>{} : std::vector<double>{1000});
   }
 }
