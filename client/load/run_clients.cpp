@@ -154,7 +154,8 @@ class LoadClient {
     const Lod lod = views_.lod();
     const bool sets_range = plan_.scenario == Scenario::range && session_.mesh();
     const Time before = LoadClock::now();
-    (void)session_.look({lod, lod.camera, plan_.budget, shown()});  // these ranges are of the data set
+    const bool early = plan_.scenario == Scenario::range;
+    (void)session_.look({lod, lod.camera, plan_.budget, shown(), early});  // these ranges are of the data set
     const std::chrono::duration<double, std::milli> took = LoadClock::now() - before;
     if (sets_range) stats_.set_range_ms.push_back(took.count());
   }

@@ -107,6 +107,14 @@ std::vector<ShownRange> parts_of(const ShownRange& shown) {
   return parts;
 }
 
+ShownRange between_keys(const ValueFormat& format, const ShownRange& shown) {
+  const KeySides sides(format, shown.range);
+  ShownRange result = shown;
+  if (std::isfinite(shown.range.alpha) && sides.first_inside() <= format.last) result.range.alpha = format.value(ValueKey(sides.first_inside()));
+  if (std::isfinite(shown.range.beta) && sides.first_above() > 0) result.range.beta = format.value(ValueKey(sides.first_above() - 1));
+  return result.range.alpha <= result.range.beta ? result : shown;  // no key inside
+}
+
 std::shared_ptr<const RelevantUpdates> find_relevant_part(const IntervalVolume& volume, const ShownRange& part, Distances distances) {
   const UpdateErrors errors{volume.steps(), volume.error_steps()};
   std::vector<std::uint64_t> slots = relevant_slots(volume, part, on_all_cores);

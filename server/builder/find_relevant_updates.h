@@ -24,6 +24,10 @@ enum class Distances {
 // The ranges that a range consists of, one at least: those with one surface; and itself, if its inside is refined.
 [[nodiscard]] std::vector<ShownRange> parts_of(const ShownRange& shown);
 
+// The range whose ends are values of keys, with the same values of keys inside. So it has the same needs, but for how
+// far surfaces move, which depends on where they are between the values.
+[[nodiscard]] ShownRange between_keys(const ValueFormat& format, const ShownRange& shown);
+
 // What such a part needs. Refined inside: without distances. Uses all cores that oneTBB may.
 [[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_part(const IntervalVolume& volume, const ShownRange& part, Distances distances);
 

@@ -5,7 +5,19 @@
 #include <utility>
 #include <vector>
 
+#include "server/builder/all_cores.h"
+
 namespace intervale {
+namespace {
+
+// What estimates are kept of.
+bool is_part(const IntervalVolume& volume, const ShownRanges& shown) {
+  if (shown.size() != 1 || shown.front() != between_keys(volume.description().format, shown.front())) return false;
+  const std::vector<ShownRange> parts = parts_of(shown.front());
+  return std::find(parts.begin(), parts.end(), shown.front()) != parts.end();
+}
+
+}  // namespace
 
 RangeCache::RangeCache(Find find, std::size_t most_bytes)
     : find_(std::move(find)), most_bytes_(most_bytes), measuring_([this](const std::stop_token& stop) { measure_all(stop); }) {}
@@ -15,7 +27,8 @@ RangeCache::Relevant RangeCache::compute(const Volume& volume, const ShownRanges
   const std::vector<ShownRange> parts = is_one ? parts_of(shown.front()) : shown;
   std::vector<Relevant> each;
   each.reserve(parts.size());
-  for (const ShownRange& part : parts) {
+  for (ShownRange part : parts) {
+    if (distances != Distances::measured) part = between_keys(volume->description().format, part);
     each.push_back(is_one && part == shown.front() ? find_(*volume, part, distances) : get(volume, {part}, distances));
   }
   if (each.size() == 1) return each.front();
@@ -29,6 +42,7 @@ std::list<RangeCache::Entry>::iterator RangeCache::find_entry(const Volume& volu
 
 RangeCache::Relevant RangeCache::get(const Volume& volume, const ShownRanges& shown, Distances distances) {
   if (shown.size() == 1 && shown.front() == volume->description().whole()) return {volume, &volume->relevant()};
+  if (distances != Distances::measured && !is_part(*volume, shown)) return compute(volume, shown, distances);  // in a millisecond or two
   std::promise<Relevant> promise;
   std::unique_lock lock(mutex_);
   if (const auto known = find_entry(volume, shown, distances); known != entries_.end()) {
@@ -95,7 +109,7 @@ void RangeCache::measure_all(const std::stop_token& stop) {
     lock.unlock();
     if (request) {
       try {
-        request->promise_.set_value(get(request->volume_, request->shown_, Distances::measured));
+        on_spare_cores([&] { request->promise_.set_value(get(request->volume_, request->shown_, Distances::measured)); });
       } catch (...) {
         request->promise_.set_exception(std::current_exception());
       }

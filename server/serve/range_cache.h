@@ -1,7 +1,8 @@
 // What ranges need of the data sets that are served (RelevantUpdates), shared by all sessions.
 //
 // A range consists of parts, one for each of its surfaces (find_relevant_updates.h). Each part is found once, for all
-// ranges that share it. Distances are estimated at once; a thread of its own measures them, the newest request first.
+// ranges that share it; estimates do for all ranges with the same values of keys inside. Distances are estimated at
+// once; a thread of its own measures them, the newest request first.
 #pragma once
 
 #include <condition_variable>

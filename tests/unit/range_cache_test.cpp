@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <semaphore>
 #include <stdexcept>
@@ -62,7 +63,7 @@ TEST_F(RangeCacheTest, EachSurfaceIsFoundOnce) {
   EXPECT_EQ(found, 4);
   (void)get(cache, volume, {{{-0.5, 0.25}, Refine::uniform}});
   EXPECT_EQ(found, 5) << "the inside";
-  EXPECT_EQ(get(cache, volume, between(-0.5, 0.5)), first);
+  (void)get(cache, volume, between(-0.5, 0.5));
   EXPECT_EQ(first->shown(), between(-0.5, 0.5));
   EXPECT_EQ(found, 5);
 }
@@ -96,12 +97,28 @@ TEST_F(RangeCacheTest, SeveralRangesAreUnitedOnceOfWhatEachNeeds) {
   RangeCache cache(find);
   const ShownRanges both = distinct({above(2).front(), between(-1, 0.02).front(), above(2).front()});
   ASSERT_EQ(both.size(), 2u);
-  const auto first = get(cache, volume, above(2)), all = get(cache, volume, both);
+  const auto measured = [&](const ShownRanges& shown) { return cache.get(volume, shown, Distances::measured); };
+  const auto first = measured(above(2)), all = measured(both);
   EXPECT_EQ(found, 3);
   EXPECT_EQ(all->shown(), both);
-  EXPECT_EQ(get(cache, volume, both), all);
-  EXPECT_EQ(get(cache, volume, above(2)), first);
+  EXPECT_EQ(measured(both), all);
+  EXPECT_EQ(measured(above(2)), first);
   EXPECT_EQ(found, 3);
+}
+
+// On the way from one value to the next a surface crosses the same edges, but at other places.
+TEST_F(RangeCacheTest, EstimatesDoForAllRangesBetweenTwoKeys) {
+  const ValueFormat& format = volume->description().format;
+  const auto at = [&](ValueKey key, double share) { return std::lerp(format.value(key), format.value(key + 1), share); };
+  RangeCache cache(find);
+  const ShownRanges a = between(at(10, 0.25), at(60, 0)), b = between(at(10, 0.5), at(60, 0.75)), c = between(at(11, 0.25), at(60, 0.5));
+  for (const ShownRanges& shown : {a, b, a}) EXPECT_EQ(get(cache, volume, shown)->shown(), shown);
+  EXPECT_EQ(found, 2);
+  (void)get(cache, volume, c);
+  EXPECT_EQ(found, 3);
+  (void)cache.get(volume, a, Distances::measured);
+  (void)cache.get(volume, b, Distances::measured);
+  EXPECT_EQ(found, 3 + 4);
 }
 
 TEST_F(RangeCacheTest, TriesAgainAfterAFailure) {
