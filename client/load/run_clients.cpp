@@ -280,7 +280,8 @@ class LoadClient {
     if (session_.mesh() && session_.state() != ClientSession::State::closed) {
       stats_.repeated_updates += session.updates - session.forgotten - session_.mesh()->updates();
     }
-    views_.report_rest(state_ == State::failed, LoadClock::now());
+    // Not the time that closing took.
+    views_.report_rest(state_ == State::failed, std::min(LoadClock::now(), plan_.end() + kGrace));
   }
 
   const LoadPlan& plan_;
