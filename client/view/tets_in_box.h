@@ -1,7 +1,6 @@
 // The tetrahedra of a part of a mesh, to be drawn one by one (paper, figure 7).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -15,8 +14,9 @@ struct TetVertex {
   float x = 0, y = 0, z = 0;
   float middle_x = 0, middle_y = 0, middle_z = 0;
   Surface surface = Surface::inside;
-  std::uint8_t lod = 0;  // as of SurfaceVertex
-  std::array<std::uint8_t, 2> padding{};
+  std::uint8_t lod = 0;    // as of SurfaceVertex
+  std::uint8_t range = 0;  // for a caller that draws several meshes: which one
+  std::uint8_t padding = 0;
 };
 static_assert(sizeof(TetVertex) == 28);
 

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "client/view/boundary_surface.h"
+#include "client/view/drawn_range.h"
+#include "client/view/point_values.h"
 #include "common/selection/stream_plan.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
@@ -53,6 +55,29 @@ TEST_P(CoarseFrontOf, AnotherRangeShowsWhatTheFineMeshHasOfTheseLevels) {
   ASSERT_TRUE(client_.show({.ranges = {within}, .refine = Refine::boundary}));
   EXPECT_EQ(canonical(moved.mesh()), canonical(coarse_front(client_, 3).mesh()));
   EXPECT_LE(moved.tet_count(), client_.tet_count());
+}
+
+TEST_P(CoarseFrontOf, IsDrawnInPlaceOfTheMeshUntilThatIsAskedFor) {
+  DrawnRange drawn(client_.front());
+  (void)drawn.update(false, false);
+  const std::uint64_t exact = drawn.surface().triangles();
+  const ShownRange within{{client_.front().range().alpha + 0.1, client_.front().range().beta}, Refine::boundary};
+  for (const int levels : {6, 3}) {
+    drawn.use_coarse(client_, levels, within);
+    EXPECT_TRUE(drawn.update(false, true).reset);
+    Front coarse = coarse_front(client_, levels);
+    coarse.set_range(within.range, within.refine);
+    BoundarySurface surface(coarse);
+    (void)surface.update();
+    EXPECT_EQ(drawn.surface().triangles(), surface.triangles());
+    EXPECT_EQ(drawn.values(), point_values(surface));
+  }
+  drawn.use_exact();
+  EXPECT_TRUE(drawn.update(false, false).reset);
+  EXPECT_EQ(drawn.surface().triangles(), exact);
+  EXPECT_TRUE(drawn.values().empty());
+  const BoundarySurface::Change none = drawn.update(false, false);
+  EXPECT_TRUE(!none.reset && none.pieces.empty() && none.removed.empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Random, CoarseFrontOf, ::testing::Range(0u, 4u));

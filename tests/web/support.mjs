@@ -22,13 +22,14 @@ export const { launch, pixels, difference } = browser;
 
 export const program = (name, ...args) => execFileSync(join(bin, name), args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] });
 
-// A folder with interval volumes, deleted when the tests end. sample: of `intervale sample`, if not the name.
+// A folder with interval volumes, deleted when the tests end. sample: of `intervale sample`, if not the name. range:
+// without, the data set has every range.
 export function makeData(...wanted) {
   const folder = mkdtempSync(join(tmpdir(), 'intervale-web-'));
   process.on('exit', () => rmSync(folder, { recursive: true, force: true }));
   for (const { name, sample = name, size, range } of wanted) {
     program('intervale', 'sample', sample, '--size', String(size), '-o', join(folder, `${name}.nrrd`));
-    program('intervale', 'build', join(folder, `${name}.nrrd`), '-o', join(folder, `${name}.ivm`), '--range', ...range.map(String));
+    program('intervale', 'build', join(folder, `${name}.nrrd`), '-o', join(folder, `${name}.ivm`), ...(range ? ['--range', ...range.map(String)] : []));
   }
   return folder;
 }

@@ -6,16 +6,17 @@
 #include <emscripten/bind.h>
 #include <emscripten/val.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "client/view/boundary_surface.h"
-#include "client/view/coarse_front.h"
 #include "client/view/cross_section.h"
+#include "client/view/drawn_range.h"
 #include "client/view/point_values.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
@@ -51,6 +52,15 @@ val array_of(const Array& items) {
 std::array<double, 3> three(const val& array) { return {array[0].as<double>(), array[1].as<double>(), array[2].as<double>()}; }
 Box box_of(const val& box) { return {three(box["min"]), three(box["max"])}; }
 
+// Pairs of numbers.
+std::vector<Range> ranges_of(const val& list) {
+  std::vector<Range> ranges;
+  const auto count = list["length"].as<unsigned>();
+  ranges.reserve(count);
+  for (unsigned i = 0; i < count; ++i) ranges.push_back({list[i][0].as<double>(), list[i][1].as<double>()});
+  return ranges;
+}
+
 // null: as much as there is.
 std::uint64_t limit_of(const val& number) {
   return number.isNull() || number.isUndefined() ? UINT64_MAX : std::uint64_t(std::max(0.0, number.as<double>()));
@@ -84,27 +94,39 @@ class Viewer {
                      .fov = camera["fov"].as<double>(),
                      .viewport = {camera["viewport"][0].as<int>(), camera["viewport"][1].as<int>()},
                      .pixel_error = view["pixelError"].as<double>()};
-    if (!view["range"].isNull()) wanted.shown.ranges = {{view["range"][0].as<double>(), view["range"][1].as<double>()}};
+    wanted.shown.ranges = ranges_of(view["ranges"]);
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
     stale_ = true;  // a budget hides and shows at once
     is_previewing_ = false;
-    coarse_.reset();
-    return text_of(session_.look(wanted));
+    for (DrawnRange& range : drawn_) range.use_exact();
+    const auto looked = session_.look(wanted);
+    fit_to_mesh();
+    return text_of(looked);
   }
-  // The range that is shown until the next look(). levels: how many of the finest ones are left out (coarse_front.h).
-  std::string preview(const val& range, int levels) {
-    if (!surface_) return {};
-    const RangeRequest request{.ranges = {{range[0].as<double>(), range[1].as<double>()}}, .refine = {}};
+  // The ranges that are shown until the next look(). levels: how many of the finest ones are left out of the ranges that
+  // differ from the last view's (coarse_front.h).
+  std::string preview(const val& ranges, int levels) {
+    if (drawn_.empty()) return {};
+    const RangeRequest request{.ranges = ranges_of(ranges), .refine = {}};
+    const StreamClient& client = *session_.mesh();
+    const ShownRanges shown = resolve(client.description(), request);
     stale_ = is_previewing_ = true;
-    if (levels == 0) {
-      coarse_.reset();
-      return text_of(session_.preview(request));
+    if (levels == 0 || shown.size() != drawn_.size()) {
+      for (DrawnRange& range : drawn_) range.use_exact();
+      const auto previewed = session_.preview(request);
+      fit_to_mesh();
+      return text_of(previewed);
     }
-    const ShownRanges shown = resolve(session_.mesh()->description(), request);
-    if (auto held = check_held(session_.mesh()->description(), shown); !held) return text_of(held);
-    if (!coarse_ || coarse_->levels != levels) coarse_.emplace(*session_.mesh(), levels);
-    coarse_->front.set_range(shown.front().range, shown.front().refine);
+    if (auto held = check_held(client.description(), shown); !held) return text_of(held);
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      const Front& front = client.fronts()[i];
+      if (shown[i] == ShownRange{front.range(), front.refine()}) {
+        drawn_[i].use_exact();
+      } else {
+        drawn_[i].use_coarse(client, levels, shown[i]);
+      }
+    }
     return {};
   }
   void connected(double now) { session_.connected(time_of(now)); }
@@ -119,10 +141,8 @@ class Viewer {
     stale_ = true;
     const auto event = session_.receive(inbox_, time_of(now));
     event_ = event ? *event : ClientSession::Event();
-    if (event_.is_new_mesh) {
-      coarse_.reset();
-      surface_.emplace(session_.mesh()->front());
-    }
+    if (event_.is_new_mesh) drawn_.clear();
+    fit_to_mesh();
     return text_of(event);
   }
   val take_messages() {
@@ -153,15 +173,23 @@ class Viewer {
     progress.set("updatesInMesh", client ? double(client->updates_in_mesh()) : 0.0);
     progress.set("updatesShown", client ? double(client->updates() - client->updates_left_out()) : 0.0);
     progress.set("tets", client ? double(client->tet_count()) : 0.0);
-    progress.set("triangles", surface_ ? double(drawn().triangles()) : 0.0);
     progress.set("updatesToGo", double(stats.updates_to_go));
     progress.set("remainingError", stats.remaining_error);
     progress.set("remainingPixels", session_.remaining_pixels());
     progress.set("done", done());
     progress.set("full", stats.is_full);
-    progress.set("volume", surface_ ? drawn().volume() : 0.0);
-    const bool rests = surface_ && done() && !is_previewing_ && !stale_;  // the bound takes about as long as the surface
-    progress.set("volumeBound", rests ? val(surface_->volume_bound()) : val::null());
+    double triangles = 0, bound = 0;
+    std::vector<double> volumes;
+    volumes.reserve(drawn_.size());
+    for (const DrawnRange& range : drawn_) {
+      triangles += double(range.surface().triangles());
+      volumes.push_back(range.surface().volume());
+    }
+    progress.set("triangles", triangles);
+    progress.set("volumes", array_of(volumes));
+    const bool rests = !drawn_.empty() && done() && !is_previewing_ && !stale_;  // the bound takes about as long as the surface
+    for (DrawnRange& range : drawn_) bound += rests ? range.volume_bound() : 0;
+    progress.set("volumeBound", rests ? val(bound) : val::null());
     progress.set("reconnects", double(stats.connections > 0 ? stats.connections - 1 : 0));
     progress.set("repeated", client && stats.updates > client->updates() ? double(stats.updates - client->updates()) : 0.0);
     return progress;
@@ -174,50 +202,60 @@ class Viewer {
   // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything.
   val update_surface(bool edges, bool all) {
     stale_ = false;
-    const bool is_other = std::exchange(coarse_is_drawn_, coarse_.has_value()) != coarse_.has_value();
-    BoundarySurface& surface = coarse_ ? coarse_->surface : *surface_;
-    const BoundarySurface::Change change = all || is_other ? surface.all() : surface.update();
-    values_ = wants_values_ ? point_values(surface) : std::vector<float>();
-    val pieces = val::array();
-    for (const std::uint32_t id : change.pieces) {
-      const SurfacePiece p = surface.piece(id, edges);
-      val piece = val::object();
-      piece.set("id", p.id);
-      piece.set("vertices", buffer_of(p.vertices));
-      piece.set("values", values_at(p.points));
-      piece.set("indices", buffer_of(p.indices));
-      piece.set("edges", edges ? buffer_of(p.edges) : val::null());
-      piece.set("triangles", array_of(p.triangles));
-      piece.set("edgeCounts", array_of(p.edge_counts));
-      piece.set("min", array_of(p.min));
-      piece.set("max", array_of(p.max));
-      pieces.call<void>("push", piece);
+    val pieces = val::array(), removed = val::array(), reset = val::array();
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      const BoundarySurface::Change change = drawn_[i].update(all, wants_values_);
+      if (change.reset) reset.call<void>("push", double(i));
+      for (const std::uint32_t id : change.removed) removed.call<void>("push", piece_id(i, id));
+      for (const std::uint32_t id : change.pieces) pieces.call<void>("push", piece(i, id, edges));
     }
+    for (std::size_t i = drawn_.size(); i < ranges_sent_; ++i) reset.call<void>("push", double(i));
+    ranges_sent_ = drawn_.size();
     val result = val::object();
-    result.set("reset", change.reset);
+    result.set("reset", reset);
     result.set("pieces", pieces);
-    result.set("removed", array_of(change.removed));
+    result.set("removed", removed);
     return result;
   }
 
   // What is cut and shown one by one fits the last surface: is_stale() must be false.
-  [[nodiscard]] bool is_stale() const { return stale_ || !surface_; }
+  [[nodiscard]] bool is_stale() const { return stale_ || drawn_.empty(); }
   // Of a Cap, and of Tets, in messages.ts.
   val cap(const val& plane) const {
-    const CrossSection section = cross_section(drawn(), {three(plane["normal"]), plane["offset"].as<double>()}, values_);
+    CrossSection all;
+    std::vector<double> triangles;
+    triangles.reserve(drawn_.size());
+    for (const DrawnRange& range : drawn_) {
+      const CrossSection one = cross_section(range.surface(), {three(plane["normal"]), plane["offset"].as<double>()}, range.values());
+      triangles.push_back(double(one.vertices.size() / 3));
+      all.vertices.insert(all.vertices.end(), one.vertices.begin(), one.vertices.end());
+      all.values.insert(all.values.end(), one.values.begin(), one.values.end());
+    }
     val cap = val::object();
-    cap.set("vertices", buffer_of(section.vertices));
-    cap.set("values", !values_.empty() ? buffer_of(section.values) : val::null());
-    cap.set("triangles", double(section.vertices.size() / 3));
+    cap.set("vertices", buffer_of(all.vertices));
+    cap.set("values", have_values() ? buffer_of(all.values) : val::null());
+    cap.set("triangles", array_of(triangles));
     return cap;
   }
   val tets(const val& box) const {
-    const TetsInBox found = tets_in_box(drawn(), box_of(box), kMostTets);
+    TetsInBox all;
+    std::vector<float> values;
+    for (std::size_t i = 0; i < drawn_.size(); ++i) {
+      TetsInBox one = tets_in_box(drawn_[i].surface(), box_of(box), kMostTets / drawn_.size());
+      for (TetVertex& vertex : one.vertices) vertex.range = std::uint8_t(i);
+      all.vertices.insert(all.vertices.end(), one.vertices.begin(), one.vertices.end());
+      if (!drawn_[i].values().empty()) {
+        const std::vector<float> its = values_of(one.points, drawn_[i].values());
+        values.insert(values.end(), its.begin(), its.end());
+      }
+      all.count += one.count;
+      all.out_of += one.out_of;
+    }
     val tets = val::object();
-    tets.set("vertices", buffer_of(found.vertices));
-    tets.set("values", values_at(found.points));
-    tets.set("count", double(found.count));
-    tets.set("outOf", double(found.out_of));
+    tets.set("vertices", buffer_of(all.vertices));
+    tets.set("values", have_values() ? buffer_of(values) : val::null());
+    tets.set("count", double(all.count));
+    tets.set("outOf", double(all.out_of));
     return tets;
   }
 
@@ -238,28 +276,44 @@ class Viewer {
     return result ? std::string() : result.error().message;
   }
 
-  [[nodiscard]] val values_at(const std::vector<PointId>& points) const {
-    return !values_.empty() ? buffer_of(values_of(points, values_)) : val::null();
+  // A range is drawn for each of the mesh's fronts.
+  void fit_to_mesh() {
+    if (session_.mesh() == nullptr) return;
+    const std::vector<Front>& fronts = session_.mesh()->fronts();
+    while (drawn_.size() > fronts.size()) drawn_.pop_back();
+    while (drawn_.size() < fronts.size()) drawn_.emplace_back(fronts[drawn_.size()]);
   }
 
-  // The surface of the mesh, or of what stands in for it.
-  [[nodiscard]] const BoundarySurface& drawn() const { return coarse_ ? coarse_->surface : *surface_; }
+  // Whether the last update made values; empty meshes have none either way.
+  [[nodiscard]] bool have_values() const {
+    return std::any_of(drawn_.begin(), drawn_.end(), [](const DrawnRange& range) { return !range.values().empty(); });
+  }
 
-  struct Coarse {
-    Coarse(const StreamClient& client, int left_out) : levels(left_out), front(coarse_front(client, left_out)), surface(front) {}
-    int levels;
-    Front front;
-    BoundarySurface surface;
-  };
+  // Of a piece of the i-th range.
+  static double piece_id(std::size_t i, std::uint32_t id) { return double(std::uint64_t(id) * kMaxRanges + i); }
+  val piece(std::size_t i, std::uint32_t id, bool edges) {
+    const SurfacePiece p = drawn_[i].piece(id, edges);
+    val piece = val::object();
+    piece.set("id", piece_id(i, p.id));
+    piece.set("range", double(i));
+    piece.set("vertices", buffer_of(p.vertices));
+    piece.set("values", drawn_[i].values().empty() ? val::null() : buffer_of(values_of(p.points, drawn_[i].values())));
+    piece.set("indices", buffer_of(p.indices));
+    piece.set("edges", edges ? buffer_of(p.edges) : val::null());
+    piece.set("triangles", array_of(p.triangles));
+    piece.set("edgeCounts", array_of(p.edge_counts));
+    piece.set("min", array_of(p.min));
+    piece.set("max", array_of(p.max));
+    return piece;
+  }
+
   ViewingSession session_;
-  std::optional<BoundarySurface> surface_;
-  std::optional<Coarse> coarse_;  // in a preview of less than the mesh
-  bool coarse_is_drawn_ = false;
+  std::deque<DrawnRange> drawn_;  // none before the first mesh; of the ranges that are shown, in their order
+  std::size_t ranges_sent_ = 0;   // with the last surface
   std::vector<std::uint8_t> inbox_;
   ClientSession::Event event_;  // of the last message
   bool wants_values_ = false;
-  std::vector<float> values_;  // by PointId, of the last surface, if they were wanted
-  bool stale_ = true;          // the mesh may have changed since the last surface
+  bool stale_ = true;  // the mesh may have changed since the last surface
   bool is_previewing_ = false;
 };
 

@@ -1,4 +1,4 @@
-// The boundary surface of the mesh, as pieces on the graphics card. The pieces of a new version are uploaded a few per
+// The boundary surfaces of the meshes, as pieces on the graphics card. The pieces of a new version are uploaded a few per
 // frame; once all are there they replace the old ones in one step, so that no frame shows cracks. Nothing here visits
 // single vertices.
 import { BufferAttribute, BufferGeometry, LineSegments, type Material, Mesh, Scene, Sphere, Vector3 } from 'three';
@@ -9,6 +9,7 @@ import { setValues, type Uploader } from './upload';
 import { applied, boxAround, center, corners, diagonal } from './vec';
 
 interface PieceObjects {
+  range: number;
   mesh: Mesh;
   lines: LineSegments | null; // the edges
 }
@@ -22,7 +23,7 @@ export class BoundarySurfaceView {
   private pending: SurfaceChange[] = []; // oldest first
   private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
 
-  constructor(private uploader: Uploader, private materials: SurfaceMaterials) {
+  constructor(private uploader: Uploader, private materials: SurfaceMaterials[]) {
     this.faces.matrixWorldAutoUpdate = this.edges.matrixWorldAutoUpdate = false; // pieces are in drawing space
   }
 
@@ -51,7 +52,7 @@ export class BoundarySurfaceView {
   // Shows the first pending version.
   swap(): void {
     const change = this.pending.shift()!;
-    if (change.reset) for (const id of this.pieces.keys()) this.remove(id);
+    for (const [id, { range }] of this.pieces) if (change.reset.includes(range)) this.remove(id);
     for (const id of change.removed) this.remove(id);
     for (const { id, objects } of this.uploaded) {
       this.remove(id);
@@ -73,9 +74,9 @@ export class BoundarySurfaceView {
     this.hasValues = false;
   }
 
-  // materials: for the next draw; either one, or one per surface.
-  use(materials: Material | Material[]): void {
-    for (const { mesh } of this.pieces.values()) mesh.material = materials;
+  // materials: for the next draw; either one, or one per surface of each range.
+  use(materials: Material | Material[][]): void {
+    for (const { mesh, range } of this.pieces.values()) mesh.material = Array.isArray(materials) ? materials[range]! : materials;
   }
 
   private remove(id: number): void {
@@ -102,10 +103,10 @@ export class BoundarySurfaceView {
       });
       return made;
     };
-    const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials.opaque);
+    const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials[piece.range]!.opaque);
     setValues(mesh.geometry, piece.values);
-    const lines = piece.edges ? new LineSegments(geometry(piece.edges, piece.edgeCounts, 2), this.materials.edges) : null;
-    return { mesh, lines };
+    const lines = piece.edges ? new LineSegments(geometry(piece.edges, piece.edgeCounts, 2), this.materials[piece.range]!.edges) : null;
+    return { range: piece.range, mesh, lines };
   }
 }
 

@@ -1,15 +1,15 @@
-// The cap: the faces where the clip plane cuts the tetrahedra.
+// The cap: the faces where the clip plane cuts the tetrahedra of each range.
 import { BufferAttribute, BufferGeometry } from 'three';
-import { capDepthMaterial, capMaterial, thicknessMaterial } from './materials';
+import { capColorMaterials, capDepthMaterials, thicknessMaterial } from './materials';
 import type { Cap } from './messages';
 import { staticMesh } from './static_mesh';
 import { setValues, type Uploader } from './upload';
 
 export class CapView {
   readonly mesh = staticMesh(new BufferGeometry());
-  readonly material = capMaterial(false);
-  readonly valueMaterial = capMaterial(true);
-  readonly depth = capDepthMaterial();
+  readonly materials = capColorMaterials(false); // by range, as the next two
+  readonly valueMaterials = capColorMaterials(true);
+  readonly depth = capDepthMaterials();
   readonly thickness = thicknessMaterial(1);
   hasValues = false; // what is shown
 
@@ -20,10 +20,15 @@ export class CapView {
   show(cap: Cap | null): void {
     this.mesh.geometry.dispose();
     this.mesh.geometry = new BufferGeometry();
-    this.mesh.visible = cap !== null && cap.triangles > 0;
+    this.mesh.visible = cap !== null && cap.triangles.some((count) => count > 0);
     this.hasValues = !!cap?.values;
     if (!cap || !this.mesh.visible) return;
     this.mesh.geometry.setAttribute('position', new BufferAttribute(new Uint32Array(cap.vertices), 4));
+    let start = 0;
+    cap.triangles.forEach((count, range) => {
+      if (count > 0) this.mesh.geometry.addGroup(3 * start, 3 * count, range);
+      start += count;
+    });
     setValues(this.mesh.geometry, cap.values);
     this.uploader.send(this.mesh.geometry, cap.vertices.byteLength + (cap.values?.byteLength ?? 0));
   }

@@ -5,8 +5,9 @@ import type { Box, Cap, Palette, Plane, Progress, SurfaceChange, Tets, View } fr
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
   look(view: View): string;
-  // Shown until the next look(), of the updates that are here, without this number of finest levels.
-  preview(range: [number, number], levels: number): string;
+  // Shown until the next look(), of the updates that are here; the ranges that differ from the last view's without this
+  // number of finest levels.
+  preview(ranges: [number, number][], levels: number): string;
   connected(now: number): void; // the WebSocket was opened
   disconnected(): void; // ... or closed
   inbox(bytes: number): Uint8Array; // to be filled with one message; valid until the next call of any function

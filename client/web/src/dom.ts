@@ -20,6 +20,12 @@ export function setText(target: Element, text: string): void {
 
 type Tags = HTMLElementTagNameMap;
 
+export function createSvg<T extends keyof SVGElementTagNameMap>(tag: T, attributes: Record<string, string>): SVGElementTagNameMap[T] {
+  const made = document.createElementNS('http://www.w3.org/2000/svg', tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  return made;
+}
+
 // A new element with these properties and children.
 export function create<T extends keyof Tags>(tag: T, properties: Partial<Tags[T]>, ...children: (Node | string)[]): Tags[T] {
   const made = Object.assign(document.createElement(tag), properties);

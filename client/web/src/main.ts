@@ -11,11 +11,11 @@ import { showLegend } from './legend';
 import { watchPanel } from './panel';
 import { watchPointers } from './pointer';
 import { watchProgress } from './progress';
-import { rangeOf } from './range';
-import { watchRange } from './range_controls';
+import { rangesOf } from './range';
+import { watchRanges } from './range_controls';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
-import { exclusive, fromHash, toHash, type ViewState } from './state';
+import { exclusive, fromHash, kDefaults, toHash, type ViewState } from './state';
 import { Status } from './status';
 import { Store } from './store';
 import { watchTheme } from './theme';
@@ -97,9 +97,9 @@ class Page {
     onClick('fullscreen', toggleFullScreen);
     onClick('help', showHelp);
     watchPanel(view, status);
-    watchRange(view, status, (range) => {
-      this.worker.preview(range);
-      this.valueColors.preview(range);
+    watchRanges(view, status, (ranges) => {
+      this.worker.preview(ranges);
+      this.valueColors.preview(ranges);
     });
     watchSaving(status, viewer, this.worker);
     watchTheme(() => {
@@ -144,11 +144,11 @@ class Page {
     const pose = this.viewer.pose();
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
-    const { range, pixelError, region, maxTets, memory, clip, tets, wireframe, colorBy } = view.value;
+    const { pixelError, region, maxTets, memory, clip, tets, wireframe, colorBy } = view.value;
     const viewport: [number, number] = [canvas.width, canvas.height];
     const { dataset } = status.value;
     return {
-      view: { camera: { ...pose, viewport }, range: dataset && rangeOf(dataset, range), pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
+      view: { camera: { ...pose, viewport }, ranges: dataset ? rangesOf(dataset, view.value) : [], pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,
@@ -172,7 +172,7 @@ class Page {
     this.viewer.open(dataset);
     this.clip.opened();
     this.region.opened();
-    view.set({ dataset: dataset.name });
+    view.set({ dataset: dataset.name, ...(dataset.hasEveryRange ? {} : { ranges: kDefaults.ranges }) });
     const wanted = this.wanted();
     if (wanted) this.worker.open(dataset.name, wanted);
   }

@@ -4,7 +4,9 @@ import {
   RawShaderMaterial, type ShaderMaterialParameters, SrcAlphaFactor, Vector2, Vector3, Vector4, ZeroFactor,
 } from 'three';
 import * as shaders from './shaders';
-import { kSurfaces, type SurfaceName, type SurfaceStyle } from './state';
+import { kMostRanges, kSurfaces, type Styles, type SurfaceName } from './state';
+
+const colors = (): { value: Vector3[] } => ({ value: Array.from({ length: kMostRanges }, () => new Vector3()) });
 
 // All materials refer to these objects: a value set here holds for each of them. Positions are in drawing space.
 export const shared = {
@@ -22,9 +24,9 @@ export const shared = {
   shrink: { value: 0.8 },
   pixelScale: { value: 1 }, // pixels per unit of length, at one unit from the eye
   edgeWidth: { value: 0.4 },
-  alpha: { value: new Vector3() },
-  beta: { value: new Vector3() },
-  box: { value: new Vector3() },
+  alpha: colors(), // by range, as the next two
+  beta: colors(),
+  box: colors(),
 };
 
 type Uniforms = Record<string, IUniform>;
@@ -42,7 +44,7 @@ function material(vertexShader: string, fragmentShader: string, uniforms: Unifor
   });
 }
 
-// Each array has one material per surface, in the order of kSurfaces.
+// Of one range. Each array has one material per surface, in the order of kSurfaces.
 export interface SurfaceMaterials {
   opaque: RawShaderMaterial[];
   depth: RawShaderMaterial[]; // opaque surfaces, depth only: what transparent ones are tested against
@@ -71,14 +73,21 @@ const kAlphaBlending: Parameters = {
 
 const coloredBy = (value: boolean): Parameters => (value ? { defines: { BY_VALUE: '' } } : {});
 
-// byValue: colours show the field's values, which each vertex has then.
-export function surfaceMaterials(byValue: boolean): SurfaceMaterials {
+const kRanges = Array.from({ length: kMostRanges }, (_, range) => range);
+
+// Where ranges overlap, the earlier one lies in front.
+const behind = (range: number): Parameters => ({ polygonOffset: range > 0, polygonOffsetFactor: range, polygonOffsetUnits: range });
+
+// By range. byValue: colours show the field's values, which each vertex has then.
+export const surfaceMaterials = (byValue: boolean): SurfaceMaterials[] => kRanges.map((range) => materialsOf(range, byValue));
+
+function materialsOf(range: number, byValue: boolean): SurfaceMaterials {
   const opacities: Record<SurfaceName, IUniform> = { alpha: { value: 1 }, beta: { value: 1 }, box: { value: 1 } };
   const each = (fragment: string, uniforms: (name: SurfaceName) => Uniforms, parameters: Parameters) =>
     kSurfaces.map((name) => material(shaders.kSurfaceVertex, fragment, uniforms(name), parameters));
-  const colorOf = (name: SurfaceName) => ({ color: shared[name] });
-  const colorAndOpacityOf = (name: SurfaceName) => ({ color: shared[name], opacity: opacities[name] });
-  const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }; // lets edges lie in front
+  const colorOf = (name: SurfaceName) => ({ color: { value: shared[name].value[range] } });
+  const colorAndOpacityOf = (name: SurfaceName) => ({ ...colorOf(name), opacity: opacities[name] });
+  const offset = behind(range + 1); // lets edges lie in front
   return {
     opaque: each(shaders.kOpaqueFragment, colorOf, { ...offset, ...coloredBy(byValue) }),
     depth: each(shaders.kTransparentFragment, colorAndOpacityOf, { ...offset, colorWrite: false }),
@@ -87,12 +96,12 @@ export function surfaceMaterials(byValue: boolean): SurfaceMaterials {
   };
 }
 
-// Applies colours and opacities, and decides which material of each surface is visible.
-export function setStyles(materials: SurfaceMaterials, styles: Record<SurfaceName, SurfaceStyle>): void {
+// Applies colours and opacities to what is drawn of a range, and decides which material of each surface is visible.
+export function setStyles(materials: SurfaceMaterials, range: number, styles: Styles): void {
   kSurfaces.forEach((name, i) => {
     const { color, opacity } = styles[name];
     const { r, g, b } = new Color().setStyle(color, ''); // without conversion: the shaders make it linear
-    shared[name].value.set(r, g, b);
+    shared[name].value[range]!.set(r, g, b);
     const opaque = opacity > 0.995;
     materials.opaque[i]!.visible = materials.depth[i]!.visible = opaque;
     materials.transparent[i]!.visible = !opaque && opacity > 0.005;
@@ -103,8 +112,12 @@ export function setStyles(materials: SurfaceMaterials, styles: Record<SurfaceNam
 }
 
 const kDepthOnly: Parameters = { colorWrite: false };
-export const capMaterial = (byValue: boolean) => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box }, coloredBy(byValue));
-export const capDepthMaterial = () => material(shaders.kCapVertex, shaders.kCapFragment, { color: shared.box }, kDepthOnly);
+const capMaterials = (parameters: Parameters) =>
+  kRanges.map((range) =>
+    material(shaders.kCapVertex, shaders.kCapFragment, { color: { value: shared.box.value[range] } }, { ...behind(range), ...parameters }),
+  );
+export const capColorMaterials = (byValue: boolean) => capMaterials(coloredBy(byValue)); // by range, as the next
+export const capDepthMaterials = () => capMaterials(kDepthOnly);
 export const tetsMaterial = (byValue: boolean) => material(shaders.kTetsVertex, shaders.kTetsFragment, {}, coloredBy(byValue));
 export const tetsDepthMaterial = () => material(shaders.kTetsVertex, shaders.kTetsFragment, {}, kDepthOnly);
 

@@ -31,10 +31,10 @@ export type Request =
   // The view that is wanted from now on. With a region: that at full detail. Without: everything, until the error is at
   // most pixelError on the camera's screen. Before the first 'open': the view that the session starts with.
   | { type: 'view'; view: View }
-  // Shown until the next 'view', of what was received; the server is not asked. If all of it would take too long, it is
-  // coarser. Answered by a report of the same type once its surface was sent, which the page's showing of the last one
+  // Shown until the next 'view', of what was received; the server is not asked. If all of it would take too long, the
+  // ranges that differ from the view's are coarser. Answered by a report of the same type once its surface was sent, which the page's showing of the last one
   // precedes; or without one where there is no mesh, or a 'view' came before.
-  | { type: 'preview'; range: [number, number] }
+  | { type: 'preview'; ranges: [number, number][] }
   // Each is answered by a Cap; if a new one arrives before the answer, only the last is answered.
   | { type: 'clip'; plane: Plane | null }
   | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
@@ -46,7 +46,7 @@ export type Request =
 
 export interface View {
   camera: Pose & { viewport: [number, number] }; // viewport: device pixels
-  range: [number, number] | null; // of values; null: the data set's own
+  ranges: [number, number][]; // of values, four at most; a mesh is made for each; none: the data set's own
   pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null;
   maxTets: number | null; // in the mesh; null: no limit
@@ -92,21 +92,22 @@ export interface Progress {
   surfaceVersion: number; // of the last boundary surface sent to the page
   done: boolean; // all that this view wants was received, and is in that surface
   full: boolean; // the memory budget leaves some updates out
-  volume: number; // of the mesh, cubic world units
-  volumeBound: number | null; // the most by which refining the tetrahedra on the surfaces can change it; null: not known until done
+  volumes: number[]; // of the mesh of each range, cubic world units
+  volumeBound: number | null; // the most by which refining the tetrahedra on the surfaces can change their sum; null: not known until done
   memory: number; // of the core, bytes
   busy: { updates: number; seconds: number }; // updates decoded and applied, and the time for it
   reconnects: number;
   repeated: number; // updates received more than once; 0 unless the server has a defect
 }
 
-// The triangles of the mesh's boundary surface in one part of the data's box. 16 bytes per vertex: x, y, z as float32;
+// The triangles of the boundary surface of one range's mesh in one part of the data's box. 16 bytes per vertex: x, y, z as float32;
 // the normal in world space as int8 of length 127 (averaged over the triangles of the vertex's own surface, or that of
 // the box's face); the level of detail as uint8: the scale of the triangles around it, 0 the finest.
 // Triangles: three uint32 indices, counterclockwise seen from outside in the world; first those on the alpha surface, then those on
 // beta, then those on the faces of the data's box.
 export interface SurfacePiece {
-  id: number;
+  id: number; // no other range has it
+  range: number; // index among those shown
   vertices: ArrayBuffer;
   values: ArrayBuffer | null; // of the field at each vertex, float32; null unless wanted
   indices: ArrayBuffer;
@@ -122,25 +123,25 @@ export interface SurfacePiece {
 export interface SurfaceChange {
   version: number; // from 1
   hasValues: boolean; // all pieces have, also those from earlier changes
-  reset: boolean; // delete all earlier pieces first
+  reset: number[]; // ranges: delete all their earlier pieces first
   pieces: SurfacePiece[];
   removed: number[]; // ids
 }
 
-// The section of the mesh by a plane: each tetrahedron's as triangles without indices. 16 bytes per vertex: x, y, z as
+// The section of the meshes by a plane: each tetrahedron's as triangles without indices. 16 bytes per vertex: x, y, z as
 // float32; three uint8, one per side of the triangle: 255 at the opposite corner, 0 on the side; 255 at all corners for
 // a side that is not an edge of the tetrahedron's section; the level of detail as uint8.
 export interface Cap {
   plane: Plane | null;
   vertices: ArrayBuffer;
   values: ArrayBuffer | null; // as in a SurfacePiece
-  triangles: number;
+  triangles: number[]; // of each range, in their order
   version: number; // of the boundary surface made from the same mesh
 }
 
 // The tetrahedra whose centres lie in a box. Four vertices each, 28 bytes per vertex: x, y, z and the tetrahedron's
 // centre as float32, so that shaders can shrink it; surface as uint8 (0 inside, 1 alpha, 2 beta); level of detail as
-// uint8; two bytes of padding.
+// uint8; the index of the range as uint8; a byte of padding.
 export interface Tets {
   box: Box | null;
   vertices: ArrayBuffer;

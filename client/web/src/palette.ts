@@ -2,7 +2,7 @@
 import type { ColorMap } from './color_maps';
 import type { Dataset } from './datasets';
 import type { Palette } from './messages';
-import { type Range, rangeOf } from './range';
+import type { Range } from './range';
 import { clamp } from './vec';
 
 export interface NamedColors {
@@ -21,9 +21,11 @@ export const chosenPalette = (palettes: NamedColors[], name: string | null): Nam
   palettes.find((palette) => palette.name === name) ?? palettes[0] ?? null;
 
 // The least and the greatest value that have colours of their own: those beyond have the colours of the ends. Unless
-// asked otherwise, the part of the range that the field's values reach. range: that is asked for, see rangeOf().
-export function spanOf(dataset: Dataset, range: Range | null, asked: Range | null): Range {
+// asked otherwise, from the least to the greatest of the values that the ranges have and the field reaches. ranges: those
+// shown; none: the data set's own.
+export function spanOf(dataset: Dataset, ranges: Range[], asked: Range | null): Range {
   if (asked) return asked;
-  const [low, high] = rangeOf(dataset, range) ?? dataset.range;
-  return [clamp(low, ...dataset.values), clamp(high, ...dataset.values)];
+  const shown = ranges.length > 0 ? ranges : [dataset.range];
+  const reached = (value: number) => clamp(value, ...dataset.values);
+  return [reached(Math.min(...shown.map(([low]) => low))), reached(Math.max(...shown.map(([, high]) => high)))];
 }

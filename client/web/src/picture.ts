@@ -8,7 +8,7 @@ import { setStyles, shared, surfaceMaterials } from './materials';
 import type { Box, Cap, Vec3 } from './messages';
 import { Outlines } from './outlines';
 import { Pick } from './pick';
-import { kSurfaces, type ViewState } from './state';
+import { stylesOf, type Styles, type SurfaceStyle, type ViewState } from './state';
 import { TetsView } from './tets';
 import { Thickness } from './thickness';
 import { Transparency } from './transparency';
@@ -80,10 +80,12 @@ export class Picture {
   }
 
   setStyles(view: ViewState): void {
-    const seenThrough = kSurfaces.map((name) => [name, { ...view[name], opacity: Math.min(view[name].opacity, kAroundTets) }]);
-    const styles = view.tets ? { ...view, ...Object.fromEntries(seenThrough) } : view;
-    setStyles(this.materials, styles);
-    setStyles(this.valueMaterials, styles);
+    const around = (style: SurfaceStyle) => (view.tets ? { ...style, opacity: Math.min(style.opacity, kAroundTets) } : style);
+    stylesOf(view).forEach(({ alpha, beta, box }, range) => {
+      const styles: Styles = { alpha: around(alpha), beta: around(beta), box: around(box) };
+      setStyles(this.materials[range]!, range, styles);
+      setStyles(this.valueMaterials[range]!, range, styles);
+    });
     shared.colorByLevel.value = view.levels ? 1 : 0;
     shared.shrink.value = view.shrink;
   }
@@ -108,7 +110,7 @@ export class Picture {
     // What has no values yet is drawn in the colours of the surfaces.
     const isByValue = (part: { hasValues: boolean }) => view.colorBy === 'value' && part.hasValues && shared.palette.value !== null;
     const materials = isByValue(this.surface) ? this.valueMaterials : this.materials;
-    const cap = isByValue(this.cap) ? this.cap.valueMaterial : this.cap.material;
+    const cap = isByValue(this.cap) ? this.cap.valueMaterials : this.cap.materials;
     const tets = isByValue(this.tets) ? this.tets.valueMaterial : this.tets.material;
     renderer.setRenderTarget(null);
     renderer.setClearColor(this.background, 1);
@@ -116,11 +118,12 @@ export class Picture {
     if (view.thickness && this.thickness.isAvailable) {
       this.thickness.draw(renderer, camera, () => this.drawThicknessLayers(frame, pose));
     } else {
-      this.drawOpaque(materials.opaque, cap, tets);
+      this.drawOpaque(materials.map(({ opaque }) => opaque), cap, tets);
       if (view.wireframe) renderer.render(this.surface.edges, camera);
-      if (materials.transparent.some((material) => material.visible)) {
-        const drawDepth = () => this.drawOpaque(materials.depth, this.cap.depth, this.tets.depth);
-        this.transparency.draw(renderer, camera, drawDepth, () => this.drawSurface(materials.transparent));
+      const transparent = materials.map((of) => of.transparent);
+      if (transparent.flat().some((material) => material.visible)) {
+        const drawDepth = () => this.drawOpaque(materials.map(({ depth }) => depth), this.cap.depth, this.tets.depth);
+        this.transparency.draw(renderer, camera, drawDepth, () => this.drawSurface(transparent));
       }
     }
     if (withOutlines) renderer.render(this.outlines.scene, camera);
@@ -139,16 +142,16 @@ export class Picture {
   // Compiles the shaders of the first picture while the mesh is still being received.
   private compileShaders(): void {
     const scene = new Scene();
-    scene.add(...this.materials.opaque.map((material) => new Mesh(new BufferGeometry(), material)));
+    scene.add(...this.materials[0]!.opaque.map((material) => new Mesh(new BufferGeometry(), material)));
     this.renderer.compile(scene, this.camera);
   }
 
-  private drawSurface(materials: Material | Material[]): void {
+  private drawSurface(materials: Material | Material[][]): void {
     this.surface.use(materials);
     this.renderer.render(this.surface.faces, this.camera);
   }
 
-  private drawOpaque(surface: Material | Material[], cap: Material, tets: Material): void {
+  private drawOpaque(surface: Material | Material[][], cap: Material | Material[], tets: Material): void {
     this.drawSurface(surface);
     this.cap.mesh.material = cap;
     this.tets.use(tets);

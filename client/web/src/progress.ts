@@ -49,6 +49,7 @@ function fieldError({ progress: p, dataset }: Readonly<Status>): string | null {
   return p && (p.remainingError > 0 || !dataset || p.updatesShown >= dataset.updates) ? short(p.remainingError) : null;
 }
 
+const total = (volumes: number[]): number => volumes.reduce((sum, volume) => sum + volume, 0);
 const screenError = (p: Progress): string => `${short(p.remainingPixels)} px`;
 
 function showStatusLine(status: Readonly<Status>): void {
@@ -59,7 +60,7 @@ function showStatusLine(status: Readonly<Status>): void {
     parts.push([screenError(p), 'error']);
     if (field !== null) parts.push([field, 'field error']);
     parts.push([bytes(p.bytes), ''], [count(p.updates), 'updates'], [count(p.tets), 'tetrahedra']);
-    parts.push([bounded(p.volume, p.volumeBound), volumeUnit(status.dataset)]);
+    parts.push([bounded(total(p.volumes), p.volumeBound), volumeUnit(status.dataset)]);
   }
   element('status-values').replaceChildren(
     ...parts.map(([value, label]) => create('span', {}, create('b', {}, value), label && ` ${label}`)),
@@ -69,8 +70,11 @@ function showStatusLine(status: Readonly<Status>): void {
 function statistics(status: Readonly<Status>): [name: string, value: string][] {
   const { progress: p, dataset } = status;
   if (!p) return [['Received', 'nothing yet']];
+  const unit = volumeUnit(status.dataset);
+  const each = p.volumes.length > 1 ? p.volumes.map((volume, i): [string, string] => [`Volume of range ${i + 1}`, `${bounded(volume, null)} ${unit}`]) : [];
   const rows: [string, string][] = [
-    ['Volume', `${bounded(p.volume, p.volumeBound)} ${volumeUnit(status.dataset)}`],
+    ['Volume', `${bounded(total(p.volumes), p.volumeBound)} ${unit}`],
+    ...each,
     ['Screen-space error', screenError(p)],
   ];
   const field = fieldError(status);

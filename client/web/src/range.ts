@@ -1,6 +1,7 @@
-// The range of values that is shown. A data set of one range is shown in it; one that has more, in any range within.
-// Pure functions.
+// The ranges of values that are shown. A data set of one range is shown in it; one that has more, in any range within;
+// one of every range, in up to four of them. Pure functions.
 import type { Dataset, Statistics } from './datasets';
+import type { ViewState } from './state';
 import { clamp } from './vec';
 
 export type Range = [least: number, greatest: number];
@@ -13,6 +14,26 @@ export function rangeOf(dataset: Dataset, asked: Range | null): Range | null {
   const wanted: Range | null = asked ?? (dataset.hasEveryRange ? [(least + greatest) / 2, greatest] : null);
   const [low, high] = dataset.range;
   return wanted && [clamp(wanted[0], low, high), clamp(wanted[1], low, high)];
+}
+
+// The same of a view, for one range or several; none: its own range.
+export function rangesOf(dataset: Dataset, { range, ranges }: Pick<ViewState, 'range' | 'ranges'>): Range[] {
+  if (dataset.hasEveryRange && ranges.length > 0) return ranges.map((one) => one.range);
+  const one = rangeOf(dataset, range);
+  return one ? [one] : [];
+}
+
+// A range for one more: the middle of the widest part of the values that no range has.
+export function freeRange([least, greatest]: Range, ranges: Range[]): Range {
+  let end = least; // of what the ranges so far have
+  let [from, to] = [greatest, greatest];
+  for (const [low, high] of [...ranges].sort((a, b) => a[0] - b[0]).concat([[greatest, greatest]])) {
+    if (low - end > to - from) [from, to] = [end, low];
+    end = Math.max(end, high);
+  }
+  if (to <= from) [from, to] = [least, greatest];
+  const step = (greatest - least) / 256 || 1;
+  return [rounded(from + (to - from) / 3, step), rounded(to - (to - from) / 3, step)];
 }
 
 // The range with one bound changed; the other one follows if need be.

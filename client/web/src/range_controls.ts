@@ -1,131 +1,129 @@
-// The controls of the range: two number fields, and for data sets of every range the histogram of the field with two
-// handles. An empty field is an infinite bound. While a handle moves, the page shows what was received of the range; the
-// server is asked when it rests.
-import { boxVolume, type Statistics, volumeUnit } from './datasets';
-import { element, input, setText } from './dom';
+// The controls of the ranges: a row of number fields for each, and for data sets of every range the histogram of the
+// field with two handles for each range, and buttons to show more of them. While a handle moves, the page shows what was
+// received of its range; the server is asked when it rests.
+import { boxVolume, type Dataset, type Statistics, volumeUnit } from './datasets';
+import { element, onClick, setText } from './dom';
 import { short } from './format';
-import { boundMoved, enclosedShare, type Range, rangeOf, rounded } from './range';
-import type { ViewState } from './state';
+import { boundMoved, enclosedShare, freeRange, type Range, rangesOf } from './range';
+import { type End, kHeight, RangeRow } from './range_row';
+import { kMostRanges, kRangeColors, type StyledRange, type SurfaceStyle, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
-import { clamp } from './vec';
 
-type End = 0 | 1;
-const kEnds: readonly End[] = [0, 1];
 const kRestMs = 250; // a handle that does not move for so long rests
-const kHeight = 48; // of the histogram's drawing; each bin is 1 wide
-const kKeySteps: Record<string, number> = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -16, PageUp: 16 };
 
-// preview: shows a range of what was received.
-export function watchRange(view: Store<ViewState>, status: Store<Status>, preview: (range: Range) => void): void {
-  const fields = [input('range-low'), input('range-high')];
-  const handles = [element('range-handle-low'), element('range-handle-high')];
-  const chart = element('histogram');
-  let moving: Range | null = null; // by a handle, and not yet in the view
-  let restTimer = 0;
-  let restFrame = 0;
+// preview: shows ranges of what was received.
+export function watchRanges(view: Store<ViewState>, status: Store<Status>, preview: (ranges: Range[]) => void): void {
+  new RangeControls(view, status, preview);
+}
 
-  const current = (): Range | null => {
-    const { dataset } = status.value;
-    return moving ?? (dataset && (rangeOf(dataset, view.value.range) ?? dataset.range));
-  };
-  const show = () => {
-    const { dataset, statistics } = status.value;
-    element('range-section').hidden = !dataset?.hasRangesWithin;
-    const range = current();
-    kEnds.forEach((end) => {
-      const bound = range?.[end] ?? NaN;
-      fields[end]!.value = Number.isFinite(bound) ? String(Number(bound.toPrecision(7))) : '';
+class RangeControls {
+  private rows = Array.from({ length: kMostRanges }, (_, index) => this.row(index));
+  private moving: Range[] | null = null; // by a handle, and not yet in the view
+  private restTimer = 0;
+  private restFrame = 0;
+
+  constructor(private view: Store<ViewState>, private status: Store<Status>, private preview: (ranges: Range[]) => void) {
+    onClick('range-add', () => this.add());
+    view.watch(['range', 'ranges'], () => this.show());
+    status.watch(['dataset', 'statistics'], () => {
+      this.moving = null;
+      const { statistics } = status.value;
+      if (statistics) draw(statistics);
+      this.show();
     });
-    chart.hidden = element('range-volume').hidden = !statistics;
-    if (!dataset || !statistics || !range) return;
-    kEnds.forEach((end) => placeHandle(handles[end]!, statistics, range[end]));
-    const [from, to] = range.map((bound) => positionOf(statistics, bound));
-    element('histogram-selection').setAttribute('x', String(from! * statistics.counts.length));
-    element('histogram-selection').setAttribute('width', String((to! - from!) * statistics.counts.length));
-    const share = enclosedShare(statistics, range);
-    setText(element('range-volume'), `encloses ${short(share * boxVolume(dataset))} ${volumeUnit(dataset)}, ${(100 * share).toPrecision(3)} % of the box`);
-  };
-  const cancelRest = () => {
-    window.clearTimeout(restTimer);
-    window.cancelAnimationFrame(restFrame);
-  };
-  const commit = () => {
-    cancelRest();
-    if (moving) view.set({ range: moving });
-    moving = null;
-    show();
-  };
-  const move = (end: End, to: number) => {
-    const range = current();
-    const { dataset } = status.value;
-    if (!range || !dataset) return;
-    moving = boundMoved(range, end, to);
-    preview(moving);
-    show();
-    cancelRest();
+  }
+
+  private row(index: number): RangeRow {
+    return new RangeRow(index, {
+      statistics: () => this.status.value.statistics,
+      bound: (end) => this.current()[index]?.[end] ?? NaN,
+      type: (end, to) => {
+        const range = this.current()[index];
+        if (range) this.set(this.replaced(index, boundMoved(range, end, to)));
+        this.show();
+      },
+      move: (end, to) => this.move(index, end, to),
+      rest: () => this.commit(),
+      restyle: (change) => {
+        const { ranges } = this.view.value;
+        this.view.set({ ranges: ranges.map((one, i) => (i === index ? { ...one, style: { ...one.style, ...change } } : one)) });
+      },
+      remove: () => this.remove(index),
+    });
+  }
+
+  // Of a data set of one range, that one.
+  private current(): Range[] {
+    const { dataset } = this.status.value;
+    if (this.moving || !dataset) return this.moving ?? [];
+    const ranges = rangesOf(dataset, this.view.value);
+    return ranges.length > 0 ? ranges : [dataset.range];
+  }
+
+  private replaced = (index: number, range: Range): Range[] => this.current().map((one, i) => (i === index ? range : one));
+
+  private set(to: Range[]): void {
+    const { ranges } = this.view.value;
+    if (ranges.length === to.length) this.view.set({ ranges: ranges.map(({ style }, i) => ({ range: to[i]!, style })) });
+    else this.view.set({ range: to[0]! });
+  }
+
+  private add(): void {
+    const { dataset } = this.status.value;
+    const [now, { ranges, alpha }] = [this.current(), this.view.value];
+    if (!dataset || now.length >= kMostRanges) return;
+    const styled: readonly StyledRange[] = ranges.length > 0 ? ranges : [{ range: now[0]!, style: alpha }];
+    const color = kRangeColors.find((one) => styled.every(({ style }) => style.color !== one)) ?? kRangeColors[0]!;
+    this.view.set({ range: null, ranges: [...styled, { range: freeRange(dataset.values, now), style: { color, opacity: 1 } }] });
+  }
+
+  private remove(index: number): void {
+    const ranges = this.view.value.ranges.filter((_, i) => i !== index);
+    this.view.set(ranges.length > 1 ? { ranges } : { range: ranges[0]!.range, ranges: [] });
+  }
+
+  private move(index: number, end: End, to: number): void {
+    const range = this.current()[index];
+    if (!range) return;
+    this.moving = this.replaced(index, boundMoved(range, end, to));
+    this.preview(this.moving);
+    this.show();
+    this.cancelRest();
     // Moves arrive with frames: while one is drawn for longer than that, the handle may have moved on.
-    restTimer = window.setTimeout(() => (restFrame = window.requestAnimationFrame(commit)), kRestMs);
-  };
+    this.restTimer = window.setTimeout(() => (this.restFrame = window.requestAnimationFrame(() => this.commit())), kRestMs);
+  }
 
-  fields.forEach((field, end) => {
-    field.addEventListener('change', () => {
-      const range = current();
-      const to = field.value.trim() === '' ? (end === 0 ? -Infinity : Infinity) : field.valueAsNumber;
-      if (range && !Number.isNaN(to)) view.set({ range: boundMoved(range, end as End, to) });
-      show();
+  private commit(): void {
+    this.cancelRest();
+    const { moving } = this;
+    this.moving = null;
+    if (moving) this.set(moving);
+    this.show();
+  }
+
+  private cancelRest(): void {
+    window.clearTimeout(this.restTimer);
+    window.cancelAnimationFrame(this.restFrame);
+  }
+
+  private show(): void {
+    const { dataset, statistics } = this.status.value;
+    const [now, { ranges }] = [this.current(), this.view.value];
+    element('range-section').hidden = !dataset?.hasRangesWithin;
+    setText(element('h-range'), now.length > 1 ? 'Ranges of values' : 'Range of values');
+    element('histogram').hidden = !statistics;
+    element('range-add').hidden = !dataset?.hasEveryRange || now.length >= kMostRanges;
+    this.rows.forEach((row, i) => {
+      const style: SurfaceStyle | null = now.length > 1 ? (ranges[i]?.style ?? null) : null;
+      row.show(now[i] ?? null, style, statistics, dataset && statistics && now[i] ? enclosed(dataset, statistics, now[i]) : null);
     });
-  });
-  kEnds.forEach((end) => watchHandle(handles[end]!, chart, () => status.value.statistics, () => current()?.[end] ?? NaN, (to) => move(end, to), commit));
-  view.watch(['range'], show);
-  status.watch(['dataset', 'statistics'], () => {
-    moving = null;
-    const { statistics } = status.value;
-    if (statistics) draw(statistics);
-    show();
-  });
+  }
 }
 
-// Where a value lies between the ends of the histogram, 0 to 1.
-const positionOf = ({ least, width, counts }: Statistics, value: number): number => clamp((value - least) / (width * counts.length), 0, 1);
-
-function placeHandle(handle: HTMLElement, statistics: Statistics, value: number): void {
-  handle.style.left = `${100 * positionOf(statistics, value)}%`;
-  handle.setAttribute('aria-valuemin', String(statistics.least));
-  handle.setAttribute('aria-valuemax', String(statistics.least + statistics.width * statistics.counts.length));
-  handle.setAttribute('aria-valuenow', String(clamp(value, statistics.least, statistics.least + statistics.width * statistics.counts.length)));
-  handle.setAttribute('aria-valuetext', short(value));
-}
-
-function watchHandle(
-  handle: HTMLElement,
-  chart: HTMLElement,
-  statistics: () => Statistics | null,
-  value: () => number,
-  move: (to: number) => void,
-  rest: () => void,
-): void {
-  const valueAt = (share: number): number => {
-    const { least, width, counts } = statistics()!;
-    return rounded(least + width * counts.length * clamp(share, 0, 1), width);
-  };
-  handle.addEventListener('pointerdown', (event) => {
-    if (event.button === 0) handle.setPointerCapture(event.pointerId);
-  });
-  handle.addEventListener('pointermove', (event) => {
-    if (!handle.hasPointerCapture(event.pointerId) || !statistics()) return;
-    const { left, width } = chart.getBoundingClientRect();
-    move(valueAt((event.clientX - left) / width));
-  });
-  handle.addEventListener('lostpointercapture', rest);
-  handle.addEventListener('keydown', (event) => {
-    const field = statistics();
-    const steps = kKeySteps[event.key];
-    if (!field || (steps === undefined && event.key !== 'Home' && event.key !== 'End')) return;
-    event.preventDefault();
-    const at = positionOf(field, value());
-    move(valueAt(event.key === 'Home' ? 0 : event.key === 'End' ? 1 : at + steps! / field.counts.length));
-  });
+function enclosed(dataset: Dataset, statistics: Statistics, range: Range): string {
+  const share = enclosedShare(statistics, range);
+  return `encloses ${short(share * boxVolume(dataset))} ${volumeUnit(dataset)}, ${(100 * share).toPrecision(3)} % of the box`;
 }
 
 // Bars as high as the cube root of their counts: small peaks are seen beside large ones.

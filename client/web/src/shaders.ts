@@ -1,6 +1,7 @@
 // The shaders, in GLSL ES 3.0. Vertices arrive packed, as the worker sends them (see messages.ts), with positions in
 // samples. Lighting is computed in linear colour; inputs and outputs are sRGB.
 import { colorMapGlsl, kLevelColors, kThicknessColors } from './color_maps';
+import { kMostRanges } from './state';
 
 const kPrecision = `
 precision highp float;
@@ -190,10 +191,11 @@ void main() {
 export const kTetsVertex = `${kPrecision}
 in uvec3 position;
 in uvec3 center;
-in uint kind; // surface and level of detail
+in uint kind; // surface, level of detail and range
 uniform float shrink;
 out vec3 vUnshrunk;
 flat out float vLevel;
+flat out uint vRange;
 out vec2 vOnSurface; // interpolated over the triangle: 1 where all corners lie on alpha; the same for beta
 ${kTransform}${kValue}
 void main() {
@@ -204,21 +206,23 @@ void main() {
   uint surface = kind & 255u;
   vOnSurface = vec2(surface == 1u, surface == 2u);
   vLevel = float((kind >> 8) & 255u);
+  vRange = (kind >> 16) & 255u;
 }`;
 
 export const kTetsFragment = `${kPrecision}
 in vec3 vPosition;
 in vec3 vUnshrunk;
 flat in float vLevel;
+flat in uint vRange;
 in vec2 vOnSurface;
-uniform vec3 alpha, beta, box;
+uniform vec3 alpha[${kMostRanges}], beta[${kMostRanges}], box[${kMostRanges}];
 uniform vec4 clip;
 ${kColoring}${kLighting}
 out vec4 fragColor;
 void main() {
   vec3 n = normalize(cross(dFdx(vPosition), dFdy(vPosition)));
   if (dot(clip.xyz, vUnshrunk) > clip.w) discard;
-  vec3 color = vOnSurface.x > 0.999 ? alpha : vOnSurface.y > 0.999 ? beta : box;
+  vec3 color = vOnSurface.x > 0.999 ? alpha[vRange] : vOnSurface.y > 0.999 ? beta[vRange] : box[vRange];
   color *= 0.5 + 0.5 * abs(dot(n, normalize(cameraPosition - vPosition))); // darker at grazing angles: shows the gaps
   fragColor = vec4(lit(colored(color, vLevel), n, vPosition), 1.0);
 }`;

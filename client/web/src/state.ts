@@ -3,8 +3,8 @@
 //
 //   #data=NAME&eye=x,y,z&at=x,y,z&up=x,y,z&fov=30
 //
-// and, where they differ from the defaults: range=low,high (either may be -inf or inf), px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset,
-// roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe), shrink, color=value, palette (a name),
+// and, where they differ from the defaults: range=low,high (either may be -inf or inf), or several
+// range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe), shrink, color=value, palette (a name),
 // span=low,high, and alpha, beta and box (each rrggbb,opacity).
 import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
@@ -18,12 +18,26 @@ export interface SurfaceStyle {
 export type SurfaceName = 'alpha' | 'beta' | 'box';
 export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // the order of the groups in a SurfacePiece
 
+export type Styles = Record<SurfaceName, SurfaceStyle>; // of a range
+
+export const kMostRanges = 4; // that are shown at once
+
+// One of several ranges: its surfaces, and the inside, have one style.
+export interface StyledRange {
+  range: [number, number]; // of values, ascending
+  style: SurfaceStyle;
+}
+
+// Blue, orange, green and purple: told apart also by people who see few colours.
+export const kRangeColors: readonly string[] = ['#3d7fd6', '#e69f00', '#009e73', '#cc79a7'];
+
 export type ColorBy = 'surface' | 'value';
 
 export class ViewState {
   dataset: string | null = null; // null: the server's first
   pose: Pose | null = null; // null: shows the whole data set
   range: [number, number] | null = null; // of values, ascending; null: see rangeOf()
+  ranges: readonly StyledRange[] = []; // two to four are shown in place of `range`; or none
   pixelError = 1; // largest screen-space error, pixels; 0.1 to 64
   maxTets: number | null = null; // null: no limit
   memory: number | null = null; // MB for updates; null: no limit
@@ -44,6 +58,10 @@ export class ViewState {
 
 export const kDefaults: Readonly<ViewState> = { ...new ViewState() };
 
+// Of each range that is shown.
+export const stylesOf = ({ ranges, alpha, beta, box }: Readonly<ViewState>): Styles[] =>
+  ranges.length > 0 ? ranges.map(({ style }) => ({ alpha: style, beta: style, box: style })) : [{ alpha, beta, box }];
+
 const kFlags = ['tets', 'thickness', 'levels', 'wireframe'] as const;
 
 // A change of the view, with what it rules out: colours show one thing at a time.
@@ -55,6 +73,10 @@ export function exclusive(change: Partial<ViewState>): Partial<ViewState> {
 // Seven digits: precise to a hundredth of a pixel on any screen.
 const write = (numbers: number[]): string => numbers.map((n) => String(Number(n.toPrecision(7)))).join(',');
 
+// Exactly: values decide what is inside.
+const writeRange = (range: readonly number[]): string => range.map((x) => (Number.isFinite(x) ? String(x) : x < 0 ? '-inf' : 'inf')).join(',');
+const writeStyle = ({ color, opacity }: SurfaceStyle): string => `${color.slice(1)},${write([opacity])}`;
+
 export function toHash(state: ViewState): string {
   const parts: string[] = [];
   const put = (key: string, value: string) => parts.push(`${key}=${value}`);
@@ -65,7 +87,8 @@ export function toHash(state: ViewState): string {
     put('up', write(state.pose.up));
     if (state.pose.fov !== kFov) put('fov', write([state.pose.fov]));
   }
-  if (state.range) put('range', state.range.map((x) => (Number.isFinite(x) ? String(x) : x < 0 ? '-inf' : 'inf')).join(',')); // exactly: values decide what is inside
+  if (state.ranges.length > 0) for (const { range, style } of state.ranges) put('range', `${writeRange(range)},${writeStyle(style)}`);
+  else if (state.range) put('range', writeRange(state.range));
   if (state.pixelError !== kDefaults.pixelError) put('px', write([state.pixelError]));
   if (state.maxTets !== null) put('tets', write([state.maxTets]));
   if (state.memory !== null) put('mb', write([state.memory]));
@@ -80,7 +103,7 @@ export function toHash(state: ViewState): string {
   for (const name of kSurfaces) {
     const style = state[name];
     const standard = kDefaults[name];
-    if (style.color !== standard.color || style.opacity !== standard.opacity) put(name, `${style.color.slice(1)},${write([style.opacity])}`);
+    if (style.color !== standard.color || style.opacity !== standard.opacity) put(name, writeStyle(style));
   }
   return parts.length > 0 ? '#' + parts.join('&') : '';
 }
@@ -94,13 +117,29 @@ function read(text: string | null, n: number): number[] | null {
 }
 
 // Two ascending numbers, -inf or inf.
-function readRange(text: string | null): [number, number] | null {
-  const bounds = (text ?? '').split(',').map((word) => {
+function readRange(words: string[]): [number, number] | null {
+  const bounds = words.map((word) => {
     if (word === 'inf' || word === '-inf') return word === 'inf' ? Infinity : -Infinity;
     return word.trim() === '' ? NaN : Number(word);
   });
   const [low, high] = bounds;
   return bounds.length === 2 && low! <= high! && low !== Infinity && high !== -Infinity ? [low!, high!] : null;
+}
+
+function readStyle(text: string | null): SurfaceStyle | null {
+  const style = /^([0-9a-f]{6}),([0-9.e-]+)$/i.exec(text ?? '');
+  const opacity = readClamped(style?.[2] ?? null, 0, 1);
+  return style && opacity !== null ? { color: '#' + style[1]!.toLowerCase(), opacity } : null;
+}
+
+// Those that are valid; the first four.
+function readRanges(texts: string[]): StyledRange[] {
+  const ranges = texts.flatMap((text) => {
+    const words = text.split(',');
+    const [range, style] = [readRange(words.slice(0, 2)), words.length > 2 ? readStyle(words.slice(2).join(',')) : undefined];
+    return range && style !== null ? [{ range, style }] : [];
+  });
+  return ranges.slice(0, kMostRanges).map(({ range, style }, i) => ({ range, style: style ?? { color: kRangeColors[i]!, opacity: 1 } }));
 }
 
 // An up vector that is not parallel to the direction of view: the preferred one if possible.
@@ -126,7 +165,9 @@ export function fromHash(hash: string): ViewState {
   if (eye && lookAt && eye.some((x, i) => x !== lookAt[i])) {
     state.pose = { eye, lookAt, up: upFor(eye, lookAt, up ?? [0, 0, 1]), fov: readClamped(get('fov'), 5, 120) ?? kFov };
   }
-  state.range = readRange(get('range'));
+  const ranges = readRanges(fields.getAll('range'));
+  if (ranges.length > 1) state.ranges = ranges;
+  else state.range = ranges[0]?.range ?? null;
   state.pixelError = readClamped(get('px'), 0.1, 64) ?? kDefaults.pixelError;
   state.maxTets = readClamped(get('tets'), 1, 1e9);
   state.memory = readClamped(get('mb'), 1, 1e5);
@@ -145,9 +186,7 @@ export function fromHash(hash: string): ViewState {
   const span = read(get('span'), 2);
   if (span && span[0]! <= span[1]!) state.span = [span[0]!, span[1]!];
   for (const name of kSurfaces) {
-    const style = /^([0-9a-f]{6}),([0-9.e-]+)$/i.exec(get(name) ?? '');
-    const opacity = readClamped(style?.[2] ?? null, 0, 1);
-    if (style && opacity !== null) state[name] = { color: '#' + style[1]!.toLowerCase(), opacity };
+    state[name] = readStyle(get(name)) ?? state[name];
   }
   return get('color') === 'value' ? { ...state, ...exclusive({ colorBy: 'value' }) } : state;
 }

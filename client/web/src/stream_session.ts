@@ -36,10 +36,10 @@ export class StreamSession {
   private surfaceTimer = 0;
   private surfaceEnd = 0; // when the last one was finished, performance.now()
   private surfaceMs = 0; // what it took
-  private previewed: [number, number] | null = null; // to be shown once the page shows the last surface
+  private previewed: [number, number][] | null = null; // to be shown once the page shows the last surface
   private pace = new PreviewPace();
   private isPreviewing = false; // since the last view
-  private range: [number, number] | null = null; // of the last view
+  private ranges = ''; // of the last view
 
   private progressTime = 0; // when it was last reported
   private progressTimer = 0;
@@ -67,8 +67,9 @@ export class StreamSession {
   // Connects with the first view.
   look(view: View): void {
     this.endPreview();
-    const isOtherRange = String(view.range) !== String(this.range);
-    this.range = view.range;
+    const ranges = JSON.stringify(view.ranges);
+    const isOtherRange = ranges !== this.ranges;
+    this.ranges = ranges;
     const error = this.viewer.look(view);
     if (error) return this.fail(error);
     this.connection.start();
@@ -80,10 +81,10 @@ export class StreamSession {
   }
 
   // Without waiting for the server or for a pause: this follows the hand.
-  preview(range: [number, number]): void {
-    this.previewed = range;
+  preview(ranges: [number, number][]): void {
+    this.previewed = ranges;
     if (!this.isOpen) return this.answerPreview();
-    if (this.shown === this.version) this.showPreview(range);
+    if (this.shown === this.version) this.showPreview(ranges);
   }
 
   pageShows(version: number): void {
@@ -92,11 +93,11 @@ export class StreamSession {
     else this.scheduleSurface();
   }
 
-  private showPreview(range: [number, number]): void {
+  private showPreview(ranges: [number, number][]): void {
     if (!this.isPreviewing) this.pace.begin(this.viewer.progress().updatesShown);
     this.isPreviewing = true;
     const start = performance.now();
-    const error = this.viewer.preview(range, this.pace.levels);
+    const error = this.viewer.preview(ranges, this.pace.levels);
     if (error) return this.fail(error);
     this.isChanged = true;
     this.sendSurface();
@@ -127,7 +128,7 @@ export class StreamSession {
     const { plane } = this.extras;
     const { version } = this;
     if (plane === null || version === 0) {
-      return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), values: null, triangles: 0, version } });
+      return this.report({ type: 'cap', cap: { plane, vertices: new ArrayBuffer(0), values: null, triangles: [], version } });
     }
     if (this.viewer.isStale()) return this.scheduleSurface();
     const cap = this.viewer.cap(plane);
@@ -247,7 +248,7 @@ export class StreamSession {
     this.viewer.wantValues(hasValues);
     const change = this.viewer.updateSurface(edges, this.needsAll);
     this.needsAll = false;
-    if (change.pieces.length > 0 || change.removed.length > 0 || change.reset) {
+    if (change.pieces.length > 0 || change.removed.length > 0 || change.reset.length > 0) {
       ++this.version;
       const buffers = change.pieces.flatMap((piece) => [...buffersOf(piece), piece.indices, ...(piece.edges ? [piece.edges] : [])]);
       this.report({ type: 'surface', change: { ...change, version: this.version, hasValues } }, buffers);

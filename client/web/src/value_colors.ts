@@ -4,14 +4,14 @@ import type { ColorMap } from './color_maps';
 import { create, element, input, onClick } from './dom';
 import { shared } from './materials';
 import { chosenPalette, type NamedColors, spanOf } from './palette';
-import { boundMoved, type Range } from './range';
+import { boundMoved, type Range, rangesOf } from './range';
 import { type ColorBy, exclusive, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
 
 export class ValueColors {
   private fields = [input('span-low'), input('span-high')];
-  private previewed: Range | null = null;
+  private previewed: Range[] | null = null;
   private drawn: NamedColors | null = null; // in the texture
 
   // onChange: the picture is to be drawn again.
@@ -22,7 +22,7 @@ export class ValueColors {
     this.fields.forEach((field, end) => field.addEventListener('change', () => this.setEnd(end as 0 | 1, field.valueAsNumber)));
     onClick('span-reset', () => view.set({ span: null }));
     view.watch(['colorBy', 'palette', 'span'], () => this.show());
-    view.watch(['range'], () => this.preview(null));
+    view.watch(['range', 'ranges'], () => this.preview(null));
     status.watch(['dataset'], () => this.preview(null));
     status.watch(['palettes'], ({ palettes }) => {
       palette.replaceChildren(...palettes.map(({ name }) => create('option', { value: name }, name)));
@@ -30,9 +30,9 @@ export class ValueColors {
     });
   }
 
-  // The range that is shown while a handle moves; null: the view's.
-  preview(range: Range | null): void {
-    this.previewed = range;
+  // The ranges that are shown while a handle moves; null: the view's.
+  preview(ranges: Range[] | null): void {
+    this.previewed = ranges;
     this.show();
   }
 
@@ -44,7 +44,7 @@ export class ValueColors {
 
   private span(): Range | null {
     const { dataset } = this.status.value;
-    return dataset && spanOf(dataset, this.previewed ?? this.view.value.range, this.view.value.span);
+    return dataset && spanOf(dataset, this.previewed ?? rangesOf(dataset, this.view.value), this.view.value.span);
   }
 
   // What is not a number leaves the end as it is.

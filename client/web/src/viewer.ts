@@ -157,7 +157,7 @@ export class Viewer {
     if (cap && (!surface.isBusy || cap.version <= surface.version)) {
       this.pendingCap = null;
       this.picture.setCap(frame, cap);
-      this.stats.capTriangles = cap.plane ? cap.triangles : 0;
+      this.stats.capTriangles = cap.plane ? cap.triangles.reduce((sum, count) => sum + count, 0) : 0;
       this.isDirty = true;
     }
     const complete = surface.isBusy ? null : tets.upload();

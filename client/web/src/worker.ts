@@ -25,7 +25,7 @@ async function handle(request: Request): Promise<void> {
       view = request.view;
       return session?.look(view);
     case 'preview':
-      return session ? session.preview(request.range) : report({ type: 'preview' });
+      return session ? session.preview(request.ranges) : report({ type: 'preview' });
     case 'clip':
       extras.plane = request.plane;
       return session?.sendCap();

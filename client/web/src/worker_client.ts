@@ -32,8 +32,8 @@ export class WorkerClient {
   private viewTimer = 0;
   private sentPlane: Plane | null = null;
   private isAwaitingCap = false;
-  private wantedPreview: Range | null = null;
-  private previewed: Range | null = null; // sent
+  private wantedPreview: Range[] | null = null;
+  private previewed: Range[] | null = null; // sent
   private isAwaitingPreview = false;
   private tetsTimer = 0;
 
@@ -92,14 +92,14 @@ export class WorkerClient {
     if (wanted.values !== (last?.values ?? false)) this.send({ type: 'values', wanted: wanted.values });
   }
 
-  // Shows a range of what was received, until the next view. One request at a time: the latest range is sent when the
-  // last one was answered.
-  preview(range: Range): void {
-    this.wantedPreview = range;
-    if (this.isAwaitingPreview || sameJson(range, this.previewed)) return;
-    this.previewed = range;
+  // Shows ranges of what was received, until the next view. One request at a time: the latest ranges are sent when the
+  // last ones were answered.
+  preview(ranges: Range[]): void {
+    this.wantedPreview = ranges;
+    if (this.isAwaitingPreview || sameJson(ranges, this.previewed)) return;
+    this.previewed = ranges;
     this.isAwaitingPreview = true;
-    this.send({ type: 'preview', range });
+    this.send({ type: 'preview', ranges });
   }
 
   // Sends at once, or when the interval since the last one is over: the last view of a motion is always sent.

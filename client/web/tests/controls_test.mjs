@@ -1,30 +1,12 @@
 // Every control of the page, in a real browser with a fake worker: its effect on the picture, on the view's state, or
 // on the requests to the worker.
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { difference, launch, pixels, share } from './browser.mjs';
-import { openPage, refined, settled, startFakeServer } from './fake_server.mjs';
+import { test } from 'node:test';
+import { difference, pixels, share } from './browser.mjs';
+import { changesPicture, openPage, recordRequests, refined, settled, sharedPages, startFakeServer, state } from './fake_server.mjs';
 
-let browser;
-let server;
-before(async () => {
-  [browser, server] = await Promise.all([launch(), startFakeServer()]);
-});
-after(async () => {
-  await browser.close();
-  server.close();
-});
-
-// A test on a page that shows the refined gyroid. Fails also if the page has problems.
-const onPage = (name, run, { hash = '#data=gyroid', ...layout } = {}) =>
-  test(name, async () => {
-    const page = await openPage(browser, server.address + hash, layout);
-    await refined(page);
-    await run(page);
-    assert.deepEqual(page.problems, []);
-    await page.context().close();
-  });
-const state = (page) => page.evaluate(() => window.intervale.state);
+const shared = sharedPages();
+const { onPage } = shared;
 const stats = (page) => page.evaluate(() => ({ ...window.intervale.stats }));
 async function drag(page, from, by, steps = 5) {
   await page.mouse.move(...from);
@@ -37,18 +19,6 @@ async function handle(page, label, exact = false) {
   const { x, y, width, height } = await page.getByRole('button', { name: label, exact }).boundingBox();
   return [x + width / 2, y + height / 2];
 }
-// That an action changes at least this share of the picture, within 15 s: some changes come from the worker.
-async function changesPicture(page, act, least = 0.01) {
-  const old = await pixels(page);
-  await act();
-  let changed = 0;
-  for (const end = Date.now() + 15_000; changed < least && Date.now() < end; ) {
-    await settled(page);
-    changed = difference(old, await pixels(page)).share;
-  }
-  assert.ok(changed >= least, `${changed} of the picture changed`);
-}
-
 onPage('the mouse and keys rotate, pan and zoom; reset restores the view', async (page) => {
   const first = await pixels(page);
   assert.equal((await state(page)).pose, null);
@@ -188,14 +158,7 @@ onPage('colours, opacities, wireframe and levels of detail change the picture', 
 });
 
 onPage('the worker is asked for the chosen detail, and for the last view of a motion', async (page) => {
-  await page.evaluate(() => {
-    window.requests = [];
-    const post = Worker.prototype.postMessage;
-    Worker.prototype.postMessage = function (...message) {
-      window.requests.push(message[0]);
-      post.apply(this, message);
-    };
-  });
+  await recordRequests(page);
   const requested = (key, value) => page.waitForFunction(([k, v]) => window.requests.some((r) => r.type === 'view' && r.view[k] === v), [key, value]);
   await page.fill('#pixel-error', '20');
   await requested('pixelError', 2);
@@ -221,7 +184,7 @@ onPage('the address restores the picture', async (page) => {
   await page.waitForFunction(() => location.hash.includes('wireframe') && location.hash.includes('eye='));
   await settled(page);
   const [old, url] = [await pixels(page), page.url()];
-  const other = await openPage(browser, url);
+  const other = await openPage(shared.browser, url);
   await refined(other);
   await other.waitForFunction(() => window.intervale.stats.capTriangles > 0);
   await settled(other);
@@ -242,65 +205,6 @@ onPage('choosing another data set resets the view', async (page) => {
   await page.waitForFunction(() => window.intervale.progress?.full && window.intervale.progress.done);
   assert.equal((await state(page)).clip, null);
   await page.waitForFunction(() => document.querySelector('#progress-text').textContent === 'Done: memory limit reached');
-});
-
-onPage('of every range, the range is chosen by two numbers, and stands in the address', async (page) => {
-  assert.equal(await page.isVisible('#range-section'), false, 'this one has one range');
-  await page.evaluate(() => {
-    window.ranges = [];
-    const post = Worker.prototype.postMessage;
-    Worker.prototype.postMessage = function (...message) {
-      if (message[0].view) window.ranges.push(message[0].view.range);
-      post.apply(this, message);
-    };
-  });
-  const shows = (low, high) => page.waitForFunction(([a, b]) => {
-    const range = window.ranges.at(-1);
-    return range?.[0] === a && range[1] === b;
-  }, [low, high]);
-  await page.getByRole('radio', { name: 'any' }).check();
-  await shows(0, 1.5);
-  assert.equal(await page.inputValue('#range-high'), '1.5');
-  await page.fill('#range-low', '-0.25');
-  await page.press('#range-low', 'Enter');
-  await shows(-0.25, 1.5);
-  assert.equal(await page.textContent('#alpha-value'), 'field = −0.25');
-  await page.fill('#range-high', '');
-  await page.press('#range-high', 'Enter');
-  await shows(-0.25, Infinity);
-  await page.waitForFunction(() => location.hash.includes('range=-0.25,inf'));
-});
-
-onPage('of every range, handles on the histogram show what is there, and ask for the rest when they rest', async (page) => {
-  await page.getByRole('radio', { name: 'any' }).check();
-  await page.waitForSelector('#histogram:not([hidden])');
-  assert.equal(await page.textContent('#range-volume'), 'encloses 55,296 units³, 50.0 % of the box');
-  await page.evaluate(() => {
-    window.sent = [];
-    const post = Worker.prototype.postMessage;
-    Worker.prototype.postMessage = function (...message) {
-      const { type, range, view } = message[0];
-      if (range || view) window.sent.push([type, ...(range ?? view.range)]);
-      post.apply(this, message);
-    };
-  });
-  const [handle, chart] = [page.getByRole('slider', { name: 'Least value shown' }), await page.locator('#histogram').boundingBox()];
-  const at = async (share) => page.mouse.move(chart.x + share * chart.width, chart.y + chart.height / 2);
-  await at(0.5);
-  await page.mouse.down();
-  for (const share of [0.6, 0.7, 0.77]) await at(share);
-  assert.equal(await page.inputValue('#range-low'), '0.8');
-  await page.mouse.up();
-  await page.waitForFunction(() => window.sent.at(-1)?.[0] === 'view');
-  const sent = await page.evaluate(() => window.sent);
-  assert.deepEqual(sent.at(-1), ['view', 0.8, 1.5]);
-  assert.equal(sent.filter(([type]) => type === 'view').length, 1, 'no view while it moves');
-  assert.deepEqual(sent[0].slice(0, 1), ['preview']);
-  await handle.press('Home');
-  await page.waitForFunction(() => window.intervale.state.range?.[0] === -1.5);
-  assert.equal(await handle.getAttribute('aria-valuenow'), '-1.5');
-  await handle.press('ArrowRight');
-  await page.waitForFunction(() => Math.abs(window.intervale.state.range?.[0] + 1.25) < 0.1);
 });
 
 onPage('the picture returns when a lost WebGL context is restored', async (page) => {
@@ -358,15 +262,15 @@ for (const [width, height] of [[360, 740], [3840, 2160]]) {
 }
 
 test('the banner explains lost connections and errors', async () => {
-  const page = await openPage(browser, server.address + '#data=lost');
+  const page = await openPage(shared.browser, shared.server.address + '#data=lost');
   await page.waitForFunction(() => /Connection lost: .* Reconnecting in [1-8] s/.test(document.querySelector('#banner-text').textContent));
   await page.waitForFunction(() => document.querySelector('#banner-text').textContent === 'Reconnected: the stream was resumed.');
   await refined(page);
-  await page.goto(server.address + '#data=broken');
+  await page.goto(shared.server.address + '#data=broken');
   await page.reload();
   await page.getByRole('button', { name: 'Try again' }).click();
   await page.waitForFunction(() => document.querySelector('#banner-text').textContent.includes('no such data set'));
-  await page.goto(server.address + '#data=nothing-of-this-name');
+  await page.goto(shared.server.address + '#data=nothing-of-this-name');
   await page.reload();
   await page.waitForFunction(() => document.querySelector('#banner-text').textContent.includes('nothing-of-this-name'));
   await page.context().close();
@@ -374,7 +278,7 @@ test('the banner explains lost connections and errors', async () => {
 
 test('a required token is requested, and is not part of the address', async () => {
   const guarded = await startFakeServer('open sesame');
-  const page = await openPage(browser, guarded.address);
+  const page = await openPage(shared.browser, guarded.address);
   await page.fill('#token', 'wrong');
   await page.keyboard.press('Enter');
   await page.fill('#token', 'open sesame');
@@ -386,7 +290,7 @@ test('a required token is requested, and is not part of the address', async () =
 });
 
 test('without WebGL 2 the banner says so', async () => {
-  const page = await openPage(browser, server.address, { script: () => (HTMLCanvasElement.prototype.getContext = () => null) });
+  const page = await openPage(shared.browser, shared.server.address, { script: () => (HTMLCanvasElement.prototype.getContext = () => null) });
   await page.waitForFunction(() => document.querySelector('#banner-text').textContent.includes('WebGL 2'));
   assert.ok(await page.isVisible('#banner'));
   await page.context().close();

@@ -1,9 +1,12 @@
 // Serves the built page (INTERVALE_VIEWER_OUT, default dist/) with the server's Content-Security-Policy, with
 // fake_worker.js in place of its worker; and opens it in a browser.
+import assert from 'node:assert/strict';
 import { createServer } from 'node:http';
 import { readFile } from 'node:fs/promises';
 import { extname, join } from 'node:path';
+import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
+import { difference, launch, pixels } from './browser.mjs';
 
 const here = fileURLToPath(new URL('.', import.meta.url));
 const kPage = process.env.INTERVALE_VIEWER_OUT ?? join(here, '../dist');
@@ -69,6 +72,29 @@ export async function openPage(browser, url, { width = 800, height = 560, theme 
   return page;
 }
 
+// What the tests of a file share: a browser and a server, from before the first test until after the last one; and
+// onPage(name, run, options), a test on a page that shows the refined data set of options.hash. It fails also if the page
+// has problems. options: of openPage(), too.
+export function sharedPages() {
+  const shared = {};
+  before(async () => {
+    [shared.browser, shared.server] = await Promise.all([launch(), startFakeServer()]);
+  });
+  after(async () => {
+    await shared.browser.close();
+    shared.server.close();
+  });
+  shared.onPage = (name, run, { hash = '#data=gyroid', ...options } = {}) =>
+    test(name, async () => {
+      const page = await openPage(shared.browser, shared.server.address + hash, options);
+      await refined(page);
+      await run(page);
+      assert.deepEqual(page.problems, []);
+      await page.context().close();
+    });
+  return shared;
+}
+
 // Until the view is completely refined and drawn.
 export const refined = (page) =>
   page.waitForFunction(() => window.intervale?.progress?.done && window.intervale.stats.frames > 0, null, { timeout: 60_000 });
@@ -76,3 +102,28 @@ export const refined = (page) =>
 // Until the effects of an action are drawn.
 export const settled = (page) =>
   page.evaluate(() => new Promise((resolve) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(resolve)), 200)));
+
+export const state = (page) => page.evaluate(() => window.intervale.state);
+
+// Keeps what is sent to the worker from now on in window.requests.
+export const recordRequests = (page) =>
+  page.evaluate(() => {
+    window.requests = [];
+    const post = Worker.prototype.postMessage;
+    Worker.prototype.postMessage = function (...message) {
+      window.requests.push(message[0]);
+      post.apply(this, message);
+    };
+  });
+
+// That an action changes at least this share of the picture, within 15 s: some changes come from the worker.
+export async function changesPicture(page, act, least = 0.01) {
+  const old = await pixels(page);
+  await act();
+  let changed = 0;
+  for (const end = Date.now() + 15_000; changed < least && Date.now() < end; ) {
+    await settled(page);
+    changed = difference(old, await pixels(page)).share;
+  }
+  assert.ok(changed >= least, `${changed} of the picture changed`);
+}

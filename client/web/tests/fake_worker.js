@@ -1,9 +1,10 @@
 // A fake of the page's worker, for tests without a server: speaks src/messages.ts. Its mesh is the part of a gyroid
-// field between two values, clipped from the tetrahedra of successively finer grids. The data set's name selects a
-// fault: "lost" loses its connection, "broken" fails to open, "full" reaches its memory limit.
+// field between two values, clipped from the tetrahedra of successively finer grids. It has one mesh for each range if
+// the page asks for several; else the range is always the same. The data set's name selects a fault: "lost" loses its
+// connection, "broken" fails to open, "full" reaches its memory limit.
 
 const kSide = 48; // of the cube, in sample spacings
-const kRange = [-0.45, 0.75];
+const kRange = [-0.45, 0.75]; // of the one mesh
 const kGrids = [4, 8, 16]; // cells per side
 const kPieceSide = 16; // of a piece of the boundary surface, in sample spacings
 
@@ -19,7 +20,9 @@ const gradientDirection = ([x, y, z]) => {
 };
 
 class Mesh {
-  constructor(n) {
+  // n: cells per side; index: of the range.
+  constructor(n, range, index) {
+    this.index = index;
     this.vertices = []; // {p, f, surface}
     this.tets = [];
     const cuts = new Map();
@@ -62,7 +65,7 @@ class Mesh {
           corner[axis]++;
           tet.push(at(...corner));
         }
-        for (const part of clip(tet, kRange[0], 1, 1)) this.tets.push(...clip(part, kRange[1], -1, 2));
+        for (const part of clip(tet, range[0], 1, 1)) this.tets.push(...clip(part, range[1], -1, 2));
       }
     }
     const oriented = ([a, b, c, d]) => (this.volume([a, b, c, d]) > 0 ? [a, b, c, d] : [b, a, c, d]);
@@ -141,7 +144,7 @@ class Mesh {
     });
     const bound = (pick) => [0, 1, 2].map((d) => pick(...list.map(({ p }) => p[d])));
     return {
-      id, vertices, values: valuesOf(list), indices: new Uint32Array(indices).buffer, edges: wantsEdges ? new Uint32Array(edges).buffer : null,
+      id: 4 * id + this.index, range: this.index, vertices, values: valuesOf(list), indices: new Uint32Array(indices).buffer, edges: wantsEdges ? new Uint32Array(edges).buffer : null,
       triangles: groups.map((faces) => faces.length), edgeCounts, min: bound(Math.min), max: bound(Math.max),
     };
   }
@@ -191,13 +194,15 @@ class Mesh {
         this.center(tet).forEach((x, d) => view.setFloat32(at + 12 + 4 * d, x, true));
         view.setUint8(at + 24, this.vertices[v].surface);
         view.setUint8(at + 25, this.level);
+        view.setUint8(at + 26, this.index);
       });
     });
     return { vertices, values: valuesOf(tets.flat().map((v) => this.vertices[v])), count: tets.length, outOf: tets.length };
   }
 }
 
-let mesh = null;
+let ranges = [kRange];
+let meshes = []; // of each range
 let step = -1; // the index of the mesh's grid
 let version = 0;
 let plane = null;
@@ -209,42 +214,63 @@ let timer = 0;
 
 const post = (report) => self.postMessage(report);
 const valuesOf = (list) => (wantsValues ? Float32Array.from(list, ({ f }) => f).buffer : null);
+const sum = (of) => meshes.reduce((total, mesh) => total + of(mesh), 0);
+const joined = (buffers) => {
+  const bytes = buffers.flatMap((buffer) => [...new Uint8Array(buffer ?? [])]);
+  return Uint8Array.from(bytes).buffer;
+};
+const joinedValues = (parts) => (wantsValues ? joined(parts.map(({ values }) => values)) : null);
 const toSamples = (p) => p.map((x) => x + kSide / 2); // the origin of the world is the centre of the cube
 
 function postProgress(done) {
   const updates = [0, 900, 6200, 48000][step + 1];
   post({ type: 'progress', progress: {
-    bytes: updates * 2.1 + 900, updates, updatesInMesh: updates, updatesShown: updates, tets: mesh?.tets.length ?? 0, triangles: 0, updatesToGo: done ? 0 : 48000 - updates,
+    bytes: updates * 2.1 + 900, updates, updatesInMesh: updates, updatesShown: updates, tets: sum((mesh) => mesh.tets.length), triangles: 0, updatesToGo: done ? 0 : 48000 - updates,
     remainingError: done ? 0.0123 : 0.4 / (step + 2), remainingPixels: done ? 0.92 : 60 / (step + 2), done, full: name === 'full',
-    volume: mesh ? mesh.tets.reduce((sum, tet) => sum + mesh.volume(tet), 0) : 0, volumeBound: 900 / 4 ** (step + 1), memory: 12.4e6,
+    volumes: meshes.map((mesh) => mesh.tets.reduce((volume, tet) => volume + mesh.volume(tet), 0)), volumeBound: 900 / 4 ** (step + 1), memory: 12.4e6,
     busy: { updates, seconds: updates / 2.1e6 }, reconnects: 0, repeated: 0,
   } });
 }
 function postCap() {
   const inSamples = plane && { normal: plane.normal, offset: plane.offset + plane.normal.reduce((sum, n) => sum + (n * kSide) / 2, 0) };
-  post({ type: 'cap', cap: { plane, version, ...(inSamples && mesh ? mesh.cap(inSamples) : { vertices: new ArrayBuffer(0), values: null, triangles: 0 }) } });
+  const parts = inSamples ? meshes.map((mesh) => mesh.cap(inSamples)) : [];
+  const triangles = parts.map((part) => part.triangles);
+  post({ type: 'cap', cap: { plane, version, vertices: joined(parts.map(({ vertices }) => vertices)), values: joinedValues(parts), triangles } });
 }
 function postTets() {
-  const none = { vertices: new ArrayBuffer(0), values: null, count: 0, outOf: 0 };
-  post({ type: 'tets', tets: { box, ...(box && mesh ? mesh.inBox({ min: toSamples(box.min), max: toSamples(box.max) }) : none) } });
+  const parts = box ? meshes.map((mesh) => mesh.inBox({ min: toSamples(box.min), max: toSamples(box.max) })) : [];
+  const count = parts.reduce((total, part) => total + part.count, 0);
+  post({ type: 'tets', tets: { box, vertices: joined(parts.map(({ vertices }) => vertices)), values: joinedValues(parts), count, outOf: count } });
 }
 function postSurface(reset) {
   version++;
-  const pieces = mesh.boundary();
-  post({ type: 'surface', change: { version, hasValues: wantsValues, reset, pieces, removed: [] } });
+  const pieces = meshes.flatMap((mesh) => mesh.boundary());
+  post({ type: 'surface', change: { version, hasValues: wantsValues, reset: reset ? [0, 1, 2, 3] : [], pieces, removed: [] } });
   if (plane) postCap();
   if (box) postTets();
 }
+function makeMeshes() {
+  meshes = ranges.map((range, index) => new Mesh(kGrids[step], range, index));
+}
 function refine() {
   if (step + 1 >= kGrids.length) return postProgress(true);
-  mesh = new Mesh(kGrids[++step]);
+  ++step;
+  makeMeshes();
   postSurface(step === 0);
   postProgress(false);
+}
+function look(view) {
+  const wanted = view.ranges.length > 1 ? view.ranges : [kRange];
+  if (JSON.stringify(wanted) === JSON.stringify(ranges)) return;
+  ranges = wanted;
+  if (meshes.length === 0) return;
+  makeMeshes();
+  postSurface(true);
 }
 
 function open(dataset) {
   clearTimeout(timer);
-  [mesh, step, name] = [null, -1, dataset];
+  [meshes, step, name] = [[], -1, dataset];
   if (name === 'broken') return post({ type: 'error', text: 'broken: the server has no such data set; see the list.' });
   post({ type: 'connection', state: { state: 'open' } });
   post({ type: 'opened', resumed: false });
@@ -267,7 +293,9 @@ post({ type: 'palettes', palettes: [palette('warm', (x) => [x, 0, 255 - x]), pal
 self.onmessage = ({ data }) => {
   if (data.type === 'open') {
     open(data.dataset);
-  } else if (data.type === 'shown' && name !== 'lost') {
+  } else if (data.type === 'view') {
+    look(data.view);
+  } else if (data.type === 'shown' && data.version === version && name !== 'lost') {
     timer = setTimeout(refine, 30);
   } else if (data.type === 'preview') {
     postMessage({ type: 'preview' });
@@ -279,11 +307,11 @@ self.onmessage = ({ data }) => {
     postTets();
   } else if (data.type === 'edges') {
     wantsEdges = data.wanted;
-    if (mesh) postSurface(false);
+    if (meshes.length > 0) postSurface(false);
   } else if (data.type === 'values') {
     const isOther = data.wanted !== wantsValues;
     wantsValues = data.wanted;
-    if (isOther && mesh) postSurface(false);
+    if (isOther && meshes.length > 0) postSurface(false);
   } else if (data.type === 'save') {
     post({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
   }

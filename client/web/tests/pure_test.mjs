@@ -12,7 +12,7 @@ const server = await createServer({
 });
 const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
 const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette'];
-const [{ exclusive, fromHash, toHash, kDefaults }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette] = await Promise.all(kModules.map(load));
+const [{ exclusive, fromHash, toHash, kDefaults, stylesOf }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette] = await Promise.all(kModules.map(load));
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -38,7 +38,8 @@ test('an address restores the view that it was written from', () => {
     const state = {
       dataset: ['buckyball', 'a b/ü&=#+', null][i % 3],
       pose: i % 2 ? { ...randomPose(), fov: 45 } : null,
-      range: i % 3 ? [Math.min(a[0], b[0]), Math.max(a[0], b[0])] : null,
+      range: i % 3 && i % 4 ? [Math.min(a[0], b[0]), Math.max(a[0], b[0])] : null,
+      ranges: i % 4 ? [] : Array.from({ length: 2 + (i % 3) }, (_, k) => ({ range: [random(-9, 0), random()], style: { color: `#00ff0${k}`, opacity: k / 4 } })),
       pixelError: random(0.5, 16),
       maxTets: i % 4 ? null : Math.round(random(1e4, 1e7)),
       memory: i % 5 ? null : 20,
@@ -61,7 +62,7 @@ test('an address restores the view that it was written from', () => {
 });
 
 test('an invalid address gives the default view', () => {
-  const invalid = ['#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#range=2,1', '#range=1', '#range=a,b', '#range=inf,inf', '#range=1,', '#span=2,1&color=red', '#span=-inf,1', '#eye=1,1,1&at=1,1,1'];
+  const invalid = ['#eye=1,2&at=&clip=0,0,0,1&roi=1,2,3', '#px=x&tets=NaN&mb=Infinity&alpha=red,2&show=nothing', '#%%%&&==', '#range=2,1', '#range=1', '#range=a,b', '#range=inf,inf', '#range=1,', '#range=2,1&range=3,2', '#range=1,2,red,1&range=1,2,3', '#span=2,1&color=red', '#span=-inf,1', '#eye=1,1,1&at=1,1,1'];
   for (const hash of ['', '#', ...invalid]) {
     assert.deepEqual(fromHash(hash), kDefaults, hash);
   }
@@ -87,15 +88,37 @@ test('a range is that of the data set, or one within it', () => {
   assert.deepEqual(values.boundMoved([1, 2], 1, Infinity), [1, Infinity]);
 });
 
+test('several ranges are those of a view, if the data set has every range', () => {
+  const every = { range: [-Infinity, Infinity], values: [0, 12], hasEveryRange: true, hasRangesWithin: true };
+  const one = { ...every, range: [0, 4], hasEveryRange: false, hasRangesWithin: false };
+  const { ranges } = fromHash('#range=1,2&range=3,4,0A0b0c,2&range=5,inf&range=6,7&range=8,9');
+  assert.deepEqual(values.rangesOf(every, { range: null, ranges }), [[1, 2], [3, 4], [5, Infinity], [6, 7]], 'four at most');
+  assert.deepEqual(values.rangesOf(one, { range: null, ranges }), []);
+  assert.deepEqual(values.rangesOf(every, { range: [1, 3], ranges: [] }), [[1, 3]]);
+  assert.deepEqual(ranges[1].style, { color: '#0a0b0c', opacity: 1 });
+  assert.equal(new Set(ranges.map(({ style }) => style.color)).size, 4);
+  assert.deepEqual(stylesOf({ ...kDefaults, ranges }).map(({ alpha }) => alpha), ranges.map(({ style }) => style));
+  assert.deepEqual(fromHash('#range=1,2,000000,1').range, [1, 2], 'one has the styles of the surfaces');
+});
+
+test('one more range lies in the middle of the widest part that no range has', () => {
+  assert.deepEqual(values.freeRange([0, 12], [[6, 12]]), [2, 4]);
+  assert.deepEqual(values.freeRange([0, 12], [[9, Infinity], [-Infinity, 3]]), [5, 7]);
+  assert.deepEqual(values.freeRange([0, 12], [[1, 8], [2, 3], [11, 12]]), [9, 10]);
+  assert.deepEqual(values.freeRange([0, 12], [[-1, 6], [5, 20]]), [4, 8], 'there is none');
+  assert.deepEqual(values.freeRange([3, 3], [[3, 3]]), [3, 3]);
+});
+
 test('the span of colours is the part of the range that the values reach, unless it is set', () => {
   const every = { range: [-Infinity, Infinity], values: [-1, 5], hasEveryRange: true, hasRangesWithin: true };
   const one = { range: [2, Infinity], values: [-1, 5], hasEveryRange: false, hasRangesWithin: false };
-  assert.deepEqual(palette.spanOf(every, null, null), [2, 5], 'the upper half, which is shown');
-  assert.deepEqual(palette.spanOf(every, [-3, 1], null), [-1, 1]);
-  assert.deepEqual(palette.spanOf(every, [-Infinity, Infinity], null), [-1, 5]);
-  assert.deepEqual(palette.spanOf(every, [8, 9], null), [5, 5]);
-  assert.deepEqual(palette.spanOf(one, [3, 4], null), [2, 5], 'this one shows its own range only');
-  assert.deepEqual(palette.spanOf(every, [1, 2], [-7, 99]), [-7, 99]);
+  assert.deepEqual(palette.spanOf(every, [[2, 5]], null), [2, 5]);
+  assert.deepEqual(palette.spanOf(every, [[-3, 1]], null), [-1, 1]);
+  assert.deepEqual(palette.spanOf(every, [[-Infinity, Infinity]], null), [-1, 5]);
+  assert.deepEqual(palette.spanOf(every, [[8, 9]], null), [5, 5]);
+  assert.deepEqual(palette.spanOf(every, [[3, 4], [0, 1]], null), [0, 4], 'of all ranges');
+  assert.deepEqual(palette.spanOf(one, [], null), [2, 5], 'this one shows its own range only');
+  assert.deepEqual(palette.spanOf(every, [[1, 2]], [-7, 99]), [-7, 99]);
   for (const span of [[0, 0], [1 / 3, 1e-9 + 1 / 3], [-1e30, 5e-324]]) assert.deepEqual(fromHash(toHash({ ...kDefaults, span })).span, span);
 });
 

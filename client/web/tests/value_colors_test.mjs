@@ -1,28 +1,10 @@
 // Colours of the field's values, in a real browser with a fake worker, whose palettes go from blue to red (warm), and
 // from black to green.
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
-import { difference, launch, pixels, share } from './browser.mjs';
-import { openPage, refined, settled, startFakeServer } from './fake_server.mjs';
+import { difference, pixels, share } from './browser.mjs';
+import { settled, sharedPages, state } from './fake_server.mjs';
 
-let browser;
-let server;
-before(async () => {
-  [browser, server] = await Promise.all([launch(), startFakeServer()]);
-});
-after(async () => {
-  await browser.close();
-  server.close();
-});
-
-const onPage = (name, hash, run) =>
-  test(name, async () => {
-    const page = await openPage(browser, server.address + hash);
-    await refined(page);
-    await run(page);
-    assert.deepEqual(page.problems, []);
-    await page.context().close();
-  });
+const { onPage } = sharedPages();
 
 // Until this share of the picture satisfies a predicate of red, green and blue, for up to 15 s.
 async function becomes(page, least, predicate, what) {
@@ -38,13 +20,12 @@ const isBlue = (r, g, b) => b > r + 60 && b > g + 60;
 const isGreen = (r, g, b) => g > r + 60 && g > b + 60;
 const isPurple = (r, g, b) => Math.min(r, b) > g + 40 && Math.abs(r - b) < 70;
 const labels = (page) => page.$$eval('#legend .ends span', (spans) => spans.map((span) => span.textContent));
-const state = (page) => page.evaluate(() => window.intervale.state);
 async function fill(page, field, text) {
   await page.fill(field, text);
   await page.press(field, 'Enter');
 }
 
-onPage('colours show values, with a bar; the surfaces have theirs again', '#data=gyroid', async (page) => {
+onPage('colours show values, with a bar; the surfaces have theirs again', async (page) => {
   await settled(page);
   const plain = await pixels(page);
   assert.ok(!(await page.isVisible('#value-controls')) && !(await page.isVisible('#legend')));
@@ -62,7 +43,7 @@ onPage('colours show values, with a bar; the surfaces have theirs again', '#data
 });
 
 const kInvisible = ['alpha', 'beta', 'box'].map((name) => `&${name}=000000,0`).join('');
-onPage('caps and shrunken tetrahedra have the colours of values between those of the surfaces', '#data=gyroid&color=value' + kInvisible, async (page) => {
+onPage('caps and shrunken tetrahedra have the colours of values between those of the surfaces', async (page) => {
   for (const [key, what] of [['c', 'the cut'], ['s', 'the tetrahedra']]) {
     assert.equal(share(await pixels(page), isPurple), 0);
     await page.keyboard.press(key);
@@ -71,9 +52,9 @@ onPage('caps and shrunken tetrahedra have the colours of values between those of
     await page.waitForFunction(() => window.intervale.stats.capTriangles + window.intervale.stats.tets === 0);
     await settled(page);
   }
-});
+}, { hash: '#data=gyroid&color=value' + kInvisible });
 
-onPage('values beyond the span have the colours of its ends; reset restores the range', '#data=gyroid&color=value', async (page) => {
+onPage('values beyond the span have the colours of its ends; reset restores the range', async (page) => {
   await fill(page, '#span-low', '1');
   await becomes(page, 0.1, isBlue, 'blue: all is below');
   assert.equal(share(await pixels(page), isRed), 0);
@@ -85,16 +66,16 @@ onPage('values beyond the span have the colours of its ends; reset restores the 
   await page.click('#span-reset');
   assert.deepEqual(await labels(page), ['−0.45', '0.15', '0.75']);
   assert.equal((await state(page)).span, null);
-});
+}, { hash: '#data=gyroid&color=value' });
 
-onPage('the address restores colours, palette and span', '#data=gyroid&color=value&palette=green&span=-9,0', async (page) => {
+onPage('the address restores colours, palette and span', async (page) => {
   await becomes(page, 0.1, isGreen, 'green');
   assert.equal(await page.inputValue('#palette'), 'green');
   assert.equal(await page.inputValue('#span-low'), '-9');
   assert.deepEqual(await labels(page), ['−9', '−4.5', '0']);
-});
+}, { hash: '#data=gyroid&color=value&palette=green&span=-9,0' });
 
-onPage('the span follows the range, also while a handle moves', '#data=any&color=value', async (page) => {
+onPage('the span follows the range, also while a handle moves', async (page) => {
   await page.waitForSelector('#histogram:not([hidden])');
   assert.equal(await page.inputValue('#span-low'), '0');
   const { x, y, width } = await page.locator('#histogram').boundingBox();
@@ -106,9 +87,9 @@ onPage('the span follows the range, also while a handle moves', '#data=any&color
   await page.mouse.up();
   await page.waitForFunction(() => window.intervale.state.range?.[0] === 0.8);
   assert.equal(await page.inputValue('#span-low'), '0.8');
-});
+}, { hash: '#data=any&color=value' });
 
-onPage('thickness and levels of detail take the place of values, and values theirs', '#data=gyroid&color=value', async (page) => {
+onPage('thickness and levels of detail take the place of values, and values theirs', async (page) => {
   for (const [key, name] of [['t', 'thickness'], ['l', 'levels']]) {
     await page.keyboard.press(key);
     assert.equal((await state(page)).colorBy, 'surface');
@@ -118,4 +99,4 @@ onPage('thickness and levels of detail take the place of values, and values thei
     assert.equal((await state(page))[name], false);
     assert.ok(!(await page.isChecked(`#${name}`)));
   }
-});
+}, { hash: '#data=gyroid&color=value' });
