@@ -1,6 +1,6 @@
 // The cap: the faces where the clip plane cuts the tetrahedra of each range.
 import { BufferAttribute, BufferGeometry } from 'three';
-import { capColorMaterials, capDepthMaterials, thicknessMaterial } from './materials';
+import { capColorMaterials, capDepthMaterials, capPickMaterial, thicknessMaterial } from './materials';
 import type { Cap } from './messages';
 import { staticMesh } from './static_mesh';
 import { setValues, type Uploader } from './upload';
@@ -10,6 +10,8 @@ export class CapView {
   readonly materials = capColorMaterials(false); // by range, as the next two
   readonly valueMaterials = capColorMaterials(true);
   readonly depth = capDepthMaterials();
+  readonly pick = capPickMaterial(false);
+  readonly valuePick = capPickMaterial(true);
   readonly thickness = thicknessMaterial(1);
   hasValues = false; // what is shown
 

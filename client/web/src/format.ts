@@ -25,6 +25,9 @@ export function short(x: number): string {
 
 const signed = (text: string): string => text.replace(/^-/, '−');
 
+// With n significant digits at most, and no grouping.
+export const withDigits = (x: number, n: number): string => signed(String(Number(x.toPrecision(n))));
+
 // A value and the bound of its error, with the digits that are significant: "123,400 ± 300". bound 0, or not known (null): the value only.
 export function bounded(value: number, bound: number | null): string {
   if (bound === null || !(bound > 0)) return digits(value, 6);

@@ -10,6 +10,7 @@ import { type Command, listKeys, watchKeys } from './keyboard';
 import { showLegend } from './legend';
 import { watchPanel } from './panel';
 import { watchPointers } from './pointer';
+import { Probe } from './probe';
 import { watchProgress } from './progress';
 import { rangesOf } from './range';
 import { watchRanges } from './range_controls';
@@ -35,12 +36,14 @@ class Page {
   private readonly clip: ClipControls;
   private readonly region: RegionControls;
   private readonly valueColors: ValueColors;
+  private readonly probe: Probe;
 
   constructor(private readonly viewer: Viewer, private readonly worker: WorkerClient) {
     this.handles = new Handles(viewer);
     this.clip = new ClipControls(view, viewer, this.handles);
     this.region = new RegionControls(view, viewer, this.handles);
     this.valueColors = new ValueColors(view, status, () => viewer.invalidate());
+    this.probe = new Probe(view, status, viewer);
     this.watchViewer();
     view.watch([], (value) => {
       const chosen = value.dataset !== status.value.dataset?.name && status.value.datasets?.find(({ name }) => name === value.dataset);
@@ -82,6 +85,7 @@ class Page {
       const pose = viewer.pose();
       if (pose) showAxes(element<SVGSVGElement>('axes'), pose);
       this.handles.place();
+      this.probe.refresh();
       showLegend(view.value, viewer.picture.thickness, status.value.dataset, this.valueColors.bar);
     };
   }
@@ -135,6 +139,7 @@ class Page {
       { key: 'W', description: 'Wireframe', run: () => toggle('wireframe') },
       { key: 'L', description: 'Colour by level of detail', run: () => toggle('levels') },
       { key: 'V', description: 'Colour by value', run: toggleValueColors },
+      { key: 'P', description: 'Value and position under the pointer', run: () => toggle('probe') },
       { key: 'H', description: 'This help', run: showHelp },
     ];
   }
@@ -144,7 +149,7 @@ class Page {
     const pose = this.viewer.pose();
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
-    const { pixelError, region, maxTets, memory, clip, tets, wireframe, colorBy } = view.value;
+    const { pixelError, region, maxTets, memory, clip, tets, wireframe, probe, colorBy } = view.value;
     const viewport: [number, number] = [canvas.width, canvas.height];
     const { dataset } = status.value;
     return {
@@ -152,7 +157,7 @@ class Page {
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,
-      values: colorBy === 'value',
+      values: colorBy === 'value' || probe,
     };
   }
 
@@ -187,7 +192,7 @@ function toggleFullScreen(): void {
 
 const showHelp = () => element<HTMLDialogElement>('help-dialog').showModal();
 
-function toggle(name: 'wireframe' | 'levels' | 'thickness'): void {
+function toggle(name: 'wireframe' | 'levels' | 'thickness' | 'probe'): void {
   if (!input(name).disabled) view.set(exclusive({ [name]: !view.value[name] }));
 }
 

@@ -50,6 +50,7 @@ export interface SurfaceMaterials {
   depth: RawShaderMaterial[]; // opaque surfaces, depth only: what transparent ones are tested against
   transparent: RawShaderMaterial[];
   edges: RawShaderMaterial[];
+  pick: RawShaderMaterial[];
 }
 
 const kAdditive: Parameters = { blending: CustomBlending, blendSrc: OneFactor, blendDst: OneFactor, depthWrite: false };
@@ -73,6 +74,10 @@ const kAlphaBlending: Parameters = {
 
 const coloredBy = (value: boolean): Parameters => (value ? { defines: { BY_VALUE: '' } } : {});
 
+const picks = (what: 0 | 1 | 2, byValue: boolean): Parameters => ({ defines: { PICKS: what, ...(byValue ? { BY_VALUE: '' } : {}) } });
+export const capPickMaterial = (byValue: boolean) => material(shaders.kSurfaceVertex, shaders.kPickFragment, {}, picks(1, byValue));
+export const tetsPickMaterial = (byValue: boolean) => material(shaders.kTetsVertex, shaders.kPickFragment, {}, picks(2, byValue));
+
 const kRanges = Array.from({ length: kMostRanges }, (_, range) => range);
 
 // Where ranges overlap, the earlier one lies in front.
@@ -92,6 +97,7 @@ function materialsOf(range: number, byValue: boolean): SurfaceMaterials {
     opaque: each(shaders.kOpaqueFragment, colorOf, { ...offset, ...coloredBy(byValue) }),
     depth: each(shaders.kTransparentFragment, colorAndOpacityOf, { ...offset, colorWrite: false }),
     transparent: each(shaders.kTransparentFragment, colorAndOpacityOf, { ...kAccumulation, ...coloredBy(byValue) }),
+    pick: each(shaders.kPickFragment, () => ({}), picks(0, byValue)),
     edges: each(shaders.kEdgeFragment, () => ({ lineColor: { value: new Vector4(0, 0, 0, 0.5) } }), kAlphaBlending),
   };
 }
@@ -106,7 +112,7 @@ export function setStyles(materials: SurfaceMaterials, range: number, styles: St
     materials.opaque[i]!.visible = materials.depth[i]!.visible = opaque;
     materials.transparent[i]!.visible = !opaque && opacity > 0.005;
     materials.transparent[i]!.uniforms['opacity']!.value = opacity;
-    materials.edges[i]!.visible = opacity > 0.005;
+    materials.edges[i]!.visible = materials.pick[i]!.visible = opacity > 0.005;
     materials.edges[i]!.uniforms['lineColor']!.value.set(r * 0.25, g * 0.25, b * 0.25, opaque ? 0.75 : 0.15 + 0.4 * opacity);
   });
 }
@@ -135,5 +141,4 @@ export const compositeMaterial = (fragment: string, uniforms: Uniforms) =>
 export const lineMaterial = (depthTest: boolean, opacity: number) =>
   material(shaders.kLineVertex, shaders.kLineFragment, { lineColor: { value: new Vector4(1, 1, 1, opacity) } }, { ...kAlphaBlending, depthTest });
 
-export const distanceMaterial = () => material(shaders.kSurfaceVertex, shaders.kDistanceFragment, {});
 export const uploadMaterial = () => material(shaders.kUploadVertex, shaders.kUploadFragment, {});

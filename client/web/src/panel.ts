@@ -71,7 +71,7 @@ function watchSurfaces(view: Store<ViewState>, status: Store<Status>): void {
 }
 
 function watchSwitches(view: Store<ViewState>): void {
-  for (const name of ['wireframe', 'levels', 'thickness'] as const) {
+  for (const name of ['wireframe', 'levels', 'thickness', 'probe'] as const) {
     input(name).addEventListener('change', () => view.set(exclusive({ [name]: input(name).checked })));
     view.watch([name], (value) => (input(name).checked = value[name]));
   }

@@ -18,6 +18,11 @@ import { along, corners, dot, length, sub, unit } from './vec';
 const kMaxPixelRatio = 2; // device pixels per CSS pixel
 const kAroundTets = 0.25; // the greatest opacity of surfaces around shrunken tetrahedra, which they would hide
 
+export interface Probed {
+  at: Vec3; // world coordinates
+  value: number | null; // of the field; null: not known
+}
+
 export class Picture {
   readonly renderer: WebGLRenderer;
   readonly surface: BoundarySurfaceView;
@@ -129,14 +134,17 @@ export class Picture {
     if (withOutlines) renderer.render(this.outlines.scene, camera);
   }
 
-  // The point drawn at x, y (CSS pixels from the canvas's upper left corner), world coordinates; null: nothing there.
-  pointAt(frame: Frame, pose: Pose, x: number, y: number): Vec3 | null {
+  // What is drawn in the pixel at x, y (CSS pixels from the canvas's upper left corner); null: nothing.
+  probe(frame: Frame, pose: Pose, x: number, y: number): Probed | null {
     this.setCamera(frame, pose);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    const distance = this.pick.distance(this.renderer, this.camera, x, y, () =>
-      this.drawOpaque(this.pick.material, this.pick.material, this.tets.material),
-    );
-    return distance === null ? null : along(pose.eye, rayThrough(pose, x, y, width, height), distance);
+    const [column, row] = [Math.floor(x), Math.floor(y)];
+    const surface = (this.surface.hasValues ? this.valueMaterials : this.materials).map(({ pick }) => pick);
+    const cap = this.cap.hasValues ? this.cap.valuePick : this.cap.pick;
+    const tets = this.tets.hasValues ? this.tets.valuePick : this.tets.pick;
+    const picked = this.pick.at(this.renderer, this.camera, column, row, () => this.drawOpaque(surface, cap, tets));
+    if (!picked) return null;
+    return { at: along(pose.eye, rayThrough(pose, column + 0.5, row + 0.5, width, height), picked.distance), value: picked.value };
   }
 
   // Compiles the shaders of the first picture while the mesh is still being received.

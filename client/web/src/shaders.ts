@@ -268,14 +268,30 @@ void main() {
   maximum = vec4(greatest, 0.0, 0.0, 1.0);
 }`;
 
-// For picking: the distance from the eye in red; alpha 1 where something is drawn.
-export const kDistanceFragment = `${kPrecision}
+// For picking: the distance from the eye, the field's value, and 1 if that is known; alpha 1 where something is drawn.
+// PICKS: 0 surfaces, 1 the cap, 2 shrunken tetrahedra, each as much of them as the picture shows.
+export const kPickFragment = `${kPrecision}
 uniform vec3 cameraPosition;
 ${kClipping}
+#if PICKS == 2
+in vec3 vUnshrunk;
+#endif
+#ifdef BY_VALUE
+in float vValue;
+#endif
 out vec4 fragColor;
 void main() {
+#if PICKS == 0
   discard_clipped();
+#elif PICKS == 1
+  if (is_hidden()) discard;
+#else
+  if (dot(clip.xyz, vUnshrunk) > clip.w) discard;
+#endif
   fragColor = vec4(distance(cameraPosition, vPosition), 0.0, 0.0, 1.0);
+#ifdef BY_VALUE
+  fragColor.yz = vec2(vValue, 1.0);
+#endif
 }`;
 
 // One triangle that covers the screen, without vertex attributes.

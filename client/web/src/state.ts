@@ -4,7 +4,8 @@
 //   #data=NAME&eye=x,y,z&at=x,y,z&up=x,y,z&fov=30
 //
 // and, where they differ from the defaults: range=low,high (either may be -inf or inf), or several
-// range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe), shrink, color=value, palette (a name),
+// range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe,
+// probe), shrink, color=value, palette (a name),
 // span=low,high, and alpha, beta and box (each rrggbb,opacity).
 import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
@@ -47,6 +48,7 @@ export class ViewState {
   shrink = 0.8; // their size, 0.4 to 1
   thickness = false;
   wireframe = false;
+  probe = false; // tells the value and the position under the pointer
   levels = false; // colour by level of detail
   colorBy: ColorBy = 'surface'; // value: of the field
   palette: string | null = null; // of values; null: the default
@@ -62,7 +64,7 @@ export const kDefaults: Readonly<ViewState> = { ...new ViewState() };
 export const stylesOf = ({ ranges, alpha, beta, box }: Readonly<ViewState>): Styles[] =>
   ranges.length > 0 ? ranges.map(({ style }) => ({ alpha: style, beta: style, box: style })) : [{ alpha, beta, box }];
 
-const kFlags = ['tets', 'thickness', 'levels', 'wireframe'] as const;
+const kFlags = ['tets', 'thickness', 'levels', 'wireframe', 'probe'] as const;
 
 // A change of the view, with what it rules out: colours show one thing at a time.
 export function exclusive(change: Partial<ViewState>): Partial<ViewState> {

@@ -1,7 +1,7 @@
 // The shrunken tetrahedra. Like the boundary surface (boundary_surface.ts), a set of them is uploaded in chunks over
 // several frames and shown once it is complete.
 import { BufferAttribute, BufferGeometry, Group, InterleavedBuffer, InterleavedBufferAttribute, type Material, type Mesh } from 'three';
-import { tetsDepthMaterial, tetsMaterial } from './materials';
+import { tetsDepthMaterial, tetsMaterial, tetsPickMaterial } from './materials';
 import type { Tets } from './messages';
 import { staticMesh } from './static_mesh';
 import { setValues, type Uploader } from './upload';
@@ -15,6 +15,8 @@ export class TetsView {
   readonly material = tetsMaterial(false);
   readonly valueMaterial = tetsMaterial(true);
   readonly depth = tetsDepthMaterial();
+  readonly pick = tetsPickMaterial(false);
+  readonly valuePick = tetsPickMaterial(true);
   hasValues = false; // what is shown
   private triangles: BufferAttribute | null = null; // the same for every chunk, so shared
   private pending: Tets | null = null;

@@ -5,7 +5,7 @@ import type { Dataset } from './datasets';
 import { type Frame, frameOf } from './frame';
 import { GpuFence } from './gpu_fence';
 import type { Cap, Report } from './messages';
-import { Picture } from './picture';
+import { Picture, type Probed } from './picture';
 import type { ViewState } from './state';
 import type { Store } from './store';
 import { add, sub } from './vec';
@@ -16,6 +16,7 @@ export class Stats {
   surfaceVersion = 0; // of the boundary surface shown; 0: none
   capTriangles = 0; // shown
   tets = 0; // shrunken tetrahedra shown
+  probes = 0; // answered
   firstMeshMs = 0; // from navigation to the first picture with triangles; 0: none yet
 }
 
@@ -25,9 +26,11 @@ export class Viewer {
   frame: Frame | null = null; // of the open data set
   onShown: (version: number) => void = () => {}; // of the surface
   onDrawn: () => void = () => {};
+  onProbed: (found: Probed | null) => void = () => {}; // the answer to probe(); null: nothing is drawn there
   onResize: () => void = () => {};
   onContext: (isLost: boolean) => void = () => {}; // the WebGL context was lost or restored
   private pendingCap: Cap | null = null; // shown with its surface, or at once if that is shown already
+  private probedAt: readonly [x: number, y: number] | null = null; // asked for and not yet answered
   private isDirty = true; // a draw is needed
   private isScheduled = false; // step() is requested
   private isLost = false; // the WebGL context
@@ -107,9 +110,15 @@ export class Viewer {
   // Makes the point drawn at x, y (CSS pixels of the canvas) the centre of rotation.
   centerOn(x: number, y: number): void {
     const pose = this.pose();
-    const point = this.frame && pose && !this.isLost ? this.picture.pointAt(this.frame, pose, x, y) : null;
-    if (!point || !pose) return;
-    this.view.set({ pose: { ...pose, lookAt: point, eye: add(point, sub(pose.eye, pose.lookAt)) } });
+    const found = this.frame && pose && !this.isLost ? this.picture.probe(this.frame, pose, x, y) : null;
+    if (!found || !pose) return;
+    this.view.set({ pose: { ...pose, lookAt: found.at, eye: add(found.at, sub(pose.eye, pose.lookAt)) } });
+  }
+
+  // Asks what is drawn at x, y (CSS pixels of the canvas), once the picture is complete; null: nothing any more.
+  probe(at: readonly [x: number, y: number] | null): void {
+    this.probedAt = at;
+    if (at) this.schedule();
   }
 
   private schedule(): void {
@@ -126,7 +135,14 @@ export class Viewer {
     const start = performance.now();
     const shown = this.frame && this.isUploading() ? this.upload(this.frame) : 0;
     this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
+    const pose = this.pose();
     if (this.isDirty) this.draw();
+    else if (this.probedAt && this.frame && pose) {
+      const [x, y] = this.probedAt;
+      this.probedAt = null;
+      this.stats.probes++;
+      this.onProbed(this.picture.probe(this.frame, pose, x, y));
+    }
     if (shown > 0) {
       this.stats.surfaceVersion = shown;
       if (this.stats.firstMeshMs === 0 && this.picture.surface.faces.children.length > 0) {
@@ -134,7 +150,7 @@ export class Viewer {
       }
       this.onShown(shown);
     }
-    if (this.isUploading() || this.isDirty) this.schedule();
+    if (this.isUploading() || this.isDirty || this.probedAt) this.schedule();
   }
 
   private isUploading(): boolean {

@@ -21,7 +21,7 @@ export interface Wanted {
   plane: Plane | null;
   tetsBox: Box | null;
   edges: boolean;
-  values: boolean; // of the field, for colours
+  values: boolean; // of the field, for colours and the probe
 }
 
 export class WorkerClient {

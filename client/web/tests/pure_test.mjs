@@ -49,6 +49,7 @@ test('an address restores the view that it was written from', () => {
       shrink: 0.55,
       thickness: i % 7 !== 0 && i % 3 === 0,
       wireframe: i % 2 === 1,
+      probe: i % 4 === 1,
       levels: i % 7 !== 0 && i % 5 === 0,
       colorBy: i % 7 ? 'surface' : 'value',
       palette: [null, 'grey', 'a b&'][i % 3],

@@ -1,0 +1,76 @@
+// The probe: a label beside the pointer that tells the field's value and the position of what is drawn there.
+import type { Dataset } from './datasets';
+import { element, setText } from './dom';
+import { withDigits } from './format';
+import type { Frame } from './frame';
+import type { Probed } from './picture';
+import { rounded } from './range';
+import type { ViewState } from './state';
+import type { Status } from './status';
+import type { Store } from './store';
+import type { Viewer } from './viewer';
+
+const kTapPixels = 8; // a finger that moves less than this taps
+const kOffset = 14; // of the label from the pointer, CSS pixels
+
+export class Probe {
+  private at: readonly [x: number, y: number] | null = null; // CSS pixels of the canvas; null: nothing is probed
+  private pressed: readonly [x: number, y: number] | null = null; // where a finger or a button went down
+
+  constructor(private view: Store<ViewState>, private status: Store<Status>, private viewer: Viewer) {
+    const { canvas } = viewer.picture;
+    const place = (event: PointerEvent) => [event.offsetX, event.offsetY] as const;
+    canvas.addEventListener('pointermove', (event) => {
+      if (event.pointerType !== 'touch' && event.buttons === 0) this.move(place(event));
+    });
+    canvas.addEventListener('pointerdown', (event) => {
+      this.pressed = place(event);
+      this.move(null);
+    });
+    canvas.addEventListener('pointerup', (event) => {
+      const [[x, y], [fromX, fromY]] = [place(event), this.pressed ?? [Infinity, Infinity]];
+      if (event.pointerType !== 'touch' || Math.hypot(x - fromX, y - fromY) < kTapPixels) this.move([x, y]);
+    });
+    canvas.addEventListener('pointerleave', (event) => {
+      if (event.pointerType !== 'touch') this.move(null);
+    });
+    view.watch(['probe'], () => this.refresh());
+    viewer.onProbed = (found) => this.show(found);
+  }
+
+  // The picture has changed.
+  refresh(): void {
+    if (!this.view.value.probe) this.show(null);
+    this.viewer.probe(this.view.value.probe ? this.at : null);
+  }
+
+  private move(at: readonly [x: number, y: number] | null): void {
+    this.at = at;
+    if (!at) this.show(null);
+    this.refresh();
+  }
+
+  private show(found: Probed | null): void {
+    const label = element('probe-label');
+    const [{ dataset }, { frame }] = [this.status.value, this.viewer];
+    label.hidden = !found || !this.at || !dataset || !frame;
+    if (!found || !this.at || !dataset || !frame) return;
+    const [x, y] = this.at;
+    setText(element('probe-value'), found.value === null ? '' : valueText(dataset, found.value));
+    setText(element('probe-position'), positionText(dataset, frame, found));
+    const { clientWidth, clientHeight } = this.viewer.picture.canvas;
+    const beside = (at: number, size: number, end: number) => Math.max(0, at + kOffset + size <= end ? at + kOffset : at - kOffset - size);
+    label.style.left = `${beside(x, label.offsetWidth, clientWidth)}px`;
+    label.style.top = `${beside(y, label.offsetHeight, clientHeight)}px`;
+  }
+}
+
+// With the digits that single precision leaves after interpolation between values of the field.
+function valueText({ field, fieldUnit, values }: Dataset, value: number): string {
+  const step = Math.max(...values.map(Math.abs)) / 2 ** 15;
+  return `${field || 'field'} = ${withDigits(rounded(value, step), 6)} ${fieldUnit}`.trimEnd();
+}
+
+// To a hundredth of the distance of samples.
+const positionText = ({ unit }: Dataset, { leastSpacing }: Frame, { at }: Probed): string =>
+  `${at.map((x) => withDigits(rounded(x, leastSpacing / 100), 15)).join(', ')} ${unit}`.trimEnd();

@@ -1,0 +1,69 @@
+// The viewer's probe of a known field, in a real browser, against a real server.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+
+import { killServers, launch, makeData, open, program, serve, settled } from './support.mjs';
+
+const kSide = 9;
+const kSpacing = 0.5;
+const kRegion = '-30,-30,-30,90,90,90'; // everything, with its handles beyond the window
+const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
+let last = seed;
+const samples = Uint16Array.from({ length: kSide ** 3 }, () => {
+  last = (last * 1103515245 + 12345) % 2147483648;
+  return last >> 15;
+});
+const valueAt = (i, j, k) => samples[i + kSide * (j + kSide * k)];
+
+let server;
+let browser;
+before(async () => {
+  console.log(`seed ${seed} (INTERVALE_SEED)`);
+  const folder = makeData();
+  const header = `NRRD0004\ntype: uint16\ndimension: 3\nsizes: ${kSide} ${kSide} ${kSide}\nspacings: ${kSpacing} ${kSpacing} ${kSpacing}\nendian: little\nencoding: raw\n\n`;
+  writeFileSync(join(folder, 'digits.nrrd'), Buffer.concat([Buffer.from(header), Buffer.from(samples.buffer)]));
+  const whole = ['--range', '-inf', 'inf', '--refine', 'uniform']; // every sample is a vertex of the mesh
+  program('intervale', 'build', join(folder, 'digits.nrrd'), '-o', join(folder, 'digits.ivm'), ...whole, '--unit', 'mm', '--field', 'density', '--field-unit', 'HU');
+  server = await serve(folder);
+  browser = await launch();
+});
+after(async () => {
+  await browser.close();
+  killServers();
+});
+
+const sizeOf = (page) => page.evaluate(() => [window.intervale.canvas.clientWidth, window.intervale.canvas.clientHeight]);
+
+// Looks at a sample of the side y = 0 straight ahead, so that the canvas's middle pixel has it in its centre; with this
+// clip plane. Returns what the probe tells there.
+async function toldAt(page, i, j, k, clip) {
+  await page.evaluate(([x, y, z, plane]) => {
+    window.intervale.set({ clip: plane, pose: { eye: [x, y - 20, z], lookAt: [x, y, z], up: [0, 0, 1], fov: 30 } });
+    return new Promise((resolve) => setTimeout(resolve, 250));
+  }, [i * kSpacing, j * kSpacing, k * kSpacing, clip]);
+  await settled(page);
+  const { x, y } = await page.locator('#canvas').boundingBox();
+  const [width, height] = await sizeOf(page);
+  assert.ok(width % 2 === 1 && height % 2 === 1, `there is a middle pixel: ${width} x ${height}`);
+  await page.mouse.move(x + width / 2 + 3, y + height / 2);
+  await page.mouse.move(x + (width - 1) / 2 + 0.5, y + (height - 1) / 2 + 0.5);
+  await page.waitForFunction(() => document.querySelector('#probe-value').textContent !== '' && !document.querySelector('#probe-label').hidden);
+  await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 200)));
+  return page.$$eval('#probe-label *', (parts) => parts.map((part) => part.textContent));
+}
+
+test('at a sample the probe tells its value exactly, on the side of the box and on a cut', async () => {
+  const { page, errors, close } = await open(browser, `${server.url}#data=digits&show=probe&roi=${kRegion}`, { width: 401, height: 340 });
+  await settled(page);
+  if ((await sizeOf(page))[1] % 2 === 0) await page.setViewportSize({ width: 401, height: 341 });
+  for (const [i, k] of [[1, 1], [4, 6], [7, 3]]) {
+    assert.deepEqual(await toldAt(page, i, 0, k, null), [`density = ${valueAt(i, 0, k)} HU`, `${i * kSpacing}, 0, ${k * kSpacing} mm`], `sample ${i}, 0, ${k}`);
+  }
+  const [i, j, k] = [5, 4, 2];
+  const cut = { normal: [0, -1, 0], offset: -j * kSpacing };
+  assert.deepEqual(await toldAt(page, i, j, k, cut), [`density = ${valueAt(i, j, k)} HU`, `${i * kSpacing}, ${j * kSpacing}, ${k * kSpacing} mm`]);
+  assert.deepEqual(errors, []);
+  await close();
+});
