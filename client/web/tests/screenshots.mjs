@@ -23,6 +23,7 @@ const kPictures = {
   'thickness-clip': { hash: '#data=gyroid&show=thickness&clip=1,0,0,3', theme: 'light' },
   wire: { hash: '#data=gyroid&show=wireframe' },
   levels: { hash: '#data=gyroid&show=levels,wireframe' },
+  ranges: { hash: '#data=any&range=-1.2,-0.6,e69f00,0.4&range=0.4,1.2,009e73,1' },
   lost: { hash: '#data=lost', isIncomplete: true },
   broken: { hash: '#data=broken', theme: 'light', isIncomplete: true },
   help: { act: (page) => page.keyboard.press('h') },
