@@ -12,6 +12,7 @@
 #include "client/cli/commands.h"
 #include "client/net/fetch.h"
 #include "client/program/access_options.h"
+#include "client/program/all_threads.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/join.h"
 #include "common/picture/picture.h"
@@ -114,6 +115,11 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const F
   return print(text);
 }
 
+Result<bool> draw(const PictureOptions& picture, const PictureSubject& subject, const std::optional<Camera>& camera) {
+  Progress progress("drawing " + picture.file.string());
+  return write_picture(picture, subject, camera, with_progress(progress, on_all_threads));
+}
+
 Result<void> run(const FetchCommand& options) {
   const auto url = parse_url(options.url, options.access);
   if (!url) return tl::unexpected(url.error());
@@ -128,6 +134,7 @@ Result<void> run(const FetchCommand& options) {
   if (!ranges) return tl::unexpected(ranges.error());
   FetchOptions fetch = options.fetch;
   fetch.shown = {*ranges, parse_refine(options.refine)};
+  fetch.prefers_uniform = options.picture && options.picture->render == Render::volume;
   const auto fetched = fetch_with_progress(*url, fetch);
   if (!fetched) return tl::unexpected(fetched.error());
   const FetchedMesh all = mesh_of(fetched->client, options.digest);
@@ -137,7 +144,7 @@ Result<void> run(const FetchCommand& options) {
   if (options.picture) {
     const Description& description = fetched->client.description();
     const Range shown = range_around(resolve(description, fetch.shown));
-    const auto drawn = write_picture(*options.picture, {all.mesh, description, shown}, options.fetch.lod.camera);
+    const auto drawn = draw(*options.picture, {all.mesh, description, shown}, options.fetch.lod.camera);
     if (!drawn) return tl::unexpected(drawn.error());
     if (!*drawn) fmt::print(stderr, "intervale-client: warning: nothing of the mesh is in the picture\n");
   }

@@ -22,7 +22,7 @@ class Fetch {
                   .client = "intervale-client " INTERVALE_VERSION,
                   .server = "the server at " + url.authority(),
                   .max_bytes = options.max_bytes}) {
-    (void)session_.look({options.lod, {}, {.max_tets = options.lod.max_tets.value_or(UINT64_MAX)}, options.shown});  // no data set is known yet
+    (void)look(options.shown.refine);  // no data set is known yet
   }
 
   Result<void> run() {
@@ -57,8 +57,8 @@ class Fetch {
     const bool had_mesh = session_.mesh() != nullptr;
     const auto event = connection_->receive(session_);
     if (!event) return tl::unexpected(event.error());
-    if (event->kind == ClientSession::Event::Kind::opened && session_.description()->has_every_range && options_.shown.ranges.empty()) {
-      return misuse("'" + url_.name + "' has every range: say which with --range LO HI");
+    if (event->kind == ClientSession::Event::Kind::opened) {
+      if (auto begun = opened(*session_.description()); !begun) return begun;
     }
     if (event->is_new_mesh && had_mesh) notice("the data at " + url_.authority() + " changed meanwhile; starting again");
     const StreamClient& client = *session_.mesh();
@@ -66,6 +66,18 @@ class Fetch {
     stats_.session = session_.stats();
     if (event->kind == ClientSession::Event::Kind::batch && events_.on_batch) events_.on_batch(client, stats_);
     return {};
+  }
+
+  Result<void> opened(const Description& description) {
+    if (description.has_every_range && options_.shown.ranges.empty())
+      return misuse("'" + url_.name + "' has every range: say which with --range LO HI");
+    if (!options_.prefers_uniform || options_.shown.refine || description.refine != Refine::uniform) return {};
+    if (auto looked = look(Refine::uniform); !looked) return looked;
+    return connection_->send(session_);
+  }
+
+  Result<void> look(const std::optional<Refine>& refine) {
+    return session_.look({options_.lod, {}, {.max_tets = options_.lod.max_tets.value_or(UINT64_MAX)}, {options_.shown.ranges, refine}});
   }
 
   // Fails with `why` once the time for it is over, or as stream() does.

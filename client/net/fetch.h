@@ -17,6 +17,8 @@ namespace intervale {
 struct FetchOptions {
   Lod lod;
   RangeRequest shown;  // of the data set; ranges are needed if it has every range
+  // Where `shown` does not say what to refine: the inside of the ranges too, if the data set has it.
+  bool prefers_uniform = false;
   // The most bytes of messages that are received; only the first one, the description, may exceed it. No updates
   // arrive for less than that message and protocol::kMinCredit.
   std::optional<std::uint64_t> max_bytes;

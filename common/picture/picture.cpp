@@ -12,6 +12,7 @@
 #include "common/picture/colour_bar.h"
 #include "common/picture/triangles.h"
 #include "common/picture/viewpoint.h"
+#include "common/picture/volume_picture.h"
 #include "common/util/atomic_file.h"
 #include "common/view/palette.h"
 
@@ -37,9 +38,19 @@ Result<void> write_png(const std::filesystem::path& path, const Pixels& pixels) 
   return file->commit();
 }
 
+Result<void> check_render(const PictureOptions& options) {
+  if (options.render == Render::surface) {
+    if (options.opacity) return misuse("--opacity needs --render volume");
+    return {};
+  }
+  if (options.edges) return misuse("--edges does not go with --render volume");
+  if (options.colour_by == ColourBy::surface) return misuse("--color-by surface does not go with --render volume");
+  return {};
+}
+
 Result<void> check_colours(const PictureOptions& options) {
   const auto& span = options.colour_span;
-  if (options.colour_by != ColourBy::value) {
+  if (!is_by_value(options)) {
     if (options.palette) return misuse("--palette needs --color-by value");
     if (span) return misuse("--color-span needs --color-by value");
     return {};
@@ -51,7 +62,36 @@ Result<void> check_colours(const PictureOptions& options) {
   return {};
 }
 
+// What a picture shows in colours of values.
+struct Colours {
+  Palette palette;
+  ValueSpan span;
+};
+
+std::optional<Colours> colours_of(const PictureOptions& options, const PictureSubject& subject) {
+  if (!is_by_value(options)) return {};
+  return Colours{*find_palette(options.palette ? *options.palette : kPaletteNames[0]),
+                 options.colour_span ? *options.colour_span : span_of(subject.description, subject.range)};
+}
+
+Result<Pixels> draw_surfaces(const PictureOptions& options, const Mesh& mesh, const std::optional<Colours>& colours, const Camera& camera,
+                             const Box& box) {
+  const Viewpoint viewpoint(camera, box);
+  TriangleOptions triangles{options.clip, options.edges, {}};
+  std::optional<Palette> palette;
+  if (colours) {
+    palette = colours->palette;
+    triangles.span = colours->span;
+  }
+  auto canvas = Canvas::create(camera.viewport, viewpoint, palette);
+  if (!canvas) return tl::unexpected(canvas.error());
+  for_each_triangle(mesh, triangles, viewpoint, [&canvas](std::span<const Corner> corners) { canvas->draw(corners); });
+  return canvas->finish();
+}
+
 }  // namespace
+
+bool is_by_value(const PictureOptions& options) { return options.render == Render::volume || options.colour_by == ColourBy::value; }
 
 Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera) {
   const std::string ending = options.file.extension().string();
@@ -60,6 +100,7 @@ Result<void> check_picture(const PictureOptions& options, const std::optional<Ca
   if (options.clip) {
     if (auto checked = check_plane(*options.clip); !checked) return checked;
   }
+  if (auto checked = check_render(options); !checked) return checked;
   if (auto checked = check_colours(options); !checked) return checked;
   if (!camera) return {};
   const auto [width, height] = camera->viewport;
@@ -68,22 +109,21 @@ Result<void> check_picture(const PictureOptions& options, const std::optional<Ca
   return {};
 }
 
-Result<bool> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera) {
+Result<bool> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera,
+                           const ParallelFor& parallel) {
   const Box box = box_of(subject.description.grid);
   const Camera seen_from = camera ? *camera : three_quarter_view(box, options.clip);
-  const Viewpoint viewpoint(seen_from, box);
-  TriangleOptions triangles{options.clip, options.edges, {}};
-  std::optional<Palette> palette;
-  if (options.colour_by == ColourBy::value) {
-    palette = find_palette(options.palette ? *options.palette : kPaletteNames[0]);
-    triangles.span = options.colour_span ? *options.colour_span : span_of(subject.description, subject.range);
+  const auto colours = colours_of(options, subject);
+  Result<Pixels> pixels;
+  if (options.render == Render::volume) {
+    const ValueSpan values = span_of(subject.description, subject.range);
+    const VolumeLook look{options.opacity ? *options.opacity : default_opacity(values), colours->palette, colours->span};
+    pixels = draw_volume(subject.mesh, {seen_from, box, options.clip, values}, look, parallel);
+  } else {
+    pixels = draw_surfaces(options, subject.mesh, colours, seen_from, box);
   }
-  auto canvas = Canvas::create(seen_from.viewport, viewpoint, palette);
-  if (!canvas) return tl::unexpected(canvas.error());
-  for_each_triangle(subject.mesh, triangles, viewpoint, [&canvas](std::span<const Corner> corners) { canvas->draw(corners); });
-  auto pixels = canvas->finish();
   if (!pixels) return tl::unexpected(pixels.error());
-  if (palette) draw_colour_bar(*pixels, *palette, *triangles.span, title_of(subject.description.labels));
+  if (colours) draw_colour_bar(*pixels, colours->palette, colours->span, title_of(subject.description.labels));
   if (auto written = write_png(options.file, *pixels); !written) return tl::unexpected(written.error());
   return pixels->has_drawing;
 }

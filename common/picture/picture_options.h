@@ -8,8 +8,9 @@
 
 namespace intervale {
 
-// Adds --image, --clip, --edges, --color-by, --palette and --color-span, which fill `picture` when the arguments are
-// parsed; without --image it stays empty, and the others are misuse. The values are checked by check_picture. picture must outlive app.
+// Adds --image, --render, --opacity, --clip, --edges, --color-by, --palette and --color-span, which fill `picture` when
+// the arguments are parsed; without --image it stays empty, and the others are misuse. The values are checked by
+// check_picture. picture must outlive app.
 void add_picture_options(CLI::App& app, std::optional<PictureOptions>& picture);
 
 }  // namespace intervale

@@ -20,16 +20,14 @@ Vec3 middle_of(const Box& box) {
   return middle;
 }
 
-// A camera's axes: all of length 1.
-struct Axes {
-  Vec3 right, up, back;
-};
 Axes axes_of(const Vec3& back, const Vec3& up) {
   const Vec3 b = normalized(back), right = normalized(cross(normalized(up), b));
   return {right, cross(b, right), b};
 }
 
 }  // namespace
+
+Axes axes_of(const Camera& camera) { return axes_of(subtract(camera.eye, camera.look_at), camera.up); }
 
 Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip) {
   Camera camera;
@@ -58,7 +56,7 @@ Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip) {
 Viewpoint::Viewpoint(const Camera& camera, const Box& box) : centre(middle_of(box)) {
   unit = length(subtract(box.max, box.min)) / 2;
   const Vec3 from = scaled(1 / unit, subtract(camera.eye, centre));
-  const Axes axes = axes_of(subtract(camera.eye, camera.look_at), camera.up);
+  const Axes axes = axes_of(camera);
   const double ahead = dot(from, axes.back);  // of the eye to the middle, along the line of sight
   const double nearest = std::max(kNearest, (ahead - 1) * 0.999), far = std::max(2 * nearest, (ahead + 1) * 1.001);
   const double scale_y = 1 / std::tan(camera.fov * std::numbers::pi / 360), scale_x = scale_y * camera.viewport[1] / camera.viewport[0];

@@ -14,6 +14,12 @@ namespace intervale {
 // side. The box is not a point.
 [[nodiscard]] Camera three_quarter_view(const Box& box, const std::optional<Plane>& clip);
 
+// A camera's axes, all of length 1: to the right of the picture, up in it, and towards the viewer.
+struct Axes {
+  Vec3 right, up, back;
+};
+[[nodiscard]] Axes axes_of(const Camera& camera);  // valid by check_lod
+
 // The scene is the world moved and scaled so that the box's corners lie on the unit sphere; floats are precise enough
 // there.
 struct Viewpoint {

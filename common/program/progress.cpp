@@ -3,7 +3,10 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cstddef>
 #include <cstdio>
+#include <functional>
 
 namespace intervale {
 
@@ -32,6 +35,18 @@ void Progress::note(const std::string& line) {
   const std::lock_guard lock(mutex_);
   fmt::print(stderr, "{}{}\n", shown_ ? "\r\x1b[K" : "", line);
   shown_ = false;
+}
+
+ParallelFor with_progress(Progress& progress, const ParallelFor& parallel) {
+  if (!progress.is_seen()) return parallel;
+  return [&progress, parallel, step = 0](std::size_t count, const std::function<void(std::size_t)>& piece) mutable {
+    ++step;
+    std::atomic<std::size_t> done = 0;
+    parallel(count, [&](std::size_t i) {
+      piece(i);
+      progress.text(fmt::format("step {}, {:.0f} %", step, 100 * double(++done) / double(count)));
+    });
+  };
 }
 
 }  // namespace intervale

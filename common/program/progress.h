@@ -5,6 +5,8 @@
 #include <mutex>
 #include <string>
 
+#include "common/util/parallel.h"
+
 namespace intervale {
 
 // A line on stderr, rewritten at most ten times a second, and erased on destruction. Any thread.
@@ -27,5 +29,9 @@ class Progress {
   bool shown_ = false;
   std::chrono::steady_clock::time_point next_{};
 };
+
+// A ParallelFor that does as `parallel`, and shows which of its loops one after the other runs, and how much of it is
+// done. One loop at a time. progress must outlive it.
+[[nodiscard]] ParallelFor with_progress(Progress& progress, const ParallelFor& parallel);
 
 }  // namespace intervale

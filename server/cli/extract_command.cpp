@@ -2,10 +2,8 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 
-#include <atomic>
 #include <chrono>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -49,22 +47,11 @@ Result<ShownRanges> shown_of(const ExtractCommand& options, const Description& d
   const auto ranges = parse_ranges(options.range);
   if (!ranges) return tl::unexpected(ranges.error());
   if (d.has_every_range && ranges->empty()) return misuse("'" + options.file + "' has every range: say which with --range LO HI");
-  ShownRanges shown = resolve(d, {*ranges, parse_refine(options.refine)});
+  auto refine = parse_refine(options.refine);
+  if (options.picture && options.picture->render == Render::volume && !refine && d.refine == Refine::uniform) refine = Refine::uniform;
+  ShownRanges shown = resolve(d, {*ranges, refine});
   if (auto held = check_held(d, shown); !held) return tl::unexpected(held.error());
   return shown;
-}
-
-// Uses all cores, and shows which of the loops one after the other runs, and how much of it is done.
-ParallelFor with_progress(Progress& progress) {
-  if (!progress.is_seen()) return on_all_cores;
-  return [&progress, step = 0](std::size_t count, const std::function<void(std::size_t)>& piece) mutable {
-    ++step;
-    std::atomic<std::size_t> done = 0;
-    on_all_cores(count, [&](std::size_t i) {
-      piece(i);
-      progress.text(fmt::format("step {}, {:.0f} %", step, 100 * double(++done) / double(count)));
-    });
-  };
 }
 
 // The meshes of all ranges as one, and the figures of each if there are several.
@@ -77,7 +64,7 @@ struct Extracted {
 Result<Extracted> extract_ranges(const ExtractCommand& options, const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown) {
   const auto relevant = find_relevant_updates(volume, shown, options.lod.camera ? Distances::measured : Distances::none);
   Progress progress("extracting " + volume->description().name);
-  const ParallelFor parallel = with_progress(progress);
+  const ParallelFor parallel = with_progress(progress, on_all_cores);
   const auto fronts = extract(*volume, *relevant, shown, options.lod, parallel);
   if (!fronts) return tl::unexpected(fronts.error());
   Extracted all;
@@ -108,6 +95,11 @@ Result<void> report(const ExtractCommand& options, const std::string& name, cons
   return print(text);
 }
 
+Result<bool> draw(const PictureOptions& picture, const PictureSubject& subject, const std::optional<Camera>& camera) {
+  Progress progress("drawing " + picture.file.string());
+  return write_picture(picture, subject, camera, with_progress(progress, on_all_cores));
+}
+
 Result<void> run(const ExtractCommand& options) {
   if (const auto ranges = parse_ranges(options.range); !ranges) return tl::unexpected(ranges.error());
   if (options.output) {
@@ -131,7 +123,7 @@ Result<void> run(const ExtractCommand& options) {
     if (auto written = write_mesh(*options.output, extracted->mesh); !written) return written;
   }
   if (options.picture) {
-    const auto drawn = write_picture(*options.picture, {extracted->mesh, description, range_around(*shown)}, options.lod.camera);
+    const auto drawn = draw(*options.picture, {extracted->mesh, description, range_around(*shown)}, options.lod.camera);
     if (!drawn) return tl::unexpected(drawn.error());
     if (!*drawn) fmt::print(stderr, "intervale: warning: nothing of the mesh is in the picture\n");
   }

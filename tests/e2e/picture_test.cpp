@@ -195,6 +195,7 @@ TEST(Pictures, FetchDrawsWhatExtractDraws) {
   const TempDir folder;
   for (const std::string& options :
        {std::string("--error-percent 20"), std::string(), std::string("--color-by value --palette cividis --clip 0 0 0 0 0 1"),
+        std::string("--render volume --opacity 120:0,150:0.1,190:0.6 --palette ice --eye 1.2 0.1 -2.5 --look-at 0 0 0 --viewport 320 240"),
         std::string("--eye 1.2 0.1 -2.5 --look-at 0 0 0 --viewport 640 480 --pixel-error 2 --clip 0 0 0 0 0 -1 --edges")}) {
     SCOPED_TRACE(options);
     const Image expected = drawn(buckyball(), options);
@@ -210,6 +211,42 @@ TEST(Pictures, FetchDrawsWhatExtractDraws) {
     for (std::size_t i = 0; i < got.rgb.size(); ++i) differ += got.rgb[i] != expected.rgb[i] ? 1 : 0;
     EXPECT_EQ(differ, 0u);
   }
+}
+
+// Those of a volume refine the inside, too, where there is a choice.
+TEST(Pictures, OfVolumesAreRefinedUniformly) {
+  const TempDir folder;
+  ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "33", "-o", folder / "x.nrrd"}).status, 0);
+  const Finished built = run({program("intervale"), "build", folder / "x.nrrd", "-o", folder / "every.ivm"});
+  ASSERT_EQ(built.status, 0) << built.err;
+  const std::string options =
+      "--range 60 188 --error-percent 10 --render volume --color-span 50 200 --eye 1.2 0.1 -2.5 --look-at 0 0 0 --viewport 320 240";
+  const Image image = drawn(folder / "every.ivm", options);
+  EXPECT_EQ(image.rgb, drawn(folder / "every.ivm", options + " --refine uniform").rgb);
+  EXPECT_NE(image.rgb, drawn(folder / "every.ivm", options + " --refine boundary").rgb);
+  EXPECT_GT(column_of_bar(image, {253, 231, 37}, {68, 1, 84}), 240);
+  ServerProgram server(folder / "every.ivm");
+  std::vector<std::string> fetch{program("intervale-client"), "fetch", server.url("every"), "--image", folder / "fetch.png"};
+  std::istringstream words(options);
+  for (std::string word; words >> word;) fetch.push_back(word);
+  const Finished fetched = run(fetch);
+  ASSERT_EQ(fetched.status, 0) << fetched.err;
+  EXPECT_EQ(read_png(folder / "fetch.png").rgb, image.rgb);
+}
+
+// Opaque, the ball is as large as its surface; its lightest values are inside.
+TEST(Pictures, OfVolumesShowWhatIsInside) {
+  const std::string camera = "--eye 16 16 916 --look-at 16 16 16 --fov 2.037 --viewport 200 160 --pixel-error 0.1 ",
+                    view = camera + "--palette grey --render volume ";
+  const Image dense = drawn(ball(), view + "--opacity 143:1"), thin = drawn(ball(), view + "--opacity 180:0,190:0.2"),
+              surface = drawn(ball(), camera);
+  for (const Image* image : {&dense, &thin}) {
+    EXPECT_EQ(hue(image->at(100 + 75, 150)), Hue::background);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(image->at(5, 7)[k], surface.at(5, 7)[k], 1);
+  }
+  EXPECT_LT(dense.at(100, 80)[0], 40);
+  EXPECT_LT(dense.at(100 - 65, 80)[0], 60);
+  EXPECT_GT(thin.at(100, 80)[0], 200);  // nothing but light values, near beta
 }
 
 TEST(Pictures, GoWithAMeshFileAndWithFigures) {
@@ -261,6 +298,12 @@ TEST(Pictures, WhatCannotBeDrawnIsOneLine) {
   complaint("--color-by density", "x.png", 2, "surface,value");
   complaint("--color-by value --palette jet", "x.png", 2, "viridis, cividis, inferno, ice or grey");
   complaint("--palette ice", "x.png", 2, "--color-by value");
+  complaint("--render cloud", "x.png", 2, "surface,volume");
+  complaint("--opacity 1:1", "x.png", 2, "--opacity needs --render volume");
+  complaint("--render volume --opacity 1:1,0:1", "x.png", 2, "--opacity: values must ascend");
+  complaint("--render volume --opacity 1", "x.png", 2, "VALUE:OPACITY");
+  complaint("--render volume --edges", "x.png", 2, "--edges");
+  complaint("--render volume --color-by surface", "x.png", 2, "--color-by surface");
   complaint("--color-span 1 2", "x.png", 2, "--color-by value");
   complaint("--color-by value --color-span 2 1", "x.png", 2, "--color-span");
   complaint("--color-by value --color-span 0 nan", "x.png", 2, "--color-span");
