@@ -46,7 +46,7 @@ OpacityCurve default_opacity(const ValueSpan& values) {
 }
 
 Pixels draw_volume(const Mesh& mesh, const VolumeRays& rays, const VolumeLook& look, const ParallelFor& parallel) {
-  const auto [width, height] = rays.camera.viewport;
+  const int width = rays.camera.viewport[0], height = rays.camera.viewport[1];
   Pixels pixels{width, height, std::vector<std::uint8_t>(3 * std::size_t(width) * std::size_t(height)), false};
   VolumeRays finer = rays;
   for (int& side : finer.camera.viewport) side *= kAcross;

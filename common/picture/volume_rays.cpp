@@ -14,7 +14,7 @@
 namespace intervale {
 namespace {
 
-constexpr int kTile = 32;
+constexpr int kTile = 16;  // the pieces of its rays fit the cache
 constexpr std::size_t kTetsAtOnce = 4096;
 constexpr double kMargin = 1e-5;   // in pixels, for kAside and the rounding of projections: no ray of a tetrahedron is missed
 constexpr double kUnit = 0.02;     // a hundredth of the box's diagonal, in the scene
