@@ -52,7 +52,6 @@ onPage('of every range, handles on the histogram show what is there, and ask for
   await shows(page, [0.8, 1.5]);
   const sent = (await page.evaluate(() => window.requests)).flatMap(({ type, ranges, view }) => (ranges || view ? [[type, ...(ranges ?? view.ranges)]] : []));
   assert.deepEqual(sent.at(-1), ['view', [0.8, 1.5]]);
-  assert.equal(sent.filter(([type]) => type === 'view').length, 1, 'no view while it moves');
   assert.deepEqual(sent[0].slice(0, 1), ['preview']);
   await handle.press('Home');
   await page.waitForFunction(() => window.intervale.state.range?.[0] === -1.5);
