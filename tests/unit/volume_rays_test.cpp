@@ -21,7 +21,6 @@
 namespace intervale {
 namespace {
 
-using testing::uniform;
 using testing::Vector;
 
 using Field = std::function<double(const Vector&)>;
