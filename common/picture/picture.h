@@ -52,10 +52,10 @@ struct PictureSubject {
 
 // Draws what the camera sees, in the size of its viewport, and writes it to a temporary file that is renamed. Without a
 // camera: the whole box in a three-quarter view, 1280 x 960 pixels. Returns whether anything of the mesh is in it;
-// otherwise it is background, with the colour bar if there is one. Equal meshes
-// give equal pictures on one machine, whatever the order of their points and tetrahedra. The options are valid by
-// check_picture. Surfaces take some 0.3 s, and a second for a million triangles; they fail where there is no EGL, with
-// what to install. Volumes take longer, and use `parallel` (volume_rays.h). One thread at a time.
+// otherwise it is background, with the colour bar if there is one. Equal meshes give equal pictures on one machine,
+// whatever the order of their points and tetrahedra. The options are valid by check_picture. Surfaces take some 0.3 s,
+// and a second for a million triangles; they fail where there is no EGL, with what to install. Volumes take longer, and
+// use `parallel` (volume_rays.h). One thread at a time.
 [[nodiscard]] Result<bool> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera,
                                          const ParallelFor& parallel = serial);
 
