@@ -52,30 +52,52 @@ Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
   for (const Range& range : shown.ranges) ranges.emplace_back(range.alpha, range.beta);
   const auto in_order = ranges.empty() ? 0 : out.CreateVectorOfStructs(ranges);
   const auto refine = std::uint8_t(shown.refine ? 1 + int(*shown.refine) : 0);
-  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early);
+  const auto channels = message.channels.empty() ? 0 : out.CreateVectorOfStrings(message.channels);
+  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early, channels);
 }
 
 Offset<fbs::Credit> encode_body(FlatBufferBuilder& out, const Credit& message) { return fbs::CreateCredit(out, message.bytes); }
 
 Offset<fbs::Have> encode_body(FlatBufferBuilder& out, const Have& message) {
-  return fbs::CreateHave(out, out.CreateVector(encode_splits(message.splits)));
+  return fbs::CreateHave(out, out.CreateVector(encode_splits(message.splits)), std::uint8_t(message.channel ? 1 + *message.channel : 0));
+}
+
+std::vector<std::int16_t> flat_weights(const Grid& grid, const ValueWeights& weights) {
+  std::vector<std::int16_t> flat(weight_count(grid));
+  for (std::size_t i = 0; i < flat.size(); ++i) flat[i] = weight_at(weights, i);
+  return flat;
+}
+
+Offset<fbs::Channel> encode_channel(FlatBufferBuilder& out, const Grid& grid, const Channel& channel) {
+  std::vector<Offset<fbs::Component>> components;
+  components.reserve(channel.components.size());
+  for (const ChannelComponent& c : channel.components) {
+    const auto corners = out.CreateVector(c.corners.data(), c.corners.size());
+    const auto weights = out.CreateVector(flat_weights(grid, c.weights));
+    components.push_back(
+        fbs::CreateComponent(out, std::uint8_t(c.format.type), c.format.step, c.format.first, c.format.last, c.is_exact, corners, weights));
+  }
+  const auto name = out.CreateString(channel.name), unit = out.CreateString(channel.unit);
+  return fbs::CreateChannel(out, name, unit, out.CreateVector(components));
 }
 
 Offset<fbs::Description> encode_description(FlatBufferBuilder& out, const Description& d) {
   const auto name = out.CreateString(d.name);
   const auto corners = out.CreateVector(d.corners.data(), d.corners.size());
-  std::vector<std::int16_t> flat(weight_count(d.grid));
-  for (std::size_t i = 0; i < flat.size(); ++i) flat[i] = weight_at(d.weights, i);
-  const auto weights = out.CreateVector(flat);
+  const auto weights = out.CreateVector(flat_weights(d.grid, d.weights));
   const fbs::Dims dims(d.grid.dims[0], d.grid.dims[1], d.grid.dims[2]);
   const auto affine = out.CreateVector(d.grid.affine.rows.data(), d.grid.affine.rows.size());
   const auto label = [&out](const std::string& text) { return text.empty() ? Offset<flatbuffers::String>() : out.CreateString(text); };
   const auto unit = label(d.labels.unit), field = label(d.labels.field), field_unit = label(d.labels.field_unit);
   const ValueFormat& format = d.format;
   const auto table = format.table ? out.CreateVector(encode_value_table(*format.table)) : 0;
+  std::vector<Offset<fbs::Channel>> each;
+  each.reserve(d.channels.size());
+  for (const Channel& channel : d.channels) each.push_back(encode_channel(out, d.grid, channel));
+  const auto channels = each.empty() ? 0 : out.CreateVector(each);
   return fbs::CreateDescription(out, name, &dims, d.range.alpha, d.range.beta, std::uint8_t(d.refine), d.max_error, d.updates, d.coefficients,
                                 d.full.vertices, d.full.tets, d.content_hash, std::uint8_t(format.type), format.step, format.first, format.last,
-                                d.is_exact, corners, weights, d.has_every_range, affine, unit, field, field_unit, table);
+                                d.is_exact, corners, weights, d.has_every_range, affine, unit, field, field_unit, table, channels);
 }
 
 Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
@@ -86,8 +108,9 @@ Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
 
 Offset<fbs::Batch> encode_body(FlatBufferBuilder& out, const Batch& message) {
   const auto payload = out.CreateVector(message.payload);
+  const auto channels = message.channels.empty() ? 0 : out.CreateVector(message.channels);
   return fbs::CreateBatch(out, message.epoch, message.sequence, message.updates, message.remaining_error, payload, message.remaining_pixels,
-                          message.updates_to_go);
+                          message.updates_to_go, channels);
 }
 
 Offset<fbs::Done> encode_body(FlatBufferBuilder& out, const Done& message) {
@@ -141,6 +164,13 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
     if (!splits) return malformed(splits.error().message);
     view.forget = std::move(*splits);
   }
+  if (const auto* channels = table.channels()) {
+    if (channels->size() > kMaxChannels) return malformed("a view of more than " + std::to_string(kMaxChannels) + " channels");
+    for (const flatbuffers::String* const name : *channels) {
+      if (VectorLength(name) > kMaxLabel) return malformed("a channel's name is too long");
+      view.channels.push_back(name->str());
+    }
+  }
   return view;
 }
 
@@ -149,7 +179,33 @@ Result<ClientMessage> decode_body(const fbs::Credit& table) { return Credit{tabl
 Result<ClientMessage> decode_body(const fbs::Have& table) {
   auto splits = decode_splits({table.splits()->data(), table.splits()->size()}, kMaxHave);
   if (!splits) return malformed(splits.error().message);
-  return Have{std::move(*splits)};
+  Have have{std::move(*splits)};
+  if (table.channel() > kMaxChannels) return malformed("a channel that no data set has");
+  if (table.channel() > 0) have.channel = table.channel() - 1u;
+  return have;
+}
+
+// The channels of a description. d: has its dims.
+Result<void> decode_channels(const fbs::Description& wire, Description& d) {
+  if (VectorLength(wire.channels()) > kMaxChannels) return malformed("a description has too many channels");
+  const std::size_t weights = weight_count(d.grid);
+  for (flatbuffers::uoffset_t i = 0; i < VectorLength(wire.channels()); ++i) {
+    const fbs::Channel& from = *wire.channels()->Get(i);
+    if (VectorLength(from.name()) > kMaxLabel || VectorLength(from.unit()) > kMaxLabel) return malformed("a channel's name or unit is too long");
+    if (from.components()->size() > kMaxComponents) return malformed("a channel has too many components");
+    Channel& channel = d.channels.emplace_back(Channel{from.name()->str(), flatbuffers::GetString(from.unit()), {}});
+    for (const fbs::Component* const c : *from.components()) {
+      if (c->type() >= kSampleTypes) return malformed("an unknown type of samples");
+      if (c->corners()->size() != kRootVertices || c->weights()->size() != weights)
+        return malformed("a channel does not have 8 corners, and the weights of its levels");
+      ChannelComponent& component = channel.components.emplace_back();
+      component.format = {SampleType(c->type()), c->step(), c->first(), c->last()};
+      component.is_exact = c->is_exact();
+      std::copy(c->corners()->begin(), c->corners()->end(), component.corners.begin());
+      for (std::size_t w = 0; w < weights; ++w) weight_at(component.weights, w) = c->weights()->Get(flatbuffers::uoffset_t(w));
+    }
+  }
+  return {};
 }
 
 // The part of a description that depends on the version of payloads. d: has its dims.
@@ -195,12 +251,13 @@ Result<ServerMessage> decode_body(const fbs::Opened& table) {
   d.content_hash = wire.content_hash();
   if (table.payload() == kPayloadVersion) {
     if (auto values = decode_values(wire, d); !values) return tl::unexpected(values.error());
+    if (auto channels = decode_channels(wire, d); !channels) return tl::unexpected(channels.error());
   }
   return Opened{std::move(d), {table.max_window(), table.min_credit(), table.max_message()}, table.resumed(), table.payload()};
 }
 
 Result<ServerMessage> decode_body(const fbs::Batch& table) {
-  if (VectorLength(table.payload()) > kMaxBatchPayload) return malformed("the batch is too large");
+  if (VectorLength(table.payload()) + VectorLength(table.channels()) > kMaxBatchPayload) return malformed("the batch is too large");
   if (!(table.remaining_error() >= 0)) return malformed("the remaining error is not a number of at least 0");
   if (!(table.remaining_pixels() >= 0)) return malformed("the remaining pixels are not a number of at least 0");
   Batch batch{.epoch = table.epoch(),
@@ -211,6 +268,7 @@ Result<ServerMessage> decode_body(const fbs::Batch& table) {
               .updates_to_go = table.updates_to_go(),
               .payload = {}};
   batch.payload.assign(table.payload()->begin(), table.payload()->end());
+  if (table.channels() != nullptr) batch.channels.assign(table.channels()->begin(), table.channels()->end());
   return batch;
 }
 
@@ -266,7 +324,7 @@ std::vector<std::uint8_t> encode(const ClientMessage& message) {
 
 std::vector<std::uint8_t> encode(const ServerMessage& message) {
   const auto* batch = std::get_if<Batch>(&message);
-  FlatBufferBuilder out((batch == nullptr ? 0 : batch->payload.size()) + 512);
+  FlatBufferBuilder out((batch == nullptr ? 0 : batch->payload.size() + batch->channels.size()) + 512);
   const auto body = [&out]<class Table>(Offset<Table> table) {
     return fbs::CreateServerMessage(out, fbs::ServerBodyTraits<Table>::enum_value, table.Union());
   };

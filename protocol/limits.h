@@ -22,7 +22,7 @@ inline constexpr std::size_t kMaxBatchPayload = 128 << 10;
 inline constexpr std::size_t kBatchEnvelope = 160;
 
 // Largest table of values in a Description: as it is coded, and the number of its values. An Opened has room for it.
-inline constexpr std::size_t kMaxTableBytes = 120 << 10;
+inline constexpr std::size_t kMaxTableBytes = 96 << 10;
 inline constexpr std::size_t kMaxTableValues = 128 << 10;
 
 // Largest message from the server: a Batch. An Opened is smaller.
@@ -47,9 +47,9 @@ inline constexpr std::size_t kMaxName = 255;
 // Longest free text: the client's name, the text of a Fault.
 inline constexpr std::size_t kMaxText = 200;
 
-// Limits of the FlatBuffers verifier. The deepest message nests 3 tables, and has 3 in all.
+// Limits of the FlatBuffers verifier. The deepest message nests 5 tables; one with all channels has 67.
 inline constexpr std::uint32_t kMaxDepth = 8;
-inline constexpr std::uint32_t kMaxTables = 16;
+inline constexpr std::uint32_t kMaxTables = 80;
 
 inline constexpr std::chrono::seconds kHandshakeTime{10};  // from the upgrade to Open, and for the closing handshake
 inline constexpr std::chrono::seconds kStallTime{120};     // without credit while there are updates to send

@@ -38,7 +38,7 @@ enum class CloseCode : std::uint16_t {
   timed_out = 4408,      // no Open, or no credit, in time
   out_of_order = 4409,   // a message that is not allowed in this state
   too_large = 4413,      // a message or the credit exceeds its limit
-  no_such_range = 4416,  // the data set has not what the view is to show
+  no_such_range = 4416,  // the data set has not what the view is to show: a range, or a channel
   other_version = 4426   // the client reads batches of another version than the server sends
 };
 
@@ -55,6 +55,8 @@ struct Open {
 // The updates that a resuming client holds. Between Open and the first View, in as many messages as needed.
 struct Have {
   std::vector<SlotGroup> splits;  // at most kMaxHave; keys ascending; only keys and slots are sent
+  // Not the updates, but the values of this channel of the data set at them; after the Have of those updates.
+  std::optional<std::size_t> channel = {};
   friend bool operator==(const Have&, const Have&) = default;
 };
 // What the client wants from now on.
@@ -70,6 +72,7 @@ struct View {
   // The server may begin before it is known how far the surfaces of the ranges move. The mesh may get finer than the
   // view asks for.
   bool early = false;
+  std::vector<std::string> channels = {};  // whose values are sent with the updates: names of the data set's
   friend bool operator==(const View&, const View&) = default;
 };
 struct Credit {
@@ -102,11 +105,14 @@ struct Batch {
   double remaining_error = 0;   // the largest saturated error; field units
   double remaining_pixels = 0;  // the largest error on the screen; 0 without a camera
   std::uint64_t updates_to_go = 0;
-  std::vector<std::uint8_t> payload;  // updates; see common/codec/batch.h
+  std::vector<std::uint8_t> payload;  // updates; see common/codec/batch.h; empty if there are none
+  // The values of the view's channels at those updates, or else at some that the client has; see
+  // common/codec/channel_batch.h. Empty if there are none.
+  std::vector<std::uint8_t> channels = {};
   friend bool operator==(const Batch&, const Batch&) = default;
 };
 // The credit that a Batch uses, counted alike by client and server: at least the bytes of its message.
-[[nodiscard]] inline std::uint64_t cost_of(const Batch& batch) { return batch.payload.size() + kBatchEnvelope; }
+[[nodiscard]] inline std::uint64_t cost_of(const Batch& batch) { return batch.payload.size() + batch.channels.size() + kBatchEnvelope; }
 
 struct Done {
   std::uint64_t epoch = 0;

@@ -17,6 +17,7 @@
 #include "common/mesh/join.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
+#include "common/program/channel_option.h"
 #include "common/program/lod_options.h"
 #include "common/program/mesh_figures.h"
 #include "common/program/progress.h"
@@ -134,6 +135,7 @@ Result<void> run(const FetchCommand& options) {
   if (!ranges) return tl::unexpected(ranges.error());
   FetchOptions fetch = options.fetch;
   fetch.shown = {*ranges, parse_refine(options.refine)};
+  fetch.channels = with_channel_of(options.picture, fetch.channels);
   fetch.prefers_uniform = options.picture && options.picture->render == Render::volume;
   const auto fetched = fetch_with_progress(*url, fetch);
   if (!fetched) return tl::unexpected(fetched.error());
@@ -160,6 +162,7 @@ void add_fetch_command(Program& program) {
   command.add_option("-o,--output", options->output, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")->type_name("MESH");
   add_ranges_option(command, options->range, kShownRangeHelp);
   add_refine_option(command, options->refine, kShownRefineHelp);
+  add_channel_option(command, options->fetch.channels);
   add_lod_options(command, options->fetch.lod);
   add_picture_options(command, options->picture);
   add_max_bytes_option(command, options->fetch.max_bytes);

@@ -21,7 +21,10 @@ ClientSession::ClientSession(Options options) : options_(std::move(options)), cr
 
 Result<void> ClientSession::look(ViewRequest request) {
   if (mesh_) {
+    const auto channels = find_channels(description_->channels, request.channels);
+    if (!channels) return tl::unexpected(channels.error());
     if (auto shown = mesh_->show(request.shown); !shown) return shown;
+    mesh_->show_channels(*channels);
   }
   view_ = std::move(request);
   if (mesh_ && view_->camera) mesh_->look(*view_->camera);
@@ -130,6 +133,11 @@ Result<void> ClientSession::start_mesh() {
   auto mesh = view_ ? StreamClient::start(*description_, view_->budget, view_->shown) : StreamClient::start(*description_);
   if (!mesh) return invalid(mesh.error());
   mesh_ = std::move(*mesh);
+  if (view_) {
+    const auto channels = find_channels(description_->channels, view_->channels);
+    if (!channels) return tl::unexpected(channels.error());
+    mesh_->show_channels(*channels);
+  }
   if (view_ && view_->camera) mesh_->look(*view_->camera);
   return {};
 }
@@ -152,7 +160,10 @@ Result<void> ClientSession::apply(const protocol::Batch& batch) {
   stats_.updates += batch.updates;
   if (!mesh_) return {};
   const auto start = Clock::now();
-  const auto applied = mesh_->apply(batch.payload, batch.epoch, shown_in(batch.epoch));
+  const ShownFrom& shown = shown_in(batch.epoch);
+  const auto channels = find_channels(description_->channels, shown.channels);
+  if (!channels) return violation("values of a channel that the data set has not");
+  const auto applied = mesh_->apply(batch.payload, batch.epoch, shown.shown, {batch.channels, *channels});
   stats_.seconds_applying += std::chrono::duration<double>(Clock::now() - start).count();
   if (!applied) return violation(applied.error().message);
   if (mesh_->updates() != updates_) return violation("a batch has not as many updates as it says");
@@ -162,10 +173,14 @@ Result<void> ClientSession::apply(const protocol::Batch& batch) {
 void ClientSession::send(const protocol::ClientMessage& message) { messages_.push_back(protocol::encode(message)); }
 
 void ClientSession::send_haves() {
-  const std::vector<SlotGroup> splits = mesh_->resume();
+  send_haves(mesh_->resume(), {});
+  for (std::size_t i = 0; i < mesh_->channels().size(); ++i) send_haves(mesh_->channels()[i].groups(), i);
+}
+
+void ClientSession::send_haves(std::span<const SlotGroup> splits, std::optional<std::size_t> channel) {
   for (auto first = splits.begin(); first != splits.end();) {
     const auto last = first + std::min(std::ptrdiff_t(protocol::kMaxHave), splits.end() - first);
-    send(protocol::Have{{first, last}});
+    send(protocol::Have{{first, last}, channel});
     stats_.have_bytes += messages_.back().size();
     first = last;
   }
@@ -176,7 +191,9 @@ void ClientSession::send_view() {
   protocol::View view{++epoch_, view_->lod};
   view.shown = view_->shown;
   view.early = view_->early;
-  if (shown_.empty() || shown_.back().shown != view.shown) shown_.push_back({epoch_, view.shown});
+  view.channels = view_->channels;
+  if (shown_.empty() || shown_.back().shown != view.shown || shown_.back().channels != view.channels)
+    shown_.push_back({epoch_, view.shown, view.channels});
   if (mesh_) {
     mesh_->set_budget(view_->budget, epoch_);
     if (is_open()) view.forget = mesh_->give_up(epoch_, protocol::kMaxHave);
@@ -188,10 +205,10 @@ void ClientSession::send_view() {
 }
 
 // epoch: no earlier than the last answered.
-const RangeRequest& ClientSession::shown_in(std::uint64_t epoch) const {
+const ClientSession::ShownFrom& ClientSession::shown_in(std::uint64_t epoch) const {
   auto at = shown_.begin();
   while (at + 1 != shown_.end() && (at + 1)->epoch <= epoch) ++at;
-  return at->shown;
+  return *at;
 }
 
 void ClientSession::send_credit() {

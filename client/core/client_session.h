@@ -30,8 +30,9 @@ struct ViewRequest {
   // Likewise. A mesh at its budget keeps what is largest on this camera's screen; without one, what came first.
   std::optional<Camera> camera = {};
   Budget budget = {};
-  RangeRequest shown = {};  // of the data set
-  bool early = false;       // see protocol::View
+  RangeRequest shown = {};                 // of the data set
+  bool early = false;                      // see protocol::View
+  std::vector<std::string> channels = {};  // of the data set, whose values come along
 };
 
 // On one thread.
@@ -86,7 +87,7 @@ class ClientSession {
   explicit ClientSession(Options options);
 
   // What is wanted from now on. Before connected(), and while there is no connection, it is only kept. Fails, and changes
-  // nothing, if the data set is known and has not all that is to be shown.
+  // nothing, if the data set is known and has not all that is to be shown, or not all channels.
   Result<void> look(ViewRequest request);
   // What the mesh shows until the next look(), of the updates that are here; the server is asked for nothing. Fails, and
   // changes nothing, if the data set has not all of it. Nothing happens while there is no mesh.
@@ -132,7 +133,7 @@ class ClientSession {
   void send_haves();
   void send_view();
   void send_credit();
-  [[nodiscard]] const RangeRequest& shown_in(std::uint64_t epoch) const;
+  void send_haves(std::span<const SlotGroup> splits, std::optional<std::size_t> channel);
   [[nodiscard]] bool is_open() const { return state_ == State::viewing || state_ == State::idle; }
   [[nodiscard]] tl::unexpected<Error> other_version(std::uint32_t payload) const;
   [[nodiscard]] tl::unexpected<Error> violation(const std::string& what) const;
@@ -147,7 +148,9 @@ class ClientSession {
   struct ShownFrom {
     std::uint64_t epoch = 0;
     RangeRequest shown;
+    std::vector<std::string> channels;
   };
+  [[nodiscard]] const ShownFrom& shown_in(std::uint64_t epoch) const;
   std::deque<ShownFrom> shown_;
   CreditWindow credit_;
   Stats stats_;

@@ -16,12 +16,19 @@ Result<StreamClient> StreamClient::start(Description description, const Budget& 
   return StreamClient(std::move(description), std::move(fronts), budget);
 }
 
-Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch, const RangeRequest& shown) {
+Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uint64_t epoch, const RangeRequest& shown, const ChannelPart& channels) {
   keep_to_budget(epoch);
   forget(epoch);
   const std::uint64_t before = updates();
-  const auto applied = apply_batch(fronts_, description_, resolve(description_, shown), payload, budget_.max_tets);
-  if (!applied) return tl::unexpected(applied.error());
+  if (!payload.empty() || channels.bytes.empty()) {
+    const auto applied = apply_batch(fronts_, description_, resolve(description_, shown), payload, budget_.max_tets);
+    if (!applied) return tl::unexpected(applied.error());
+  }
+  if (!channels.bytes.empty()) {
+    std::vector<ChannelValues*> named;
+    for (const std::size_t number : channels.numbers) named.push_back(&channels_[number]);
+    if (auto taken = apply_channels(named, fronts_[0], payload, channels.bytes); !taken) return taken;
+  }
   if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than the room that the view names");
   rebalance();
   return {};
@@ -48,7 +55,9 @@ Result<void> StreamClient::show(const RangeRequest& request) {
 std::vector<Mesh> StreamClient::meshes() const {
   std::vector<Mesh> meshes;
   meshes.reserve(fronts_.size());
-  for (const Front& front : fronts_) meshes.push_back(front.mesh());
+  std::vector<MeshChannel> channels;
+  for (const std::size_t number : shown_channels_) channels.push_back(channels_[number].for_mesh());
+  for (const Front& front : fronts_) meshes.push_back(front.mesh(serial, channels));
   return meshes;
 }
 
@@ -102,6 +111,7 @@ void StreamClient::arrived(std::uint64_t epoch) {
 bool StreamClient::forget(std::uint64_t epoch) {
   if (forget_.empty() || epoch < forget_epoch_) return false;
   for (Front& front : fronts_) front.forget(forget_);
+  for (ChannelValues& channel : channels_) channel.keep_split(fronts_[0], forget_);
   forget_.clear();
   return true;
 }

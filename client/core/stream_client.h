@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/core/budget.h"
+#include "common/front/channel_values.h"
 #include "common/front/front.h"
 #include "common/mesh/join.h"
 #include "common/mesh/mesh.h"
@@ -34,7 +35,13 @@ class StreamClient {
   // after each successful call. A payload that is damaged, or does not fit the batches before it, is an error; this
   // object must not be used again then. Updates that the meshes have no room for within max_tets are kept, but hidden:
   // those that came last or, once look() was called, the least important ones.
-  Result<void> apply(std::span<const std::uint8_t> payload, std::uint64_t epoch = 0, const RangeRequest& shown = {});
+  // channels: of a batch with values, that part of it and the numbers of the channels that its view names.
+  struct ChannelPart {
+    std::span<const std::uint8_t> bytes;
+    std::span<const std::size_t> numbers;
+  };
+  Result<void> apply(std::span<const std::uint8_t> payload, std::uint64_t epoch = 0, const RangeRequest& shown = {},
+                     const ChannelPart& channels = {});
 
   // What the meshes show from now on, of the updates that are here: the i-th is that of the i-th range. Fails, and
   // changes nothing, if the data set has not all of it. Linear in the updates for each mesh that shows another range.
@@ -72,18 +79,27 @@ class StreamClient {
   // One for each range that is shown, in its order. Each stays where it is as long as there are as many ranges.
   [[nodiscard]] const std::vector<Front>& fronts() const { return fronts_; }
   [[nodiscard]] const Front& front() const { return fronts_[0]; }
-  [[nodiscard]] std::vector<Mesh> meshes() const;               // likewise; linear in their size
+  // Likewise, with the channels that a view named last; linear in their size.
+  [[nodiscard]] std::vector<Mesh> meshes() const;
+  // Of the data set, with the values that are here.
+  [[nodiscard]] const std::vector<ChannelValues>& channels() const { return channels_; }
+  // The channels that meshes() brings along: numbers of the data set's.
+  void show_channels(std::vector<std::size_t> numbers) { shown_channels_ = std::move(numbers); }
   [[nodiscard]] Mesh mesh() const { return joined(meshes()); }  // all of them as one
 
  private:
   StreamClient(Description description, std::vector<Front> fronts, const Budget& budget)
-      : description_(std::move(description)), fronts_(std::move(fronts)), budget_(budget) {}
+      : description_(std::move(description)), fronts_(std::move(fronts)), budget_(budget) {
+    for (const Channel& channel : description_.channels) channels_.emplace_back(description_.grid, channel);
+  }
   [[nodiscard]] std::uint64_t sum(std::uint64_t (Front::*count)() const) const;
   void rebalance();
   bool forget(std::uint64_t epoch);
   void keep_to_budget(std::uint64_t epoch);
   Description description_;
   std::vector<Front> fronts_;  // with the same splits; room for kMaxRanges, so that none moves
+  std::vector<ChannelValues> channels_;
+  std::vector<std::size_t> shown_channels_;
   Budget budget_;
   struct LessRoom {
     std::uint64_t epoch = 0, max_updates = 0;

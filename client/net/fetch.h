@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/core/client_session.h"
 #include "client/net/url.h"
@@ -16,7 +17,8 @@ namespace intervale {
 
 struct FetchOptions {
   Lod lod;
-  RangeRequest shown;  // of the data set; ranges are needed if it has every range
+  RangeRequest shown;                 // of the data set; ranges are needed if it has every range
+  std::vector<std::string> channels;  // of the data set, that the meshes bring along
   // Where `shown` does not say what to refine: the inside of the ranges too, if the data set has it.
   bool prefers_uniform = false;
   // The most bytes of messages that are received; only the first one, the description, may exceed it. No updates

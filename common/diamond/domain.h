@@ -33,6 +33,17 @@ class Domain {
   [[nodiscard]] Vertex clamp(Vertex v) const { return {std::clamp(v.x, 0, last_.x), std::clamp(v.y, 0, last_.y), std::clamp(v.z, 0, last_.z)}; }
   [[nodiscard]] bool contains(Vertex v) const { return v == clamp(v); }
 
+  // The root's local number of a corner of the virtual grid; -1 for any other vertex of a diamond.
+  [[nodiscard]] int corner_number(Vertex v) const {
+    const std::int32_t n = std::int32_t(1) << levels_;
+    if (((v.x | v.y | v.z) & (n - 1)) != 0) return -1;
+    const Diamond root(this->root());
+    for (int i = 0; i < root.row->vertices; ++i) {
+      if (root.vertex(i) == v) return i;
+    }
+    return -1;
+  }
+
   // Whether all vertices of the diamond lie in the box: its tetrahedra then all exist, and none is moved by clamping.
   [[nodiscard]] bool is_interior(const Diamond& d) const {
     return contains({d.centre.x - d.h, d.centre.y - d.h, d.centre.z - d.h}) && contains({d.centre.x + d.h, d.centre.y + d.h, d.centre.z + d.h});

@@ -40,6 +40,15 @@
 
 namespace intervale {
 
+// A channel for a mesh to bring along.
+struct MeshChannel {
+  std::string name, unit;
+  unsigned components = 1;  // at most kMaxComponents
+  // Sets `components` values at a vertex of the hierarchy, not clamped to the box. Called for the vertices of what is
+  // shown, from the threads of the mesh's ParallelFor at the same time.
+  std::function<void(Vertex vertex, std::span<double> values)> values_at;
+};
+
 class Front {
  public:
   // The mesh of the root's patch. grid.dims in [kMinSide, kMaxSide]. format: as check_value_format accepts it. corners:
@@ -102,8 +111,9 @@ class Front {
   [[nodiscard]] std::uint64_t shown_slots(SupercubeKey supercube) const;  // of that one's splits
   [[nodiscard]] bool is_hidden(Handle handle) const;                      // split, but not shown
 
-  // The mesh, in world coordinates, with the value of each point.
-  [[nodiscard]] Mesh mesh(const ParallelFor& parallel = serial) const;
+  // The mesh, in world coordinates, with the value of each point, and with channels: linear along the edges that are
+  // cut, as the values are.
+  [[nodiscard]] Mesh mesh(const ParallelFor& parallel = serial, std::span<const MeshChannel> channels = {}) const;
 
   // Whether both have one grid, format and range, equal keys at the corners, and every diamond split here is split in
   // `other` with the same key. O(front).

@@ -4,12 +4,14 @@
 // spine that is; and a centre inside the range stays a point. Only on the far faces of a box that clamps (domain.h),
 // where edges may fall together or vanish, the tetrahedra decide.
 #include <algorithm>
+#include <array>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <cassert>
 #include <utility>
 
 #include "common/front/front.h"
 #include "common/front/front_mesher.h"
+#include "common/patch/channel.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -20,8 +22,9 @@ using Position = FrontMesher::Position;
 
 class FrontMesh {
  public:
-  FrontMesh(const FrontState& state, const ParallelFor& parallel)
+  FrontMesh(const FrontState& state, const ParallelFor& parallel, std::span<const MeshChannel> channels)
       : state_(state),
+        channels_(channels),
         mesher_(state),
         is_mirrored_(state.grid.affine.is_mirrored()),
         parallel_(parallel),
@@ -46,6 +49,11 @@ class FrontMesh {
     mesh.surface.resize(points);
     mesh.value.resize(points);
     mesh.tets.resize(state_.tet_count);
+    mesh.channels.resize(channels_.size());
+    for (std::size_t i = 0; i < channels_.size(); ++i) {
+      mesh.channels[i] = {channels_[i].name, channels_[i].unit, channels_[i].components, {}};
+      mesh.channels[i].value.resize(std::size_t(points) * channels_[i].components);
+    }
     parallel_(pieces_, [&](std::size_t piece) { place_points(piece, mesh); });
     place_tets(mesh);
     return mesh;
@@ -135,18 +143,35 @@ class FrontMesh {
     constexpr double kStep = 1.0 / FrontMesher::kSteps;
     const Affine& affine = state_.grid.affine;
     std::vector<FrontMesher::Point> points;
+    std::vector<FrontMesher::Ends> ends;
     for_each_supercube(piece, [&](std::size_t number) {
       points.clear();
-      mesher_.append_points(number, points, used_);
-      for (const FrontMesher::Point& p : points) {
+      ends.clear();
+      mesher_.append_points(number, points, used_, channels_.empty() ? nullptr : &ends);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const FrontMesher::Point& p = points[i];
         if (!used_[p.id]) continue;
         const std::uint32_t n = number_[p.id];
+        if (!channels_.empty()) place_channels(ends[i], n, mesh);
         mesh.points[n] = affine.point({p.position[0] * kStep, p.position[1] * kStep, p.position[2] * kStep});
         mesh.surface[n] = p.surface;
         if (p.surface != Surface::inside) mesh.value[n] = p.surface == Surface::alpha ? state_.values.range.alpha : state_.values.range.beta;
       }
       place_values(number, mesh);
     });
+  }
+
+  void place_channels(const FrontMesher::Ends& ends, std::size_t point, Mesh& mesh) const {
+    std::array<double, kMaxComponents> centre{}, vertex{};
+    for (std::size_t i = 0; i < channels_.size(); ++i) {
+      const std::size_t n = channels_[i].components;
+      channels_[i].values_at(ends.centre, std::span(centre).first(n));
+      if (ends.at != 0) channels_[i].values_at(ends.vertex, std::span(vertex).first(n));
+      const double share = double(ends.at) / FrontMesher::kSteps;
+      for (std::size_t c = 0; c < n; ++c) {
+        mesh.channels[i].value[point * n + c] = ends.at == 0 ? centre[c] : centre[c] * (1 - share) + vertex[c] * share;
+      }
+    }
   }
 
   // The values of a supercube's centres that are points.
@@ -179,6 +204,7 @@ class FrontMesh {
   }
 
   const FrontState& state_;
+  const std::span<const MeshChannel> channels_;
   const FrontMesher mesher_;
   const bool is_mirrored_;  // what is positive in samples is not in the world
   const ParallelFor& parallel_;
@@ -191,6 +217,6 @@ class FrontMesh {
 
 }  // namespace
 
-Mesh Front::mesh(const ParallelFor& parallel) const { return FrontMesh(state_, parallel).make(); }
+Mesh Front::mesh(const ParallelFor& parallel, std::span<const MeshChannel> channels) const { return FrontMesh(state_, parallel, channels).make(); }
 
 }  // namespace intervale

@@ -61,21 +61,23 @@ bool FrontMesher::is_at_border(std::size_t number) const {
   return is_on_border({(p.x + 1) * reach, (p.y + 1) * reach, (p.z + 1) * reach});
 }
 
-void FrontMesher::append_points(std::size_t number, std::vector<Point>& points, std::span<const std::uint8_t> wanted) const {
+void FrontMesher::append_points(std::size_t number, std::vector<Point>& points, std::span<const std::uint8_t> wanted, std::vector<Ends>* ends) const {
   // The domain's corner (0, 0, 0), the oldest vertex, owns no edge.
   if (const FrontState::Split origin = state_.origin.split_at(Slot()); number == 0 && origin.side() == Side::inside) {
     points.push_back({origin.centre(), {}, Surface::inside, false});
+    if (ends != nullptr) ends->emplace_back();
   }
   const FrontState::Block& block = state_.blocks[number];
   FrontCursor cursor(state_);
   cursor.move_to(block.scale, block.position);
   for (const Slot slot : set_bits<Slot>(block.shown & block.placed.slots())) {
-    append_cuts(cursor, Diamond(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]), points, wanted);
+    append_cuts(cursor, Diamond(centre_of(block.scale, block.position, slot), block.scale, kTypeOfSlot[slot]), points, wanted, ends);
   }
 }
 
 // The points of one split in the cursor's supercube.
-void FrontMesher::append_cuts(FrontCursor& cursor, const Diamond& d, std::vector<Point>& points, std::span<const std::uint8_t> wanted) const {
+void FrontMesher::append_cuts(FrontCursor& cursor, const Diamond& d, std::vector<Point>& points, std::span<const std::uint8_t> wanted,
+                              std::vector<Ends>* ends) const {
   const FrontValues& values = state_.values;
   const Slot slot = kSlotOfType[d.type];
   const FrontState::Split split = cursor.here().placed[slot];
@@ -100,9 +102,12 @@ void FrontMesher::append_cuts(FrontCursor& cursor, const Diamond& d, std::vector
       const std::int32_t t = 2 * cuts.q[i] + 1;
       const Position at{c.x * kSteps + (e.x - c.x) * t, c.y * kSteps + (e.y - c.y) * t, c.z * kSteps + (e.z - c.z) * t};
       points.push_back({first + PointId(i), at, i == 0 ? surface : Surface::beta, ends_on_border});
+      if (ends != nullptr) ends->push_back({d.centre, end, t});
     }
   }
-  if (split.side() == Side::inside) points.push_back({id, {c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, on_border});
+  if (split.side() != Side::inside) return;
+  points.push_back({id, {c.x * kSteps, c.y * kSteps, c.z * kSteps}, Surface::inside, on_border});
+  if (ends != nullptr) ends->push_back({d.centre, d.centre, 0});
 }
 
 void FrontMesher::append_runs(std::size_t number, std::vector<Run>& runs) const {

@@ -35,6 +35,12 @@ class FrontMesher {
     Surface surface = Surface::inside;
     bool on_border = false;  // on a far face of the box, where clamping moves vertices
   };
+  // Where a point's values come from: the edge that a cut lies on, and how far from its centre, in 1 / kSteps; a centre
+  // itself, at 0. Vertices are not clamped.
+  struct Ends {
+    Vertex centre, vertex;
+    std::int32_t at = 0;
+  };
   struct Run {  // points with the ids [first, first + count)
     PointId first = 0;
     std::uint32_t count = 0;
@@ -57,7 +63,9 @@ class FrontMesher {
   [[nodiscard]] const FrontState::Block& block(std::size_t number) const { return state_.blocks[number]; }
 
   // The points that its shown splits brought. wanted: by id, 0 for points that may be left out; if empty, none may.
-  void append_points(std::size_t number, std::vector<Point>& points, std::span<const std::uint8_t> wanted = {}) const;
+  // ends: gets those of each point that is appended, if it is not null.
+  void append_points(std::size_t number, std::vector<Point>& points, std::span<const std::uint8_t> wanted = {},
+                     std::vector<Ends>* ends = nullptr) const;
   // The same points, as runs.
   void append_runs(std::size_t number, std::vector<Run>& runs) const;
   // The points that its shown splits removed: the cuts of the edges that they split.
@@ -103,7 +111,8 @@ class FrontMesher {
   Tet* place_patch(Tet* to, const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points) const;
   void append_patch_faces(const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points,
                           std::vector<Face>& faces) const;
-  void append_cuts(FrontCursor& cursor, const Diamond& d, std::vector<Point>& points, std::span<const std::uint8_t> wanted) const;
+  void append_cuts(FrontCursor& cursor, const Diamond& d, std::vector<Point>& points, std::span<const std::uint8_t> wanted,
+                   std::vector<Ends>* ends) const;
   [[nodiscard]] static bool can_change(FrontCursor& cursor, Vertex centre);
 
   const FrontState& state_;

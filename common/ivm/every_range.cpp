@@ -89,7 +89,10 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   parts.statistics = std::make_shared<const FieldStatistics>(std::move(values.description.statistics));
   parts.set = std::move(values.set);
   parts.keys = std::move(values.keys);
-  return IntervalVolume::assemble(std::move(parts), parallel);
+  auto made = IntervalVolume::assemble(std::move(parts), parallel);
+  if (!made) return made;
+  if (auto ok = made->set_channels(std::move(values.description.channels), std::move(values.channel_keys)); !ok) return tl::unexpected(ok.error());
+  return made;
 }
 
 }  // namespace intervale

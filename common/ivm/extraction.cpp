@@ -72,6 +72,25 @@ Result<std::vector<Extraction>> extract(const IntervalVolume& volume, const Rele
   return each;
 }
 
+std::vector<MeshChannel> channels_of(const IntervalVolume& volume, std::span<const std::size_t> numbers) {
+  std::vector<MeshChannel> channels;
+  channels.reserve(numbers.size());
+  for (const std::size_t number : numbers) {
+    const Channel& channel = volume.description().channels[number];
+    const ChannelKeys& keys = volume.channel_keys()[number];
+    const auto values_at = [&volume, &channel, &keys](Vertex vertex, std::span<double> values) {
+      const int corner = volume.domain().corner_number(vertex);
+      const auto place = corner < 0 ? volume.set().find(vertex) : std::nullopt;
+      for (std::size_t c = 0; c < values.size(); ++c) {
+        const ChannelComponent& component = channel.components[c];
+        values[c] = component.format.value(corner < 0 ? keys[c][place->index] : component.corners[std::size_t(corner)]);
+      }
+    };
+    channels.push_back({channel.name, channel.unit, unsigned(channel.components.size()), values_at});
+  }
+  return channels;
+}
+
 Result<Extraction> extract(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const ParallelFor& parallel) {
   auto each = extract(volume, relevant, relevant.shown(), lod, parallel);
   if (!each) return tl::unexpected(each.error());

@@ -1,7 +1,9 @@
 // Refining a mesh to a level of detail, without a server: from Sigma, or from any other source of the same updates.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/front/front.h"
@@ -29,6 +31,9 @@ struct Extraction {
 [[nodiscard]] inline Result<Extraction> extract(const IntervalVolume& volume, const Lod& lod, const ParallelFor& parallel = serial) {
   return extract(volume, volume.relevant(), lod, parallel);
 }
+
+// Channels of a data set, by number, for the meshes of what was extracted from it. volume: must outlive the result.
+[[nodiscard]] std::vector<MeshChannel> channels_of(const IntervalVolume& volume, std::span<const std::size_t> numbers);
 
 // The front of a data set before the first split.
 [[nodiscard]] Front root_front(const Description& description, const ShownRange& shown);

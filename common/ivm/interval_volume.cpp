@@ -45,8 +45,28 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts, const ParallelFor& 
   return IntervalVolume(std::move(parts), std::move(bounds));
 }
 
+Result<void> IntervalVolume::set_channels(std::vector<Channel> channels, std::vector<ChannelKeys> keys) {
+  if (auto valid = check_channels(channels); !valid) return valid;
+  bool fits = keys.size() == channels.size();
+  for (std::size_t i = 0; fits && i < channels.size(); ++i) {
+    fits = keys[i].size() == channels[i].components.size();
+    for (std::size_t c = 0; fits && c < keys[i].size(); ++c) {
+      fits = keys[i][c].size() == size();
+      for (std::size_t k = 0; fits && k < size(); ++k) fits = keys[i][c][k] <= channels[i].components[c].format.last;
+    }
+  }
+  if (!fits) return fail("the values of a channel do not fit the data set");
+  description_.channels = std::move(channels);
+  channel_keys_ = std::move(keys);
+  return {};
+}
+
 std::size_t IntervalVolume::memory_bytes() const {
-  return sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
+  std::size_t of_channels = 0;
+  for (const ChannelKeys& channel : channel_keys_) {
+    for (const ValueKeys& keys : channel) of_channels += keys.memory_bytes();
+  }
+  return of_channels + sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
          error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + (bounds_ ? bounds_->memory_bytes() : 0) +
          (statistics_ ? statistics_->memory_bytes() : 0);
 }

@@ -65,6 +65,11 @@ class IntervalVolume {
   [[nodiscard]] const FieldStatistics* statistics() const { return statistics_.get(); }
   [[nodiscard]] std::size_t memory_bytes() const;
 
+  // Channels, which it has none of at first: those of the description, and their keys by component and number.
+  [[nodiscard]] const std::vector<ChannelKeys>& channel_keys() const { return channel_keys_; }
+  // Fails as check_channels() does, and where sizes or ranges do not match.
+  [[nodiscard]] Result<void> set_channels(std::vector<Channel> channels, std::vector<ChannelKeys> keys);
+
  private:
   IntervalVolume(Parts parts, std::shared_ptr<const ValueBounds> bounds);
   Description description_;
@@ -76,6 +81,7 @@ class IntervalVolume {
   RelevantUpdates relevant_;
   std::shared_ptr<const ValueBounds> bounds_;
   std::shared_ptr<const FieldStatistics> statistics_;
+  std::vector<ChannelKeys> channel_keys_;
 };
 
 }  // namespace intervale

@@ -3,6 +3,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <cstring>
@@ -41,8 +42,9 @@ constexpr std::uint32_t bit_of(StreamType type) { return std::uint32_t(1) << std
 constexpr std::uint32_t kCommon =
     bit_of(StreamType::field) | bit_of(StreamType::weights) | bit_of(StreamType::page_index) | bit_of(StreamType::pages) | bit_of(StreamType::labels);
 constexpr std::uint32_t kStatistics = bit_of(StreamType::histogram) | bit_of(StreamType::volumes);
-constexpr std::uint32_t kForPeople = kStatistics | bit_of(StreamType::labels);  // what a mesh can do without
-constexpr std::uint32_t kSometimes = bit_of(StreamType::value_table);
+constexpr std::uint32_t kChannels = bit_of(StreamType::channels) | bit_of(StreamType::channel_pages);
+constexpr std::uint32_t kNotNeeded = kStatistics | bit_of(StreamType::labels) | kChannels;  // what a mesh can do without
+constexpr std::uint32_t kSometimes = bit_of(StreamType::value_table) | kChannels;
 constexpr std::uint32_t types_of(FileScope scope) {
   if (scope == FileScope::every_range) return kCommon | kStatistics | kSometimes;
   return ((std::uint32_t(1) << kStreamTypes) - 2) & ~kStatistics;
@@ -163,7 +165,9 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
 
 std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
   std::uint32_t types = types_of(scope);
-  if (streams[StreamType::value_table].empty()) types &= ~bit_of(StreamType::value_table);
+  for (const int type : set_bits(kSometimes)) {
+    if (streams[StreamType(type)].empty()) types &= ~bit_of(StreamType(type));
+  }
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   header.version = kIvmVersion;
@@ -175,7 +179,7 @@ std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
   for (const int type : set_bits(types)) {
     const auto& bytes = streams[StreamType(type)];
     const bool is_pages = StreamType(type) == StreamType::pages;
-    const Entry e{std::uint32_t(type), (kForPeople >> type & 1) != 0 ? kOptional : 0, header.file_bytes, bytes.size(),
+    const Entry e{std::uint32_t(type), (kNotNeeded >> type & 1) != 0 ? kOptional : 0, header.file_bytes, bytes.size(),
                   is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size())};
     entries.push_back(e);
     header.file_bytes += bytes.size();
@@ -202,6 +206,10 @@ Result<Container> Container::open(std::span<const std::byte> file, FileScope sco
     const bool is_pages = StreamType(e.type) == StreamType::pages;
     if (e.checksum != (is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size()))) return fail(name_of(e.type) + " is damaged (checksum)");
     if (e.type < kStreamTypes) container.streams_[e.type] = bytes;
+    if (StreamType(e.type) == StreamType::channels) {
+      const std::array<std::uint64_t, 2> both{container.content_hash_, e.checksum};
+      container.content_hash_ = XXH3_64bits(both.data(), sizeof both);
+    }
   }
   return container;
 }

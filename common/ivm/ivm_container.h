@@ -35,8 +35,11 @@ enum class StreamType : std::uint32_t {
   labels = 14,
   // both, if values need a table
   value_table = 15,
+  // both, if there are channels
+  channels = 16,
+  channel_pages = 17,
 };
-inline constexpr std::uint32_t kStreamTypes = 16;  // and one more, as 0 is none
+inline constexpr std::uint32_t kStreamTypes = 18;  // and one more, as 0 is none
 
 enum class FileScope { every_range, one_range };  // of which ranges a data set is
 
@@ -66,13 +69,13 @@ void append(std::vector<std::byte>& out, std::span<const T> values) {
 
 // A file from outside: its header, table and checksums are in order, and it has the streams of its scope; optional ones
 // of an unknown type are skipped, once their checksums were checked. Pages have checksums of their own, which whoever
-// reads them must check. value_table is empty if the file has none.
+// reads them must check. value_table and the streams of channels are empty if the file has none.
 class Container {
  public:
   // The file must outlive the result. Fails, in one line, if it is not a file of this scope.
   static Result<Container> open(std::span<const std::byte> file, FileScope scope);
 
-  [[nodiscard]] std::uint64_t content_hash() const { return content_hash_; }  // Description::content_hash
+  [[nodiscard]] std::uint64_t content_hash() const { return content_hash_; }  // Description::content_hash: that of the header, and of channels
   [[nodiscard]] std::size_t file_bytes() const { return file_bytes_; }
   // The bytes of a stream of the scope.
   [[nodiscard]] std::span<const std::byte> operator[](StreamType type) const { return streams_[std::size_t(type)]; }

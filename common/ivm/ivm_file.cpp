@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/codec/byte_planes.h"
+#include "common/ivm/channel_file.h"
 #include "common/ivm/ivm_coding.h"
 #include "common/ivm/value_streams.h"
 #include "common/util/bits.h"
@@ -187,6 +188,7 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
     append_plane(stored, contents_of(volume, kCompressed[i]), kCompression);
     append<std::uint8_t>(streams[kCompressed[i]], stored);
   });
+  append_channels(streams, volume.description().grid, volume.set(), volume.description().channels, volume.channel_keys(), parallel);
   return make_container(FileScope::one_range, streams);
 }
 
@@ -209,7 +211,12 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   parts.keys = ValueKeys(parts.set.size(), d.format.last);
   if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_errors(*file, *record, parts); !ok) return tl::unexpected(ok.error());
-  return IntervalVolume::assemble(std::move(parts), parallel);
+  auto channels = read_channels(*file, d.grid, parts.set, parallel);
+  if (!channels) return tl::unexpected(channels.error());
+  auto volume = IntervalVolume::assemble(std::move(parts), parallel);
+  if (!volume) return volume;
+  if (auto ok = volume->set_channels(std::move(channels->channels), std::move(channels->keys)); !ok) return tl::unexpected(ok.error());
+  return volume;
 }
 
 Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel) {

@@ -9,6 +9,7 @@
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/value_keys.h"
 #include "common/ivm/value_volume.h"
+#include "common/patch/channel.h"
 #include "common/patch/value_format.h"
 #include "common/patch/value_weights.h"
 
@@ -21,6 +22,9 @@ struct PagedValues {
   PagedValues(const IntervalVolume::Parts& p) : PagedValues(p.description, p.description.weights, p.set, p.keys, nullptr) {}
   PagedValues(const IntervalVolume& v) : PagedValues(v.description(), v.description().weights, v.set(), v.keys(), nullptr) {}
   // NOLINTEND(google-explicit-constructor)
+  // Of a channel. keys: one for each of the set.
+  PagedValues(const Grid& g, const SupercubeSet& s, const ChannelComponent& c, const ValueKeys& k)
+      : set(s), keys(k), grid(g), format(c.format), corners(c.corners), weights(c.weights), max_error(0), error_levels(nullptr) {}
 
   const SupercubeSet& set;  // with each diamond all its ancestors
   const ValueKeys& keys;    // by number
@@ -43,6 +47,7 @@ struct DecodedValues {
   DecodedValues(ValueVolume::Parts& p) : values(p), keys(p.keys), error_levels(&p.error_levels) {}
   DecodedValues(IntervalVolume::Parts& p) : values(p), keys(p.keys), error_levels(nullptr) {}
   // NOLINTEND(google-explicit-constructor)
+  DecodedValues(const Grid& g, const SupercubeSet& s, const ChannelComponent& c, ValueKeys& k) : values(g, s, c, k), keys(k), error_levels(nullptr) {}
 
   PagedValues values;
   ValueKeys& keys;                        // those of `values`

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/codec/byte_planes.h"
+#include "common/ivm/channel_file.h"
 #include "common/ivm/ivm_container.h"
 #include "common/ivm/value_streams.h"
 
@@ -100,6 +101,7 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
   append_values(streams, volume.parts(), d.is_exact, parallel);
   append_labels(streams, d.labels);
   append_statistics(d, streams[StreamType::histogram], streams[StreamType::volumes]);
+  append_channels(streams, d.grid, volume.set(), d.channels, volume.parts().channel_keys, parallel);
   return make_container(FileScope::every_range, streams);
 }
 
@@ -123,6 +125,10 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
   parts.keys = ValueKeys(parts.set.size(), d.format.last);
   parts.error_levels.resize(coarse_diamonds(parts.set));
   if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
+  auto channels = read_channels(*file, d.grid, parts.set, parallel);
+  if (!channels) return tl::unexpected(channels.error());
+  d.channels = std::move(channels->channels);
+  parts.channel_keys = std::move(channels->keys);
   return ValueVolume(std::move(parts));
 }
 

@@ -41,4 +41,6 @@ class ValueKeys {
   std::vector<std::uint8_t> bytes_;
 };
 
+using ChannelKeys = std::vector<ValueKeys>;  // of a channel (channel.h), by component
+
 }  // namespace intervale

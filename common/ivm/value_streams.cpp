@@ -84,38 +84,41 @@ struct StoredPage {
   std::uint64_t checksum = 0;
 };
 
-Result<std::vector<StoredPage>> stored_pages(const Container& file, std::size_t pages) {
-  const auto index = file.stream(StreamType::page_index, pages * sizeof(PageRecord));
-  if (!index) return tl::unexpected(index.error());
-  auto rest = file[StreamType::pages];
+// Takes so many pages off the front of an index and of the pages.
+Result<std::vector<StoredPage>> take_stored(std::span<const std::byte>& index, std::span<const std::byte>& pages, std::size_t count) {
+  if (index.size() / sizeof(PageRecord) < count) return fail("the index of the pages is damaged");
   std::vector<StoredPage> stored;
-  stored.reserve(pages);
-  for (std::size_t page = 0; page < pages; ++page) {
+  stored.reserve(count);
+  for (std::size_t page = 0; page < count; ++page) {
     PageRecord r;
-    std::memcpy(&r, index->data() + page * sizeof r, sizeof r);
-    if (r.bytes > rest.size()) return fail("the index of the pages is damaged");
-    stored.push_back({rest.first(r.bytes), r.checksum});
-    rest = rest.subspan(r.bytes);
+    std::memcpy(&r, index.data(), sizeof r);
+    index = index.subspan(sizeof r);
+    if (r.bytes > pages.size()) return fail("the index of the pages is damaged");
+    stored.push_back({pages.first(r.bytes), r.checksum});
+    pages = pages.subspan(r.bytes);
   }
-  if (!rest.empty()) return fail("the index of the pages is damaged");
   return stored;
 }
 
 }  // namespace
 
 void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel) {
-  const std::vector<ValuePage> pages = pages_of(values.set);
-  std::vector<std::vector<std::uint8_t>> coded(pages.size());
-  parallel(pages.size(), [&](std::size_t page) { coded[page] = encode_page(values, pages[page]); });
   const FieldRecord field = record_of(values, is_exact);
   append(streams[StreamType::field], std::span(&field, 1));
   if (values.format.table) append<std::uint8_t>(streams[StreamType::value_table], encode_value_table(*values.format.table));
   const auto scales = std::size_t(Domain(values.grid.dims).levels());
   append(streams[StreamType::weights], std::span<const PredictorWeights>(&values.weights.of[0][0], scales * 3));
+  append_pages(values, streams[StreamType::page_index], streams[StreamType::pages], parallel);
+}
+
+void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& to, const ParallelFor& parallel) {
+  const std::vector<ValuePage> pages = pages_of(values.set);
+  std::vector<std::vector<std::uint8_t>> coded(pages.size());
+  parallel(pages.size(), [&](std::size_t page) { coded[page] = encode_page(values, pages[page]); });
   for (auto& page : coded) {
     const PageRecord record{page.size(), XXH3_64bits(page.data(), page.size())};
-    append(streams[StreamType::page_index], std::span(&record, 1));
-    append<std::uint8_t>(streams[StreamType::pages], page);
+    append(index, std::span(&record, 1));
+    append<std::uint8_t>(to, page);
     page = {};
   }
 }
@@ -149,11 +152,18 @@ Result<void> read_weights(const Container& file, int levels, ValueWeights& to) {
   return {};
 }
 
-// Pages of one scale in parallel: they depend on coarser ones only.
 Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel) {
+  auto index = file[StreamType::page_index], pages = file[StreamType::pages];
+  if (auto ok = take_pages(index, pages, to, parallel); !ok) return ok;
+  if (!index.empty() || !pages.empty()) return fail("the index of the pages is damaged");
+  return {};
+}
+
+// Pages of one scale in parallel: they depend on coarser ones only.
+Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& from, const DecodedValues& to, const ParallelFor& parallel) {
   const SupercubeSet& set = to.values.set;
   const std::vector<ValuePage> pages = pages_of(set);
-  const auto stored = stored_pages(file, pages.size());
+  const auto stored = take_stored(index, from, pages.size());
   if (!stored) return tl::unexpected(stored.error());
   const auto scale = [&](std::size_t page) { return scale_of_key(set.bricks()[pages[page].front().first].key); };
   constexpr std::size_t kNone = ~std::size_t(0);

@@ -1,7 +1,10 @@
 // The streams of an .ivm file that hold values: what both scopes share. FORMAT.md is the specification.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "common/ivm/ivm_container.h"
 #include "common/ivm/paged_values.h"
@@ -26,5 +29,11 @@ void append_labels(Streams& streams, const Labels& labels);
 [[nodiscard]] Result<void> read_weights(const Container& file, int levels, ValueWeights& to);
 // Sets keys and error levels. All the rest is known.
 [[nodiscard]] Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel);
+
+// Appends the pages of some values, and their index: for each page its bytes and their XXH3-64, two numbers of 8 bytes.
+void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& pages, const ParallelFor& parallel);
+// The inverse, of bytes from outside: takes them off the front of both.
+[[nodiscard]] Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& pages, const DecodedValues& to,
+                                      const ParallelFor& parallel);
 
 }  // namespace intervale

@@ -28,7 +28,11 @@ std::uint64_t updated_slots(const Domain& domain, int scale, Vertex position) {
 ValueVolume::ValueVolume(Parts parts) : parts_(std::move(parts)), domain_(parts_.description.grid.dims) {}
 
 std::size_t ValueVolume::memory_bytes() const {
-  return description().format.memory_bytes() + parts_.set.memory_bytes() + parts_.keys.memory_bytes() + parts_.error_levels.size();
+  std::size_t bytes = description().format.memory_bytes() + parts_.set.memory_bytes() + parts_.keys.memory_bytes() + parts_.error_levels.size();
+  for (const ChannelKeys& channel : parts_.channel_keys) {
+    for (const ValueKeys& keys : channel) bytes += keys.memory_bytes();
+  }
+  return bytes;
 }
 
 double ValueVolume::error_of_level(double max_error, ErrorLevel level) {

@@ -19,6 +19,7 @@
 #include "common/diamond/supercube.h"
 #include "common/ivm/field_statistics.h"
 #include "common/ivm/value_keys.h"
+#include "common/patch/channel.h"
 #include "common/patch/labels.h"
 #include "common/patch/value_format.h"
 #include "common/util/result.h"
@@ -44,6 +45,7 @@ struct FieldDescription {
   FieldStatistics statistics;
   // Of the file that it was read from: of its contents, where the name and the labels do not count. 0: it was not read.
   std::uint64_t content_hash = 0;
+  std::vector<Channel> channels;
   friend bool operator==(const FieldDescription&, const FieldDescription&) = default;
 };
 
@@ -57,9 +59,10 @@ class ValueVolume {
   struct Parts {
     FieldDescription description;
     ValueWeights weights;
-    SupercubeSet set;                      // all_diamonds()
-    ValueKeys keys;                        // by number
-    std::vector<ErrorLevel> error_levels;  // by number; of all diamonds of scale 1 and coarser, which come first
+    SupercubeSet set;                            // all_diamonds()
+    ValueKeys keys;                              // by number
+    std::vector<ErrorLevel> error_levels;        // by number; of all diamonds of scale 1 and coarser, which come first
+    std::vector<ChannelKeys> channel_keys = {};  // by channel of the description, and component
   };
   explicit ValueVolume(Parts parts);
 

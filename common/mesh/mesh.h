@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -45,6 +46,13 @@ struct DefaultInit : std::allocator<T> {
 template <class T>
 using MeshArray = std::vector<T, DefaultInit<T>>;
 
+// A channel (channel.h) at the points of a mesh; NaN where it is not known.
+struct PointArray {
+  std::string name, unit;   // unit: empty if it is not known
+  unsigned components = 1;  // 1, or 3 of a vector
+  MeshArray<double> value;  // `components` for each point, side by side
+};
+
 // Points in world coordinates, each used by a tetrahedron and given once (once for each range that it is of); tetrahedra as four point indices,
 // positively oriented: (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).
 struct Mesh {
@@ -54,6 +62,7 @@ struct Mesh {
   MeshArray<std::array<std::uint32_t, 4>> tets;
   // Of a mesh of several ranges, which of them each tetrahedron is of: 0, 1, ... (join.h); none for one range.
   MeshArray<std::uint8_t> part = {};
+  std::vector<PointArray> channels = {};  // those that were asked for
 };
 
 // The sum of the volumes of the tetrahedra, in world units cubed; compensated, so that their order changes it by less

@@ -87,7 +87,7 @@ Result<void> check_description(const Description& d) {
   if (std::any_of(d.corners.begin(), d.corners.end(), [&d](ValueKey key) { return key > d.format.last; }))
     return fail("a corner's value is out of range");
   if (!(d.max_error >= 0) || !std::isfinite(d.max_error)) return fail("the largest error is negative or not finite");
-  return {};
+  return check_channels(d.channels);
 }
 
 }  // namespace intervale

@@ -10,6 +10,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
+#include "common/patch/channel.h"
 #include "common/patch/labels.h"
 #include "common/patch/value_format.h"
 #include "common/patch/value_weights.h"
@@ -71,6 +72,7 @@ struct Description {
   FullMesh full;
   // Of the file that it was read from: of its contents, where the name and the labels do not count. 0: it was not read.
   std::uint64_t content_hash = 0;
+  std::vector<Channel> channels;
   // What is shown if nothing else is asked for.
   [[nodiscard]] ShownRange whole() const { return {range, refine}; }
   friend bool operator==(const Description&, const Description&) = default;
@@ -99,7 +101,8 @@ struct Description {
 [[nodiscard]] Result<void> check_grid(const Grid& grid);
 
 // Checks a description from outside: sides within bounds, a box that is finite and not flat, a valid range, a format
-// as check_value_format accepts it with the corners' keys in it, a finite error, labels as check_labels accepts them.
+// as check_value_format accepts it with the corners' keys in it, a finite error, labels as check_labels and channels as check_channels
+// accept them.
 [[nodiscard]] Result<void> check_description(const Description& description);
 
 }  // namespace intervale

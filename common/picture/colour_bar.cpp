@@ -59,8 +59,6 @@ void draw_colour_bar(Pixels& pixels, const Palette& palette, const ValueSpan& sp
   }
 }
 
-std::string title_of(const Labels& labels) {
-  return labels.field + (labels.field.empty() || labels.field_unit.empty() ? "" : ", ") + labels.field_unit;
-}
+std::string title_of(const std::string& name, const std::string& unit) { return name + (name.empty() || unit.empty() ? "" : ", ") + unit; }
 
 }  // namespace intervale

@@ -14,7 +14,7 @@ namespace intervale {
 // middle beside it and the title above, on a light ground. A title that is too long for the picture is shortened.
 void draw_colour_bar(Pixels& pixels, const Palette& palette, const ValueSpan& span, const std::string& title);
 
-// The field's name and the unit of its values, as far as they are known: "density, HU".
-[[nodiscard]] std::string title_of(const Labels& labels);
+// The name of a field or a channel and the unit of its values, as far as they are known: "density, HU".
+[[nodiscard]] std::string title_of(const std::string& name, const std::string& unit);
 
 }  // namespace intervale

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <png.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -45,14 +46,15 @@ Result<void> check_render(const PictureOptions& options) {
   }
   if (options.edges) return misuse("--edges does not go with --render volume");
   if (options.colour_by == ColourBy::surface) return misuse("--color-by surface does not go with --render volume");
+  if (options.colour_by == ColourBy::channel) return misuse("a channel's colours do not go with --render volume");
   return {};
 }
 
 Result<void> check_colours(const PictureOptions& options) {
   const auto& span = options.colour_span;
   if (!is_by_value(options)) {
-    if (options.palette) return misuse("--palette needs --color-by value");
-    if (span) return misuse("--color-span needs --color-by value");
+    if (options.palette) return misuse("--palette needs --color-by value or a channel");
+    if (span) return misuse("--color-span needs --color-by value or a channel");
     return {};
   }
   if (options.palette && !find_palette(*options.palette))
@@ -66,12 +68,50 @@ Result<void> check_colours(const PictureOptions& options) {
 struct Colours {
   Palette palette;
   ValueSpan span;
+  MeshArray<double> of_points;  // of a channel
+  std::string title;
 };
+
+// The numbers that a channel's colours stand for, one for each point: its values, or the lengths of its vectors.
+MeshArray<double> numbers_of(const PointArray& channel) {
+  if (channel.components == 1) return channel.value;
+  MeshArray<double> lengths(channel.value.size() / channel.components);
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const double* const v = &channel.value[i * channel.components];
+    lengths[i] = std::hypot(v[0], v[1], v[2]);
+  }
+  return lengths;
+}
+
+// Of a scalar in the whole data set, of a vector's lengths in the mesh.
+ValueSpan span_of(const Channel& channel, const MeshArray<double>& numbers) {
+  const ValueFormat& format = channel.components.front().format;
+  if (channel.components.size() == 1) return {format.least(), format.greatest()};
+  double longest = 0;
+  for (const double length : numbers) longest = std::max(longest, length);  // of what is not a number: what was before
+  return {0, longest};
+}
+
+Colours colours_of_channel(const PictureOptions& options, const PictureSubject& subject, const Palette& palette) {
+  const auto has_name = [&options](const auto& channel) { return channel.name == options.channel; };
+  const auto& here = subject.mesh.channels;
+  const auto& channels = subject.description.channels;
+  const auto found = std::find_if(here.begin(), here.end(), has_name);
+  const auto channel = std::find_if(channels.begin(), channels.end(), has_name);
+  Colours colours{palette, {}, numbers_of(*found), title_of(channel->name, channel->unit)};
+  colours.span = options.colour_span ? *options.colour_span : span_of(*channel, colours.of_points);
+  return colours;
+}
 
 std::optional<Colours> colours_of(const PictureOptions& options, const PictureSubject& subject) {
   if (!is_by_value(options)) return {};
-  return Colours{*find_palette(options.palette ? *options.palette : kPaletteNames[0]),
-                 options.colour_span ? *options.colour_span : span_of(subject.description, subject.range)};
+  const Palette palette = *find_palette(options.palette ? *options.palette : kPaletteNames[0]);
+  if (options.colour_by == ColourBy::channel) return colours_of_channel(options, subject, palette);
+  const Labels& labels = subject.description.labels;
+  return Colours{palette,
+                 options.colour_span ? *options.colour_span : span_of(subject.description, subject.range),
+                 {},
+                 title_of(labels.field, labels.field_unit)};
 }
 
 Result<Pixels> draw_surfaces(const PictureOptions& options, const Mesh& mesh, const std::optional<Colours>& colours, const Camera& camera,
@@ -82,6 +122,7 @@ Result<Pixels> draw_surfaces(const PictureOptions& options, const Mesh& mesh, co
   if (colours) {
     palette = colours->palette;
     triangles.span = colours->span;
+    triangles.values = colours->of_points.empty() ? std::span<const double>(mesh.value) : colours->of_points;
   }
   auto canvas = Canvas::create(camera.viewport, viewpoint, palette);
   if (!canvas) return tl::unexpected(canvas.error());
@@ -91,7 +132,9 @@ Result<Pixels> draw_surfaces(const PictureOptions& options, const Mesh& mesh, co
 
 }  // namespace
 
-bool is_by_value(const PictureOptions& options) { return options.render == Render::volume || options.colour_by == ColourBy::value; }
+bool is_by_value(const PictureOptions& options) {
+  return options.render == Render::volume || options.colour_by == ColourBy::value || options.colour_by == ColourBy::channel;
+}
 
 Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera) {
   const std::string ending = options.file.extension().string();
@@ -123,7 +166,7 @@ Result<bool> write_picture(const PictureOptions& options, const PictureSubject& 
     pixels = draw_surfaces(options, subject.mesh, colours, seen_from, box);
   }
   if (!pixels) return tl::unexpected(pixels.error());
-  if (colours) draw_colour_bar(*pixels, colours->palette, colours->span, title_of(subject.description.labels));
+  if (colours) draw_colour_bar(*pixels, colours->palette, colours->span, colours->title);
   if (auto written = write_png(options.file, *pixels); !written) return tl::unexpected(written.error());
   return pixels->has_drawing;
 }

@@ -22,7 +22,7 @@
 namespace intervale {
 
 enum class Render : std::uint8_t { surface, volume };
-enum class ColourBy : std::uint8_t { surface, value };
+enum class ColourBy : std::uint8_t { surface, value, channel };
 
 struct PictureOptions {
   std::filesystem::path file;
@@ -31,19 +31,20 @@ struct PictureOptions {
   Render render = Render::surface;
   std::optional<OpacityCurve> opacity;  // of volumes only: of a hundredth of the box's diagonal; or default_opacity()
   std::optional<ColourBy> colour_by;    // or the surface; of volumes the value, and nothing else
-  // By value only:
+  std::string channel;                  // by channel: its name. Vectors have the colours of their lengths
+  // By value or channel only:
   std::optional<std::string> palette;    // a name of kPaletteNames; or the first
-  std::optional<ValueSpan> colour_span;  // what lies beyond has the colours of the palette's ends; or span_of()
+  std::optional<ValueSpan> colour_span;  // what lies beyond has the colours of the palette's ends; or span_of(), or the channel's least and greatest
 };
 
 // Misuse if the options are invalid for every mesh: call this before long work. camera: valid by check_lod; see
 // write_picture.
 [[nodiscard]] Result<void> check_picture(const PictureOptions& options, const std::optional<Camera>& camera);
 
-// Whether colours are those of the field's values.
+// Whether colours are those of values: of the field or of a channel.
 [[nodiscard]] bool is_by_value(const PictureOptions& options);
 
-// What a picture is of. By value, the mesh has values.
+// What a picture is of. By value, the mesh has values; by channel, that channel.
 struct PictureSubject {
   const Mesh& mesh;
   const Description& description;

@@ -16,15 +16,18 @@ PictureOptions& given(std::optional<PictureOptions>& picture) { return picture ?
 
 void add_colour_options(CLI::App& app, CLI::Option* image, std::optional<PictureOptions>& picture) {
   const auto set_colour_by = [&picture](const std::string& what) {
-    given(picture).colour_by = what == "value" ? ColourBy::value : ColourBy::surface;
+    given(picture).colour_by = what == "value" ? ColourBy::value : what == "surface" ? ColourBy::surface : ColourBy::channel;
+    if (picture->colour_by == ColourBy::channel) picture->channel = what;
   };
-  app.add_option_function<std::string>("--color-by", set_colour_by, "Colours: of the surface (default), or of the field's value, with a colour bar")
-      ->check(CLI::IsMember({"surface", "value"}))
+  app.add_option_function<std::string>(
+         "--color-by", set_colour_by,
+         "Colours: of the surface (default); or of the field's value, or of a channel, which comes along, with a colour bar")
+      ->type_name("surface|value|CHANNEL")
       ->group(kGroup)
       ->needs(image);
   app.add_option_function<std::string>(
          "--palette", [&picture](const std::string& name) { given(picture).palette = name; },
-         "With --color-by value or --render volume: " + palette_list() + " (default " + std::string(kPaletteNames[0]) + ")")
+         "With --color-by value or a channel, or --render volume: " + palette_list() + " (default " + std::string(kPaletteNames[0]) + ")")
       ->type_name("NAME")
       ->group(kGroup)
       ->needs(image);
@@ -33,7 +36,7 @@ void add_colour_options(CLI::App& app, CLI::Option* image, std::optional<Picture
          [&picture](const std::array<double, 2>& v) {
            given(picture).colour_span = ValueSpan{v[0], v[1]};
          },
-         "Likewise: the values at the palette's ends (default: the part of the range that the data set has)")
+         "Likewise: the values at the palette's ends (default: the part of the range that the data set has; all values of a channel)")
       ->type_name("LO HI")
       ->group(kGroup)
       ->needs(image);
@@ -82,6 +85,11 @@ void add_picture_options(CLI::App& app, std::optional<PictureOptions>& picture) 
       ->needs(image);
   add_volume_options(app, image, picture);
   add_colour_options(app, image, picture);
+}
+
+std::vector<std::string> with_channel_of(const std::optional<PictureOptions>& picture, std::vector<std::string> channels) {
+  if (picture && picture->colour_by == ColourBy::channel) channels.push_back(picture->channel);
+  return channels;
 }
 
 }  // namespace intervale

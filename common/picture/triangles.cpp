@@ -114,8 +114,8 @@ class Batch {
 // Where the values of points lie within the span; 0 without one.
 class Values {
  public:
-  Values(const Mesh& mesh, const std::optional<ValueSpan>& span) : mesh_(mesh), span_(span) {}
-  [[nodiscard]] double at(std::uint32_t point) const { return span_ ? span_->at(mesh_.value[point]) : 0; }
+  explicit Values(const TriangleOptions& options) : values_(options.values), span_(options.span) {}
+  [[nodiscard]] double at(std::uint32_t point) const { return span_ ? span_->at(values_[point]) : 0; }
   // Between two points.
   [[nodiscard]] double at(const CutEdge& on) const {
     const double kept = at(on.kept);
@@ -123,14 +123,14 @@ class Values {
   }
 
  private:
-  const Mesh& mesh_;
+  std::span<const double> values_;
   const std::optional<ValueSpan>& span_;
 };
 
 void add_boundary(const Mesh& mesh, const TriangleOptions& options, Batch& batch) {
   const std::vector<Triangle> triangles = ordered_boundary(mesh);
   const auto smooth = smooth_normals(mesh, triangles);
-  const Values values(mesh, options.span);
+  const Values values(options);
   const std::vector<double> distances = options.clip ? plane_distances(mesh, *options.clip) : std::vector<double>{};
   for (const Triangle& t : triangles) {
     const Part part = part_of(mesh, t);
@@ -166,7 +166,7 @@ void for_each_triangle(const Mesh& mesh, const TriangleOptions& options, const V
                        const std::function<void(std::span<const Corner>)>& take) {
   Batch batch(viewpoint, take);
   add_boundary(mesh, options, batch);
-  if (options.clip) add_cut(mesh, *options.clip, Values(mesh, options.span), batch);
+  if (options.clip) add_cut(mesh, *options.clip, Values(options), batch);
   batch.flush();
 }
 

@@ -21,13 +21,14 @@ struct Corner {
   std::array<float, 3> position;  // in the scene
   std::array<float, 3> normal;    // outward, of length 1
   std::uint32_t look;             // equal for all three: the Part, and bit 4 << i if the side opposite corner i is drawn as an edge of the mesh
-  float value;                    // where the field's value lies in the options' span (ValueSpan::at); 0 without a span
+  float value;                    // where the value lies in the options' span (ValueSpan::at); 0 without a span
 };
 
 struct TriangleOptions {
-  std::optional<Plane> clip;      // cuts away what lies on its normal's side (plane_cut.h)
-  bool edges = false;             // whether the edges of the boundary are drawn; those of a cut always are
-  std::optional<ValueSpan> span;  // of the values, which the mesh then has
+  std::optional<Plane> clip;            // cuts away what lies on its normal's side (plane_cut.h)
+  bool edges = false;                   // whether the edges of the boundary are drawn; those of a cut always are
+  std::optional<ValueSpan> span;        // of the values, which are then there
+  std::span<const double> values = {};  // one for each point of the mesh
 };
 
 // Calls take() with corners, three a triangle, counterclockwise seen from outside; some ten thousand at a time, valid

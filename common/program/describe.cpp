@@ -1,5 +1,6 @@
 #include "common/program/describe.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +15,23 @@ nlohmann::ordered_json number(double value) {
 }  // namespace
 
 nlohmann::ordered_json to_json(const Range& range) { return nlohmann::ordered_json::array({number(range.alpha), number(range.beta)}); }
+
+nlohmann::ordered_json to_json(std::span<const Channel> channels) {
+  auto list = nlohmann::ordered_json::array();
+  for (const Channel& channel : channels) {
+    auto steps = nlohmann::ordered_json::array();
+    double longest = 0;
+    for (const ChannelComponent& component : channel.components) {
+      steps.push_back(component.is_exact ? 0.0 : component.format.step);
+      longest = std::hypot(longest, std::max(std::abs(component.format.least()), std::abs(component.format.greatest())));
+    }
+    const bool is_scalar = channel.components.size() == 1;
+    const ValueFormat& first = channel.components.front().format;
+    const nlohmann::ordered_json values{{"least", is_scalar ? first.least() : 0.0}, {"greatest", is_scalar ? first.greatest() : longest}};
+    list.push_back({{"name", channel.name}, {"kind", is_scalar ? "scalar" : "vector"}, {"unit", channel.unit}, {"values", values}, {"steps", steps}});
+  }
+  return list;
+}
 
 void add_grid(nlohmann::ordered_json& json, const Grid& grid, const Labels& labels) {
   json["dims"] = grid.dims;
@@ -33,6 +51,7 @@ nlohmann::ordered_json to_json(const Description& description) {
       {"scope", has_one ? "one" : "every"},
   };
   add_grid(json, description.grid, description.labels);
+  json["channels"] = to_json(description.channels);
   json["values"] = {{"least", description.format.least()}, {"greatest", description.format.greatest()}};
   json["step"] = description.is_exact ? 0.0 : description.format.step;
   json["max_error"] = number(description.max_error);

@@ -6,14 +6,12 @@
 
 #include "common/diamond/ancestor_inserter.h"
 #include "common/ivm/batch_encoder.h"
+#include "common/ivm/channel_encoder.h"
 #include "common/ivm/refinement.h"
 
 namespace intervale {
 namespace {
 
-constexpr std::size_t kBrickBytes = 18;         // most bytes that name a brick: a step and a mask
-constexpr std::size_t kSupercubeBytes = 7;      // a mask of slots
-constexpr std::size_t kPlaneBytes = 64;         // the lengths of all byte planes
 constexpr std::size_t kSmallBatch = 8 << 10;    // the end of a band closes a batch of this size or more
 constexpr std::uint32_t kMaxVisited = 1 << 16;  // supercubes and updates visited in one call of next()
 
@@ -31,11 +29,11 @@ struct StreamPlan::BatchBuilder {
   std::uint32_t updates = 0;
   std::uint32_t visited = 0;  // supercubes and updates
 
-  BatchBuilder(const IntervalVolume& volume, SplitSet& sent, std::size_t max_payload)
+  BatchBuilder(const IntervalVolume& volume, SplitSet& sent, std::span<const std::size_t> channels, std::size_t max_payload)
       : inserter(volume.set(), sent),
         around(volume.set()),
         above(kMaxLevels, SetNeighbours(volume.set())),
-        update_bytes(1 + volume.keys().width()),
+        update_bytes(1 + volume.keys().width() + most_channel_bytes(volume, channels)),
         max_bytes(max_payload) {}
   // How much longer `count` updates of a supercube make the payload; and the most that it can be.
   [[nodiscard]] std::size_t bytes_of(const SlotGroup& added, std::size_t count) const {
@@ -56,7 +54,8 @@ struct StreamPlan::BatchBuilder {
   }
 };
 
-StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume) : volume_(std::move(volume)), sent_(volume_->size()) {
+StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume)
+    : volume_(std::move(volume)), sent_(volume_->size()), channels_(volume_->channel_keys().size()) {
   set_relevant({volume_, &volume_->relevant()});
 }
 
@@ -123,6 +122,11 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const UpdateIndex i = here.index(slot);
     sent_.erase(i);
     --sent_count_;
+    for (SentChannel& channel : channels_) {
+      if (channel.count == 0 || !channel.held.contains(i)) continue;
+      channel.held.erase(i);
+      --channel.count;
+    }
     if ((relevant_->slots(here.supercube, here.occupancy) >> slot & 1) == 0) return;
     Pending& pending = pending_[here.brick];
     ++pending.unsent;
@@ -338,7 +342,8 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
 }
 
 std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
-  BatchBuilder builder(*volume_, sent_, max_bytes);
+  if (lacks_values()) return next_values(max_bytes);
+  BatchBuilder builder(*volume_, sent_, wanted_channels_, max_bytes);
   while (!done()) {
     if (next_brick_ == 0) {
       if (builder.bytes >= kSmallBatch) break;
@@ -355,7 +360,9 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   if (builder.updates == 0) return {};
   std::vector<SlotGroup>& groups = builder.groups;
   std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
-  return Batch{encode_batch(*volume_, relevant_->shown(), sent_, groups), builder.updates};
+  Batch batch{encode_batch(*volume_, relevant_->shown(), sent_, groups), builder.updates, {}};
+  if (!wanted_channels_.empty()) batch.channels = send_values(groups, {});
+  return batch;
 }
 
 }  // namespace intervale

@@ -26,8 +26,9 @@ namespace intervale {
 
 // A batch of updates, parents before children.
 struct Batch {
-  std::vector<std::uint8_t> payload;  // see common/codec/batch.h
+  std::vector<std::uint8_t> payload;  // see common/codec/batch.h; empty if there are no updates
   std::uint32_t updates = 0;
+  std::vector<std::uint8_t> channels;  // their values (common/codec/channel_batch.h); empty if there are none
 };
 
 // Payload of a view's first batch: small, so that there is a mesh to draw soon. Each further batch may be twice as
@@ -35,7 +36,8 @@ struct Batch {
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: ten bytes for each
-// brick, and where something was sent a bit for each update (two with max_updates) and a byte for each supercube.
+// brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and a byte
+// for each supercube.
 class StreamPlan {
  public:
   // At first everything that the range of the data set needs is relevant.
@@ -58,13 +60,20 @@ class StreamPlan {
   // of this volume. Before the set_lod() of the same view. O(supercubes).
   void set_relevant(std::shared_ptr<const RelevantUpdates> relevant);
 
+  // Replaces the channels that are wanted, by number, ascending: their values go with all updates from now on, and
+  // before those to the updates that were sent already. O(1) if those have them.
+  void set_channels(std::span<const std::size_t> numbers);
+  // Like resume(): the client has the values of a channel at these updates, which it has, too. channel: a number of the
+  // data set's.
+  bool resume(std::size_t channel, SupercubeKey key, std::uint64_t slots);
+
   // Replaces the level of detail; check_lod(lod) must hold. O(bricks); with max_updates O(updates).
   void set_lod(const Lod& lod);
 
   // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call: done()
-  // tells which. max_bytes, at least 256, bounds the payload before compression, which takes about half of it.
+  // tells which. max_bytes, at least 256, bounds the payload with its channels before compression, which takes about half of it.
   std::optional<Batch> next(std::size_t max_bytes);
-  [[nodiscard]] bool done() const { return pending_bricks_ == 0 || is_full(); }
+  [[nodiscard]] bool done() const { return !lacks_values() && (pending_bricks_ == 0 || is_full()); }
   // More is wanted than the client may hold.
   [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }
 
@@ -78,6 +87,18 @@ class StreamPlan {
   [[nodiscard]] Remaining remaining() const;
 
  private:
+  // A channel, and the updates that the client has its values of.
+  struct SentChannel {
+    SplitSet held;
+    std::uint64_t count = 0;
+  };
+  static constexpr std::size_t kBrickBytes = 18;     // most bytes that name a brick: a step and a mask
+  static constexpr std::size_t kSupercubeBytes = 7;  // a mask of slots
+  static constexpr std::size_t kPlaneBytes = 64;     // the lengths of all byte planes
+  // Some updates were sent without a value that is wanted now.
+  [[nodiscard]] bool lacks_values() const;
+  std::optional<Batch> next_values(std::size_t max_bytes);
+  [[nodiscard]] std::vector<std::uint8_t> send_values(std::span<const SlotGroup> groups, std::vector<std::uint8_t> names);
   using Rank = Ranking::Rank;
   struct BatchBuilder;
   // A non-negative float in 16 bits, rounded up by at most 1 %.
@@ -121,6 +142,9 @@ class StreamPlan {
   static constexpr std::uint32_t kStepsPage = 64;
   std::vector<std::uint32_t> steps_page_;
   std::vector<std::uint8_t> steps_;
+  std::vector<SentChannel> channels_;         // of the data set
+  std::vector<std::size_t> wanted_channels_;  // ascending
+  std::uint32_t next_lacking_ = 0;            // bricks before this one lack no value that is wanted
   std::optional<Ranking> ranking_;
   std::optional<SplitSet> budget_;  // with max_updates: the updates within the budget
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);

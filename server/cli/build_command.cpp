@@ -3,17 +3,21 @@
 #include <oneapi/tbb/info.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/value_file.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
+#include "common/util/printable.h"
 #include "server/builder/all_cores.h"
+#include "server/builder/channel_builder.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/value_builder.h"
@@ -34,8 +38,16 @@ struct BuildCommand {
   std::vector<std::int64_t> dims;
   std::vector<double> spacing, origin, affine;
   std::optional<std::string> unit, field, field_unit;
+  std::vector<std::string> channels, channel_steps;  // NAME=FILE, NAME=S
   bool big_endian = false, json = false;
   std::uint64_t skip = 0;
+};
+
+// A channel to be built.
+struct ChannelInput {
+  std::string name;
+  std::filesystem::path file;
+  std::optional<double> step;
 };
 
 Result<Affine> parse_affine(const BuildCommand& options) {
@@ -84,6 +96,64 @@ Result<void> set_labels(const BuildCommand& options, Labels& labels) {
   return set("--field-unit", options.field_unit, labels.field_unit);
 }
 
+// The two sides of NAME=VALUE.
+Result<std::pair<std::string, std::string>> parse_pair(const char* option, const std::string& text) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+    return misuse(fmt::format("{} '{}' is not NAME=...", option, printable(text)));
+  return std::pair(text.substr(0, equals), text.substr(equals + 1));
+}
+
+Result<std::vector<ChannelInput>> parse_channels(const BuildCommand& options) {
+  std::vector<ChannelInput> channels;
+  const auto find = [&channels](const std::string& name) {
+    return std::find_if(channels.begin(), channels.end(), [&name](const ChannelInput& channel) { return channel.name == name; });
+  };
+  for (const std::string& text : options.channels) {
+    const auto pair = parse_pair("--channel", text);
+    if (!pair) return tl::unexpected(pair.error());
+    if (!is_channel_name(pair->first))
+      return misuse(fmt::format("--channel needs a name of at most {} bytes of UTF-8, other than surface, value and range", kMaxLabel));
+    if (find(pair->first) != channels.end()) return misuse("two channels are named '" + pair->first + "'");
+    channels.push_back({pair->first, pair->second, {}});
+  }
+  if (channels.size() > kMaxChannels) return misuse(fmt::format("at most {} channels", kMaxChannels));
+  for (const std::string& text : options.channel_steps) {
+    const auto pair = parse_pair("--channel-step", text);
+    if (!pair) return tl::unexpected(pair.error());
+    const auto channel = find(pair->first);
+    if (channel == channels.end()) return misuse("--channel-step: no channel is named '" + printable(pair->first) + "'");
+    double step = 0;
+    const char* const end = pair->second.data() + pair->second.size();
+    if (const auto [at, error] = std::from_chars(pair->second.data(), end, step); error != std::errc() || at != end)
+      return misuse("--channel-step: '" + printable(pair->second) + "' is not a number");
+    channel->step = step;
+  }
+  return channels;
+}
+
+std::string text_of_dims(const Grid& grid) { return fmt::format("{} x {} x {}", grid.dims[0], grid.dims[1], grid.dims[2]); }
+
+// The channels of a data set of this grid and set: one after the other, so that the samples of one are in memory.
+Result<std::pair<std::vector<Channel>, std::vector<ChannelKeys>>> build_channels(const std::vector<ChannelInput>& inputs, const BuildCommand& options,
+                                                                                 const Grid& grid, const SupercubeSet& set) {
+  std::pair<std::vector<Channel>, std::vector<ChannelKeys>> built;
+  for (const ChannelInput& input : inputs) {
+    Progress progress("channel " + printable(input.name));
+    auto volume = read_volume(input.file, {});
+    if (!volume) return tl::unexpected(volume.error());
+    if (volume->grid.dims != grid.dims)
+      return fail(
+          fmt::format("channel '{}' has {} samples, the field has {}", printable(input.name), text_of_dims(volume->grid), text_of_dims(grid)));
+    if (auto finite = check_finite(*volume, options.nan); !finite) return tl::unexpected(finite.error());
+    auto channel = build_channel(*volume, input.name, input.step, set);
+    if (!channel) return tl::unexpected(Error{"channel '" + printable(input.name) + "': " + channel.error().message, channel.error().usage});
+    built.first.push_back(std::move(channel->channel));
+    built.second.push_back(std::move(channel->keys));
+  }
+  return built;
+}
+
 // Protects the input, and files of other kinds, from being overwritten by mistake.
 Result<void> check_output(const std::filesystem::path& input, const std::filesystem::path& output) {
   std::error_code none;
@@ -102,7 +172,8 @@ std::string text_of_values(const Volume& volume) {
 }
 
 // Of one range: frees the samples once they are not needed any more.
-Result<nlohmann::ordered_json> build_range(const BuildCommand& options, Volume& volume, const Range& range, std::string& text) {
+Result<nlohmann::ordered_json> build_range(const BuildCommand& options, const std::vector<ChannelInput>& inputs, Volume& volume, const Range& range,
+                                           std::string& text) {
   const std::string values = text_of_values(volume);
   const auto format = choose_value_format(volume, options.step);
   if (!format) return tl::unexpected(format.error());
@@ -117,6 +188,9 @@ Result<nlohmann::ordered_json> build_range(const BuildCommand& options, Volume& 
   }
   if (!made) return tl::unexpected(made.error());
   volume.bytes = std::vector<std::byte>();  // the compression runs on several threads
+  auto channels = build_channels(inputs, options, volume.grid, made->set());
+  if (!channels) return tl::unexpected(channels.error());
+  if (auto set = made->set_channels(std::move(channels->first), std::move(channels->second)); !set) return tl::unexpected(set.error());
   if (auto saved = save_ivm(options.output, *made, on_all_cores); !saved) return tl::unexpected(saved.error());
   if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
     fmt::print(stderr, "intervale: warning: no part of the volume lies in the range; its values are {}\n", values);
@@ -126,14 +200,19 @@ Result<nlohmann::ordered_json> build_range(const BuildCommand& options, Volume& 
 }
 
 // Of every range.
-Result<nlohmann::ordered_json> build_values(const BuildCommand& options, Volume& volume, std::string& text) {
+Result<nlohmann::ordered_json> build_values(const BuildCommand& options, const std::vector<ChannelInput>& inputs, Volume& volume, std::string& text) {
   if (volume.grid.sample_count() > kMostSamples)
     return misuse("the volume has more than 2^31 - 1 samples, too many for every range: give --range LO HI");
   const auto format = choose_value_format(volume, options.step);
   if (!format) return tl::unexpected(format.error());
   Progress progress("building " + volume.name);
-  const ValueVolume made = build_value_volume(volume, *format, [&](double done) { progress.fraction(done); });
+  ValueVolume::Parts parts = build_value_volume(volume, *format, [&](double done) { progress.fraction(done); }).take();
   volume.bytes = std::vector<std::byte>();
+  auto channels = build_channels(inputs, options, volume.grid, parts.set);
+  if (!channels) return tl::unexpected(channels.error());
+  parts.description.channels = std::move(channels->first);
+  parts.channel_keys = std::move(channels->second);
+  const ValueVolume made(std::move(parts));
   if (auto saved = save_values(options.output, made, on_all_cores); !saved) return tl::unexpected(saved.error());
   text = text_of(made, options.output);
   return stats_of(made, options.output);
@@ -146,6 +225,8 @@ Result<void> run(const BuildCommand& options) {
   if (!*range && options.refine != "boundary") return misuse("--refine belongs to a range: give --range too, or --refine to extract");
   const auto layout = parse_layout(options);
   if (!layout) return tl::unexpected(layout.error());
+  const auto channels = parse_channels(options);
+  if (!channels) return tl::unexpected(channels.error());
   Labels labels;
   if (auto valid = set_labels(options, labels); !valid) return valid;
   // Before the long computation, not after it.
@@ -153,9 +234,13 @@ Result<void> run(const BuildCommand& options) {
   if (!std::filesystem::is_directory(folder))
     return fail("cannot write '" + options.output + "': the folder '" + folder.string() + "' does not exist");
   if (auto output = check_output(options.input, options.output); !output) return output;
+  for (const ChannelInput& channel : *channels) {
+    if (auto output = check_output(channel.file, options.output); !output) return output;
+  }
 
   auto volume = read_volume(options.input, *layout);
   if (!volume) return tl::unexpected(volume.error());
+  if (volume->components != 1) return misuse("'" + options.input + "' has vectors: a field has one number a sample; vectors are read by --channel");
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
   if (auto set = set_labels(options, volume->labels); !set) return set;
   volume->name = std::filesystem::path(options.output).stem().string();
@@ -163,7 +248,7 @@ Result<void> run(const BuildCommand& options) {
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   std::string text;
-  auto stats = *range ? build_range(options, *volume, **range, text) : build_values(options, *volume, text);
+  auto stats = *range ? build_range(options, *channels, *volume, **range, text) : build_values(options, *channels, *volume, text);
   if (!stats) return tl::unexpected(stats.error());
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (options.json) {
@@ -189,6 +274,15 @@ void add_build_command(Program& program) {
                   "Distance of the values that floats are rounded to, so that each is off by S/2 at most; 0: exact. Default: exact if 65536 "
                   "steps are enough, else a power of two: 2048 to 4096 steps from the least to the greatest value")
       ->type_name("S");
+  command
+      .add_option("--channel", o->channels, "Another field on the same grid, a scalar or a vector of 3, that meshes can bring along; may be repeated")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->type_name("NAME=FILE");
+  command.add_option("--channel-step", o->channel_steps, "Like --step, of a channel; may be repeated")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->type_name("NAME=S");
   command.add_option("--refine", o->refine, "What to refine: boundary: the surfaces of the range only; uniform: the inside too")
       ->check(CLI::IsMember({"boundary", "uniform"}))
       ->capture_default_str();

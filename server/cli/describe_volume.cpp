@@ -53,6 +53,19 @@ std::string place_of(const Grid& grid, const Labels& labels) {
   return text;
 }
 
+std::string text_of(const std::vector<Channel>& channels) {
+  std::string text;
+  for (const Channel& channel : channels) {
+    text += fmt::format("channel {}: {}{}{}", printable(channel.name), channel.components.size() == 1 ? "scalar" : "vector",
+                        channel.unit.empty() ? "" : ", in ", channel.unit);
+    for (const ChannelComponent& c : channel.components)
+      text +=
+          fmt::format(", {:g} to {:g}{}", c.format.least(), c.format.greatest(), c.is_exact ? "" : fmt::format(" in steps of {:g}", c.format.step));
+    text += "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 nlohmann::ordered_json stats_of(const IntervalVolume& volume, const std::filesystem::path& file) {
@@ -71,6 +84,7 @@ std::string text_of(const IntervalVolume& volume, const std::filesystem::path& f
   std::string text = fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined: {}\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
                                  d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
   text += place_of(d.grid, d.labels);
+  text += text_of(d.channels);
   text += fmt::format("{} updates, {} coefficients, {} supercubes, largest error {:g}\n", d.updates, d.coefficients, volume.set().supercubes(),
                       d.max_error);
   text += fmt::format("full mesh: {} vertices, {} tetrahedra, {} as an indexed mesh\n", d.full.vertices, d.full.tets,
@@ -83,6 +97,7 @@ nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem
   const FieldDescription& d = volume.description();
   nlohmann::ordered_json stats{{"name", d.name}, {"scope", "every"}};
   add_grid(stats, d.grid, d.labels);
+  stats["channels"] = to_json(d.channels);
   stats.update({
       {"type", name_of(d.format.type)},
       {"values", {{"least", d.format.least()}, {"greatest", d.format.greatest()}}},
@@ -107,6 +122,7 @@ std::string text_of(const ValueVolume& volume, const std::filesystem::path& file
   text += fmt::format(
       "values {:g} to {:g}, {}\n", d.format.least(), d.format.greatest(),
       d.is_exact ? std::string("exact") : fmt::format("rounded to multiples of {:g}: off by {:g} at most", d.format.step, d.format.step / 2));
+  text += text_of(d.channels);
   text += fmt::format("{} updates, {} supercubes, largest error {:g}\n", volume.set().size(), volume.set().supercubes(), d.max_error);
   text += fmt::format("in memory {} ({:.2f} bytes a sample), in the file {} ({:.2f} times smaller than the samples)\n",
                       human_bytes(volume.memory_bytes()), double(volume.memory_bytes()) / double(d.grid.sample_count()), human_bytes(file_bytes),

@@ -16,6 +16,7 @@
 #include "common/mesh/join.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
+#include "common/program/channel_option.h"
 #include "common/program/lod_options.h"
 #include "common/program/mesh_figures.h"
 #include "common/program/progress.h"
@@ -34,6 +35,7 @@ struct ExtractCommand {
   std::optional<PictureOptions> picture;
   std::vector<std::string> range;
   std::optional<std::string> refine;
+  std::vector<std::string> channels;
   Lod lod;
   unsigned threads = 0;
   bool digest = false;
@@ -62,6 +64,9 @@ struct Extracted {
 };
 
 Result<Extracted> extract_ranges(const ExtractCommand& options, const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown) {
+  const auto numbers = find_channels(volume->description().channels, with_channel_of(options.picture, options.channels));
+  if (!numbers) return tl::unexpected(numbers.error());
+  const std::vector<MeshChannel> channels = channels_of(*volume, *numbers);
   const auto relevant = find_relevant_updates(volume, shown, options.lod.camera ? Distances::measured : Distances::none);
   Progress progress("extracting " + volume->description().name);
   const ParallelFor parallel = with_progress(progress, on_all_cores);
@@ -71,7 +76,7 @@ Result<Extracted> extract_ranges(const ExtractCommand& options, const std::share
   std::vector<Mesh> meshes;
   meshes.reserve(fronts->size());
   for (const Extraction& one : *fronts) {
-    meshes.push_back(one.front.mesh(parallel));
+    meshes.push_back(one.front.mesh(parallel, channels));
     all.updates += one.updates;
     if (shown.size() > 1) all.each.push_back(figures_of(meshes.back(), one.updates, options.digest, one.front.range()));
   }
@@ -140,6 +145,7 @@ void add_extract_command(Program& program) {
       ->type_name("MESH");
   add_ranges_option(command, options->range, kShownRangeHelp);
   add_refine_option(command, options->refine, kShownRefineHelp);
+  add_channel_option(command, options->channels);
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);
   command.add_option("--threads", options->threads, "Number of threads; 0: one for each core")->capture_default_str();

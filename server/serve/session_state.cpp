@@ -49,8 +49,11 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
   if (!opened() || view_ != ViewState::none) return Fault{CloseCode::out_of_order, "Have is allowed between Open and the first View only"};
   if (!resumed_) return {};
+  if (have.channel && *have.channel >= volume_->description().channels.size())
+    return Fault{CloseCode::malformed, "Have names a channel that the data set does not contain"};
   for (const SlotGroup& g : have.splits) {
-    if (!plan_->resume(g.key, g.slots)) return Fault{CloseCode::malformed, "Have names updates that the data set does not contain"};
+    if (have.channel ? !plan_->resume(*have.channel, g.key, g.slots) : !plan_->resume(g.key, g.slots))
+      return Fault{CloseCode::malformed, "Have names updates that the data set does not contain"};
   }
   return {};
 }
@@ -61,8 +64,11 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
     return Fault{CloseCode::out_of_order, "the epoch of a View must be greater than the last one"};
   ShownRanges shown = distinct(resolve(volume_->description(), view.shown));
   if (auto held = check_held(volume_->description(), shown); !held) return Fault{CloseCode::no_such_range, held.error().message};
+  const auto channels = find_channels(volume_->description().channels, view.channels);
+  if (!channels) return Fault{CloseCode::no_such_range, channels.error().message.substr(0, protocol::kMaxText)};
   if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
   plan_->set_room(view.room.value_or(UINT64_MAX));
+  plan_->set_channels(*channels);
   epoch_ = view.epoch;
   lod_ = view.lod;
   if (shown_ != shown || !lod_.camera) measurement_.reset();
@@ -142,7 +148,14 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   view_ = ViewState::streaming;
   target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
   const StreamPlan::Remaining remaining = plan_->remaining();
-  protocol::Batch message{epoch_, sequence_++, batch->updates, remaining.error, remaining.pixels, remaining.updates, std::move(batch->payload)};
+  protocol::Batch message{epoch_,
+                          sequence_++,
+                          batch->updates,
+                          remaining.error,
+                          remaining.pixels,
+                          remaining.updates,
+                          std::move(batch->payload),
+                          std::move(batch->channels)};
   credit_ -= protocol::cost_of(message);  // does not underflow: the payload is at most `size`
   return message;
 }

@@ -161,12 +161,13 @@ double usable(double value, double otherwise) { return std::isfinite(value) && v
 
 // `space directions` if there are any, or else `spacings`, along the axes. The axes of the world are the header's own:
 // `space` is not looked at.
-Result<Affine> affine_of(const Nrrd& nrrd, const std::string& name) {
+// first_axis: the first one in space.
+Result<Affine> affine_of(const Nrrd& nrrd, unsigned first_axis, const std::string& name) {
   Vec3 spacing, origin;
   std::array<Vec3, 3> directions;
   int found = 0;
   for (unsigned axis = 0; axis < 3; ++axis) {
-    const auto& info = nrrd.axis[axis];
+    const auto& info = nrrd.axis[first_axis + axis];
     found += nrrd.spaceDim > 0 && !std::isnan(info.spaceDirection[0]) ? 1 : 0;
     for (unsigned k = 0; k < 3; ++k) directions[axis][k] = info.spaceDirection[k];
     spacing[axis] = usable(info.spacing, 1);
@@ -179,17 +180,27 @@ Result<Affine> affine_of(const Nrrd& nrrd, const std::string& name) {
   return Affine::of_columns(directions, origin);
 }
 
+// Whether the first of four axes has the components of a vector.
+bool has_vectors(const Nrrd& nrrd) {
+  const auto& first = nrrd.axis[0];
+  const bool is_in_space = first.kind == nrrdKindDomain || first.kind == nrrdKindSpace || first.kind == nrrdKindTime || first.kind == nrrdKindPoint;
+  return nrrd.dim == 4 && first.size == 3 && !is_in_space;
+}
+
 Result<NrrdHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std::string& name) {
   NrrdHeader header;
   for (const int field : {nrrdField_type, nrrdField_dimension, nrrdField_sizes, nrrdField_encoding})
     if (!state.seen[field]) return fail(name + ": the NRRD header has no '" + airEnumStr(nrrdField, field) + "' line");
-  if (nrrd.dim != 3) return fail(name + " has " + std::to_string(nrrd.dim) + (nrrd.dim == 1 ? " axis" : " axes") + "; a volume has 3");
+  header.components = has_vectors(nrrd) ? 3 : 1;
+  const unsigned first_axis = header.components == 1 ? 0 : 1;
+  if (nrrd.dim != 3 + first_axis) return fail(name + " has " + std::to_string(nrrd.dim) + (nrrd.dim == 1 ? " axis" : " axes") + "; a volume has 3");
   std::array<std::int64_t, 3> dims{};
   for (unsigned axis = 0; axis < 3; ++axis) {
-    if (nrrd.axis[axis].kind >= nrrdKindList)
-      return fail(name + ": axis " + std::to_string(axis + 1) + " holds the parts of a '" + airEnumStr(nrrdKind, nrrd.axis[axis].kind) +
+    const auto& info = nrrd.axis[first_axis + axis];
+    if (info.kind >= nrrdKindList)
+      return fail(name + ": axis " + std::to_string(first_axis + axis + 1) + " holds the parts of a '" + airEnumStr(nrrdKind, info.kind) +
                   "'; a volume has 3 axes in space and one number a sample");
-    dims[axis] = static_cast<std::int64_t>(std::min<std::uint64_t>(nrrd.axis[axis].size, INT64_MAX));
+    dims[axis] = static_cast<std::int64_t>(std::min<std::uint64_t>(info.size, INT64_MAX));
   }
   const auto type = sample_type(nrrd.type, name);
   if (!type) return tl::unexpected<Error>(type.error());
@@ -200,10 +211,12 @@ Result<NrrdHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std:
   header.big_endian = state.encoding->endianMatters && state.endian == airEndianBig;
   header.line_skip = state.lineSkip;
   header.byte_skip = state.byteSkip;
-  const auto affine = affine_of(nrrd, name);
+  const auto affine = affine_of(nrrd, first_axis, name);
   if (!affine) return tl::unexpected<Error>(affine.error());
   const auto grid = make_grid(dims, *affine, name);
   if (!grid) return tl::unexpected<Error>(grid.error());
+  constexpr std::uint64_t kMostNumbers = std::uint64_t(1) << 60;  // so that their bytes have a number
+  if (grid->sample_count() > kMostNumbers / header.components) return fail(name + " has too many samples");
   header.grid = *grid;
   return header;
 }

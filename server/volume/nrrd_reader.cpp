@@ -95,7 +95,7 @@ bool parse_sample(std::string_view text, std::byte* sample) {
 }
 
 Result<void> read_text_data(const InputFile& file, std::uint64_t offset, const NrrdHeader& header, std::vector<std::byte>& out) {
-  const std::uint64_t samples = header.grid.sample_count(), left = file.size() - offset;
+  const std::uint64_t samples = header.grid.sample_count() * header.components, left = file.size() - offset;
   if (header.byte_skip < 0) return fail(in_quotes(file.path()) + ": a negative 'byte skip' makes no sense with text");
   const auto skipped = static_cast<std::uint64_t>(header.byte_skip);
   if (left < skipped || (left - skipped) / 2 + 1 < samples)
@@ -127,7 +127,7 @@ Result<Volume> read_nrrd(const std::filesystem::path& path) {
   const auto header = read_nrrd_header(*header_file);
   if (!header) return tl::unexpected<Error>(header.error());
 
-  Volume volume{path.stem().string(), header->grid, header->type, {}, header->labels};
+  Volume volume{path.stem().string(), header->grid, header->type, {}, header->labels, header->components};
   const auto data = !header->data_file ? InputFile::open(path) : detached_path(path, *header->data_file).and_then(InputFile::open);
   if (!data) return tl::unexpected<Error>(data.error());
   const auto start = skip_lines(*data, header->data_file ? 0 : header->data_offset, header->line_skip);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <span>
 #include <string>
 
@@ -33,8 +34,8 @@ Result<void> check_floats(std::span<Float> samples, std::optional<double> replac
   }
   const auto first = std::find_if(samples.begin(), samples.end(), bad);
   if (first == samples.end()) return {};
-  return fail(std::string("sample ") + position_of(static_cast<std::size_t>(first - samples.begin()), volume.grid) + " of '" + volume.name + "' is " +
-              (std::isnan(*first) ? "NaN" : "infinite") + "; give such samples a value with --nan VALUE");
+  return fail(std::string("sample ") + position_of(static_cast<std::size_t>(first - samples.begin()) / volume.components, volume.grid) + " of '" +
+              volume.name + "' is " + (std::isnan(*first) ? "NaN" : "infinite") + "; give such samples a value with --nan VALUE");
 }
 
 }  // namespace
@@ -46,6 +47,20 @@ Result<Volume> read_volume(const std::filesystem::path& path, const std::optiona
   }
   if (!layout) return misuse(in_quotes(path) + " is not .nrrd or .nhdr: say what its raw samples are with --dims X Y Z and --type TYPE");
   return read_raw(path, *layout);
+}
+
+Volume component_of(const Volume& volume, unsigned component) {
+  Volume one{volume.name, volume.grid, volume.type, {}, volume.labels};
+  if (volume.components == 1) {
+    one.bytes = volume.bytes;
+    return one;
+  }
+  const std::size_t width = size_of(volume.type), samples = volume.grid.sample_count();
+  one.bytes.resize(samples * width);
+  for (std::size_t i = 0; i < samples; ++i) {
+    std::memcpy(&one.bytes[i * width], &volume.bytes[(i * volume.components + component) * width], width);
+  }
+  return one;
 }
 
 Result<void> check_finite(Volume& volume, std::optional<double> replacement) {

@@ -15,13 +15,15 @@
 
 namespace intervale {
 
-// Samples in the machine's byte order, x fastest, then y, then z; bytes.size() = grid.sample_count() * size_of(type).
+// Samples in the machine's byte order, x fastest, then y, then z; bytes.size() = grid.sample_count() * components *
+// size_of(type).
 struct Volume {
   std::string name;  // the file's name without folders and extension
   Grid grid;
   SampleType type = SampleType::u8;
   std::vector<std::byte> bytes;
   Labels labels{};
+  unsigned components = 1;  // numbers a sample, side by side: 1, or 3 of a vector
 };
 
 // Calls visitor with the samples as a std::span<const T> of the volume's own type T, and returns what it returns.

@@ -295,7 +295,7 @@ TEST(Pictures, WhatCannotBeDrawnIsOneLine) {
   complaint("", "none/x.png", 1, "does not exist");
   complaint("--eye 0 0 99 --look-at 0 0 0 --viewport 65535 65535", "x.png", 2, "smaller viewport");
   complaint("--eye 0 0 99 --look-at 0 0 0 --viewport 65535 64", "x.png", 2, "each way");
-  complaint("--color-by density", "x.png", 2, "surface,value");
+  complaint("--color-by density", "x.png", 2, "no channel 'density'");
   complaint("--color-by value --palette jet", "x.png", 2, "viridis, cividis, inferno, ice or grey");
   complaint("--palette ice", "x.png", 2, "--color-by value");
   complaint("--render cloud", "x.png", 2, "surface,volume");

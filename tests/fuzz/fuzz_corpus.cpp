@@ -4,12 +4,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <string>
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/refinement.h"
 #include "common/ivm/value_file.h"
-
+#include "common/selection/stream_plan.h"
 #include "protocol/codec.h"
 #include "tests/fuzz/small_volumes.h"
 #include "tests/support/batches.h"
@@ -48,6 +49,23 @@ void add_batches(const Corpus& corpus) {
   }
 }
 
+// What a client of all updates, and one of some, gets when it switches both channels on.
+void add_channels(const Corpus& corpus) {
+  const auto volume = std::make_shared<const IntervalVolume>(testing::small_volumes()[1]);
+  for (const bool all : {false, true}) {
+    StreamPlan plan(volume);
+    Lod lod;
+    lod.error = all ? 0 : volume->description().max_error / 2;
+    plan.set_lod(lod);
+    while (plan.next(1 << 16)) {
+    }
+    const std::vector<std::size_t> both{0, 1};
+    plan.set_channels(both);
+    const auto batch = plan.next(1 << 16);
+    if (batch) corpus.add("channel_batch", all ? "all" : "some", {7}, batch->channels);
+  }
+}
+
 void add_nrrds(const Corpus& corpus) {
   const std::string sizes = "dimension: 3\nsizes: 2 3 4\n", samples(24, 'x');
   corpus.add("nrrd", "raw", "NRRD0004\n# made\ntype: uchar\n" + sizes + "encoding: raw\n\n", samples);
@@ -57,6 +75,8 @@ void add_nrrds(const Corpus& corpus) {
              "space units: \"mm\" \"mm\" \"mm\"\nsample units: HU\ncontent: head\nbyte skip: -1\n" +
                  sizes + "encoding: raw\n\n",
              "head" + samples);
+  corpus.add("nrrd", "vectors", "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 2 2 2\nkinds: vector domain domain domain\nencoding: raw\n\n",
+             samples);
   corpus.add("nrrd", "text", "NRRD0002\ntype: float\n" + sizes + "line skip: 1\nencoding: ascii\n\nskipped\n",
              "1 2 3 4 5 6 7 8 9 10 11 12 1e3 -2 0.5 4 5 6 7 8 9 10 11 12\n");
   corpus.add("nrrd", "detached", "NRRD0004\ntype: uchar\n" + sizes + "encoding: raw\ndata file: elsewhere.raw\n", "");
@@ -81,6 +101,8 @@ void add_messages(const Corpus& corpus) {
   corpus.add("protocol", "view-all", {0}, encode(ClientMessage(View{1, {}})));
   corpus.add("protocol", "view-forget", {0},
              encode(ClientMessage(View{9, {}, 1000, {{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));
+  corpus.add("protocol", "view-channels", {0}, encode(ClientMessage(View{10, {}, {}, {}, {}, true, {"noise", "place"}})));
+  corpus.add("protocol", "have-channel", {0}, encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}}, 1})));
   corpus.add("protocol", "have", {0},
              encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));
   corpus.add("protocol", "credit", {0}, encode(ClientMessage(Credit{65536})));
@@ -90,6 +112,7 @@ void add_messages(const Corpus& corpus) {
   const auto queue = in_order(v, select(v, {}), {});
   const auto payload = testing::batch_of(v, std::span(queue).first(30));
   corpus.add("protocol", "batch", {1}, encode(ServerMessage(protocol::Batch{1, 2, 30, 0.5, 2.5, 400, payload})));
+  corpus.add("protocol", "batch-channels", {1}, encode(ServerMessage(protocol::Batch{1, 2, 0, 0.5, 2.5, 400, {}, payload})));
   corpus.add("protocol", "done", {1}, encode(ServerMessage(Done{1, 22})));
   corpus.add("protocol", "fault", {1}, encode(ServerMessage(Fault{CloseCode::too_large, "too large"})));
 }
@@ -145,6 +168,7 @@ int main(int argc, char** argv) {
     corpus.add("value_file", "volume" + std::to_string(i), "", encode_values(testing::small_value_volumes()[i]));
   }
   add_batches(corpus);
+  add_channels(corpus);
   add_nrrds(corpus);
   add_messages(corpus);
   add_requests(corpus);

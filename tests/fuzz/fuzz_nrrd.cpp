@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (volume.error().message.empty()) std::abort();
     return 0;
   }
-  if (volume->bytes.size() != volume->grid.sample_count() * intervale::size_of(volume->type)) std::abort();
+  if (volume->bytes.size() != volume->grid.sample_count() * volume->components * intervale::size_of(volume->type)) std::abort();
   for (std::int32_t side : volume->grid.dims) {
     if (side < intervale::kMinSide || side > intervale::kMaxSide) std::abort();
   }

@@ -1,6 +1,7 @@
 // The volumes that fuzz targets and their seeds are made from.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
@@ -8,6 +9,7 @@
 #include "server/builder/value_builder.h"
 #include "server/builder/value_steps.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/channels.h"
 
 namespace intervale::testing {
 
@@ -21,6 +23,7 @@ inline const std::vector<IntervalVolume>& small_volumes() {
     for (std::size_t i = 0; i < dims.size(); ++i) {
       const Volume volume = i == 0 ? gyroid(dims[i]) : digits(dims[i], unsigned(i));
       made.push_back(FieldHierarchy(volume, {.range = ranges[i]}).compact().value());
+      if (i == 1) set_channels(made.back(), 1);
     }
     return made;
   }();
@@ -34,7 +37,13 @@ inline const std::vector<ValueVolume>& small_value_volumes() {
     for (const std::array<std::int32_t, 3>& dims : {std::array{5, 5, 5}, std::array{4, 7, 6}, std::array{2, 6, 3}}) {
       Volume volume = dims[0] == 5 ? gyroid(dims) : digits(dims, unsigned(dims[0]));
       const ValueFormat format = choose_value_format(volume, {}).value();
-      made.push_back(build_value_volume(volume, format));
+      ValueVolume::Parts parts = build_value_volume(volume, format).take();
+      if (dims[0] == 2) {
+        auto channel = build_channel(places(dims), "place", {}, parts.set).value();
+        parts.description.channels.push_back(std::move(channel.channel));
+        parts.channel_keys.push_back(std::move(channel.keys));
+      }
+      made.emplace_back(std::move(parts));
     }
     return made;
   }();

@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <random>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "client/core/client_session.h"
 #include "common/ivm/every_range.h"
@@ -16,6 +19,7 @@
 #include "server/builder/find_relevant_updates.h"
 #include "server/builder/value_builder.h"
 #include "tests/support/cameras.h"
+#include "tests/support/channels.h"
 #include "tests/support/mesh_laws.h"
 #include "tests/support/session_server.h"
 #include "tests/support/value_fields.h"
@@ -27,12 +31,14 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
  public:
   static constexpr std::array<std::array<std::int32_t, 3>, 4> kBoxes{{{17, 17, 17}, {9, 7, 5}, {17, 12, 13}, {6, 21, 4}}};
 
-  // Of every range, or refined uniformly.
+  // Of every range, or refined uniformly; with channels.
   [[nodiscard]] std::shared_ptr<const IntervalVolume> make_volume() {
     Volume samples = field.volume;
     samples.name = "made";
-    if (GetParam() % 3 != 0) return std::make_shared<const IntervalVolume>(*of_every_range(build_value_volume(samples, field.format).take()));
-    return std::make_shared<const IntervalVolume>(*FieldHierarchy(samples, {testing::random_range(field, random), Refine::uniform}).compact());
+    auto made = GetParam() % 3 != 0 ? of_every_range(build_value_volume(samples, field.format).take())
+                                    : FieldHierarchy(samples, {testing::random_range(field, random), Refine::uniform}).compact();
+    testing::set_channels(*made, {{"noise", channels[0]}, {"place", channels[1]}});
+    return std::make_shared<const IntervalVolume>(std::move(*made));
   }
 
   // Within the data set's, one to four of them.
@@ -53,6 +59,9 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
     ViewRequest view;
     view.shown = random_request();
     view.early = random() % 2 == 0;
+    for (const char* const name : {"place", "noise"}) {
+      if (random() % 3 == 0) view.channels.emplace_back(name);
+    }
     if (random() % 2 == 0) view.lod.error_percent = double(random() % 40);
     if (random() % 3 == 0) view.lod.max_updates = random() % (volume->size() + 10);
     if (random() % 3 == 0) {
@@ -60,6 +69,17 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
       view.lod.camera->pixel_error = double(1 + random() % 64);
     }
     return view;
+  }
+
+  // Whether the client has a channel's values at all updates, or no value that is wrong.
+  void expect_channels(const ClientSession& session, const std::vector<std::string>& complete) const {
+    const StreamClient& client = *session.mesh();
+    for (std::size_t i = 0; i < channels.size(); ++i) {
+      const ChannelValues& held = client.channels()[i];
+      ASSERT_EQ(testing::wrong_value(held, channels[i], client.front()), "");
+      if (std::find(complete.begin(), complete.end(), held.channel().name) == complete.end()) continue;
+      EXPECT_EQ(held.groups(), client.front().splits()) << held.channel().name;
+    }
   }
 
   // The mesh of each range is that of a fresh client that asks for this range alone. At an error above 0 it is if the
@@ -78,6 +98,7 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
   }
 
   void expect_valid(const ClientSession& session) {
+    expect_channels(session, {});
     for (const Front& front : session.mesh()->fronts()) {
       ASSERT_EQ(front.validate().value_or(""), "");
       if (random() % 4 != 0) continue;  // this is slow
@@ -87,6 +108,7 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
 
   testing::ValueField field = testing::random_value_field(kBoxes[GetParam() % 4], GetParam());
   std::mt19937 random{GetParam()};
+  std::array<Volume, 2> channels{testing::noise(field.volume.grid.dims, 1, 300, GetParam()), testing::places(field.volume.grid.dims)};
   std::shared_ptr<const IntervalVolume> volume = make_volume();
 };
 
@@ -109,10 +131,12 @@ TEST_P(RangeStream, EndsWithTheMeshOfAFreshClient) {
     server.run();
     ViewRequest whole;
     whole.shown = random_request();
+    whole.channels = random_view().channels;
     ASSERT_TRUE(session.look(whole));
     server.run();
     EXPECT_EQ(session.state(), ClientSession::State::idle);
     expect_each(session, whole);
+    expect_channels(session, whole.channels);
     EXPECT_EQ(session.mesh()->updates(), session.stats().updates) << "an update was sent twice";
     session.disconnected();
   }
@@ -133,6 +157,7 @@ TEST_P(RangeStream, KeepsItsBudgetsAndForgets) {
     server.run(1 + int(random() % 4));
     expect_valid(session);
     server.run();
+    expect_channels(session, view.channels);
     EXPECT_LE(session.mesh()->updates(), room);
     std::uint64_t roots = 0;  // no budget makes meshes smaller than the patches of the root
     for (const ShownRange& shown : resolve(volume->description(), view.shown)) roots += root_front(volume->description(), shown).tet_count();
@@ -142,9 +167,37 @@ TEST_P(RangeStream, KeepsItsBudgetsAndForgets) {
   }
   ViewRequest whole;
   whole.shown = random_request();
+  whole.channels = {"noise"};
   ASSERT_TRUE(session.look(whole));
   server.run();
   expect_each(session, whole);
+  expect_channels(session, whole.channels);
+}
+
+// Switched on, off and on again, one by one and together: what is here already is not sent again.
+TEST_P(RangeStream, AChannelComesForUpdatesThatAreHereAlready) {
+  ClientSession session({.dataset = "made", .client = "test"});
+  ViewRequest view;
+  view.shown = random_request();
+  session.look(view);
+  testing::SessionServer server(volume, session);
+  server.run();
+  const std::uint64_t updates = session.mesh()->updates();
+  for (const std::vector<std::string>& names : std::vector<std::vector<std::string>>{{"place"}, {"noise", "place"}, {}, {"noise"}}) {
+    view.channels = names;
+    ASSERT_TRUE(session.look(view));
+    const std::uint64_t messages = session.stats().messages;
+    server.run();
+    expect_channels(session, names);
+    EXPECT_EQ(session.stats().updates, updates);
+    for (const Mesh& mesh : session.mesh()->meshes()) EXPECT_EQ(mesh.channels.size(), names.size());
+    const bool has_all = names.empty() || names == std::vector<std::string>{"noise"};
+    EXPECT_TRUE(!has_all || session.stats().messages == messages + 1) << "something but Done";
+  }
+  view.channels = {"nothing"};
+  const auto refused = session.look(view);
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().usage);
 }
 
 // At any error, and with a budget and a camera the meshes of extract().

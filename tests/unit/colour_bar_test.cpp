@@ -84,10 +84,10 @@ TEST(ColourBar, OfATinyPictureIsCutOff) {
 }
 
 TEST(ColourBar, HasTheFieldAndItsUnitAsTitle) {
-  EXPECT_EQ(title_of({}), "");
-  EXPECT_EQ(title_of({"mm", "density", "HU"}), "density, HU");
-  EXPECT_EQ(title_of({"mm", "density", ""}), "density");
-  EXPECT_EQ(title_of({"mm", "", "HU"}), "HU");
+  EXPECT_EQ(title_of("", ""), "");
+  EXPECT_EQ(title_of("density", "HU"), "density, HU");
+  EXPECT_EQ(title_of("density", ""), "density");
+  EXPECT_EQ(title_of("", "HU"), "HU");
 }
 
 TEST(Text, IsCountedAndShortenedByCharacters) {

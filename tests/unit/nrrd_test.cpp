@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/volume/nrrd.h"
+#include "server/volume/read_volume.h"
 #include "tests/support/affines.h"
 #include "tests/support/temp_dir.h"
 
@@ -172,7 +173,9 @@ TEST(Nrrd, RefusesWhatIsNoVolumeOfNumbers) {
   const TempDir folder;
   const auto read = [&](const std::string& text) { return read_nrrd(folder.file("v.nrrd", text + "\n" + std::string(4096, 'x'))); };
   expect_refused(read("NRRD0004\ntype: uint8\ndimension: 2\nsizes: 4 4\nencoding: raw\n"), "2 axes; a volume has 3");
-  expect_refused(read("NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 4 4 4\nencoding: raw\n"), "4 axes");
+  expect_refused(read("NRRD0004\ntype: uint8\ndimension: 4\nsizes: 2 4 4 4\nencoding: raw\n"), "4 axes");
+  expect_refused(read("NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 4 4 4\nkinds: time domain domain domain\nencoding: raw\n"), "4 axes");
+  expect_refused(read("NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 4 4 4\nkinds: vector list domain domain\nencoding: raw\n"), "'list'");
   expect_refused(read("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 3 4 4\nkinds: RGB-color domain domain\nencoding: raw\n"), "RGB-color");
   expect_refused(read("NRRD0004\ntype: int64\ndimension: 3\nsizes: 3 4 4\nendian: little\nencoding: raw\n"), "64-bit");
   expect_refused(read("NRRD0004\ntype: block\nblock size: 3\ndimension: 3\nsizes: 3 4 4\nencoding: raw\n"), "block");
@@ -187,6 +190,25 @@ TEST(Nrrd, RefusesWhatIsNoVolumeOfNumbers) {
   expect_refused(read("NRRD0004\nspacing: 1 1 1\ntype: uint8\ndimension: 3\nsizes: 2 4 4\nencoding: raw\n"), "spacing");
   expect_refused(read("P5\n4 4\n255\n"), "not an NRRD file");
   expect_refused(read_nrrd(folder.file("v.nrrd", "")), "v.nrrd");
+}
+
+TEST(Nrrd, ReadsVectors) {
+  const TempDir folder;
+  const std::string start = "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 2 2 2\n", raw = "encoding: raw\n\n" + kSamples;
+  const std::string directions = "space dimension: 3\nspace directions: none (2,0,0) (0,3,0) (0,0,4)\nspace origin: (5,6,7)\n";
+  for (const std::string& lines :
+       {std::string(), std::string("kinds: 3-vector space space space\n"), directions, std::string("spacings: nan 2 3 4\n")}) {
+    const auto volume = read_nrrd(folder.file("v.nrrd", start + lines + raw));
+    ASSERT_TRUE(volume) << volume.error().message;
+    EXPECT_EQ(volume->components, 3u);
+    EXPECT_EQ(volume->grid.dims, (std::array<std::int32_t, 3>{2, 2, 2}));
+    EXPECT_EQ(volume->grid.affine.spacing(), (lines.find('2') == std::string::npos ? Vec3{1, 1, 1} : Vec3{2, 3, 4}));
+    EXPECT_EQ(bytes_of(*volume), kSamples);
+    EXPECT_EQ(bytes_of(component_of(*volume, 1)), "behknqtw");
+  }
+  expect_refused(read_nrrd(folder.file("v.nrrd", start + "encoding: raw\n\n" + kSamples.substr(1))), "cut short");
+  const std::string huge = "NRRD0004\ntype: double\ndimension: 4\nsizes: 3 1048576 1048576 1048576\nendian: little\n";
+  expect_refused(read_nrrd(folder.file("v.nrrd", huge + "encoding: raw\n\n" + kSamples)), "too many samples");
 }
 
 TEST(Nrrd, ReadsDetachedDataBesideOrBelow) {

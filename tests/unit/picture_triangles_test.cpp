@@ -160,7 +160,8 @@ TEST(PictureTriangles, HaveTheFieldsValues) {
   const Plane through_middle{{kMiddle, kMiddle, kMiddle}, {0.3, 0.5, -0.8}};
   const ValueSpan span{90, 94};  // alpha is 91, beta 95
   int cut = 0, whole = 0;
-  for (const Face& face : faces_of(shell(9, 5), {.clip = through_middle, .span = span})) {
+  const Mesh mesh = shell(9, 5);
+  for (const Face& face : faces_of(mesh, {.clip = through_middle, .span = span, .values = mesh.value})) {
     for (std::size_t i = 0; i < 3; ++i) {
       const double value = 90 + 4 * double(face.values[i]), distance = length(minus(face.corners[i], {kMiddle, kMiddle, kMiddle}));
       if (face.part != Part::cut) {

@@ -49,6 +49,18 @@ Description described_by_table() {
   return d;
 }
 
+Description with_channels() {
+  Description d = some_description();
+  const auto component = [&](SampleType type, double step, std::int64_t first, ValueKey last) {
+    ChannelComponent c{{type, step, first, last}, last % 2 == 0, {}, d.weights};
+    c.corners.fill(last / 3);
+    return c;
+  };
+  d.channels = {{"temperature", "K", {component(SampleType::f32, 0.5, -7, 1000)}},
+                {"velocity", "", std::vector(3, component(SampleType::i16, 1, -32768, 65535))}};
+  return d;
+}
+
 std::vector<ClientMessage> client_messages() {
   return {Open{"buckyball", "test 1", 262144},
           View{1, {}},
@@ -59,19 +71,26 @@ std::vector<ClientMessage> client_messages() {
           View{4, {}, {}, {}, {{{2, 2}}, Refine::uniform}},
           View{7, {}, {}, {}, {{{2, 2}, {0, 1}, {2, 2}, {-1, 5}}, Refine::boundary}},
           View{6, {}, {}, {}, {{}, Refine::boundary}},
+          View{8, {}, {}, {}, {}, true, {"temperature", "velocity"}},
           View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}},
           Credit{65536},
           Open{"buckyball", "test 1", 0, 0xfedcba9876543210u},
           Open{.dataset = "buckyball", .payload = 0},
           Open{.dataset = "buckyball", .payload = 0xffffffff},
           Have{},
+          Have{{{{}, {}, supercube_key(5, {1, 2, 3}), 1}}, 15},
           Have{{{{}, {}, supercube_key(5, {1, 2, 3}), 1}, {{}, {}, supercube_key(0, {4, 0, 9}), (std::uint64_t(1) << kSlots) - 1}}}};
 }
 
 std::vector<ServerMessage> server_messages() {
-  return {
-      Opened{some_description(), {}},          Opened{described_by_table(), {}}, Batch{1, 2, 3, 4.5, 5.5, 6, {7, 8, 9}}, Batch{}, Done{1, 22, true},
-      Fault{CloseCode::too_large, "too large"}};
+  return {Opened{some_description(), {}},
+          Opened{described_by_table(), {}},
+          Opened{with_channels(), {}},
+          Batch{1, 2, 3, 4.5, 5.5, 6, {7, 8, 9}},
+          Batch{},
+          Batch{1, 2, 0, 4.5, 5.5, 6, {}, {7, 8, 9}},
+          Done{1, 22, true},
+          Fault{CloseCode::too_large, "too large"}};
 }
 
 Result<ClientMessage> decode(const ClientMessage&, std::span<const std::uint8_t> bytes) { return decode_client_message(bytes); }

@@ -60,6 +60,22 @@ void write_array(MeshOutput& out, const std::string& attributes, std::uint64_t c
   out.text("</DataArray>\n");
 }
 
+// A text as the value of an attribute.
+std::string escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '"')
+      out += "&quot;";
+    else
+      out += c;
+  }
+  return out;
+}
+
 // The file up to its cells; point_at(i) is the index in mesh.points of the file's point i.
 template <class PointAt>
 void write_head(MeshOutput& out, const std::string& kind, const std::string& cell_counts, const Mesh& mesh, std::uint64_t points, PointAt point_at) {
@@ -68,6 +84,11 @@ void write_head(MeshOutput& out, const std::string& kind, const std::string& cel
            ">\n<Piece NumberOfPoints=\"" + std::to_string(points) + "\" " + cell_counts + ">\n<PointData Scalars=\"surface\">\n");
   write_array(out, R"(type="UInt8" Name="surface")", points, [&](std::uint64_t i) { return mesh.surface[point_at(i)]; });
   if (!mesh.value.empty()) write_array(out, R"(type="Float64" Name="value")", points, [&](std::uint64_t i) { return mesh.value[point_at(i)]; });
+  for (const PointArray& channel : mesh.channels) {
+    const unsigned n = channel.components;
+    const std::string attributes = "type=\"Float64\" Name=\"" + escaped(channel.name) + "\" NumberOfComponents=\"" + std::to_string(n) + "\"";
+    write_array(out, attributes, points * n, [&](std::uint64_t i) { return channel.value[point_at(i / n) * n + i % n]; });
+  }
   out.text("</PointData>\n<Points>\n");
   write_array(out, R"(type="Float64" Name="Points" NumberOfComponents="3")", points, [&](std::uint64_t i) { return mesh.points[point_at(i)]; });
   out.text("</Points>\n");

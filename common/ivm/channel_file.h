@@ -1,0 +1,28 @@
+// The channels of an .ivm file: two streams that a reader may skip. FORMAT.md is the specification.
+#pragma once
+
+#include <vector>
+
+#include "common/diamond/grid.h"
+#include "common/diamond/supercube.h"
+#include "common/ivm/ivm_container.h"
+#include "common/ivm/value_keys.h"
+#include "common/patch/channel.h"
+#include "common/util/parallel.h"
+#include "common/util/result.h"
+
+namespace intervale {
+
+// Appends channels, if there are any. grid, set: of the data set; keys: by channel, component and number in the set. The
+// same bytes whatever `parallel` is.
+void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set, const std::vector<Channel>& channels,
+                     const std::vector<ChannelKeys>& keys, const ParallelFor& parallel);
+
+struct StoredChannels {
+  std::vector<Channel> channels;
+  std::vector<ChannelKeys> keys;
+};
+// The inverse, of bytes from outside; none if the file has none.
+[[nodiscard]] Result<StoredChannels> read_channels(const Container& file, const Grid& grid, const SupercubeSet& set, const ParallelFor& parallel);
+
+}  // namespace intervale
