@@ -14,11 +14,12 @@ void DrawnRange::use_coarse(const StreamClient& client, int levels, const ShownR
   coarse_->front.set_range(shown.range, shown.refine);
 }
 
-BoundarySurface::Change DrawnRange::update(bool all, bool wants_values) {
+BoundarySurface::Change DrawnRange::update(bool all, const std::optional<WantedValues>& wanted) {
   const bool is_other = std::exchange(coarse_is_drawn_, coarse_.has_value()) != coarse_.has_value();
   BoundarySurface& surface = changing();
   BoundarySurface::Change change = all || is_other ? surface.all() : surface.update();
-  values_ = wants_values ? point_values(surface) : std::vector<float>();
+  values_.clear();
+  if (wanted) values_ = wanted->channel == nullptr ? point_values(surface) : point_values(surface, *wanted->channel);
   return change;
 }
 

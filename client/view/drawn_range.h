@@ -24,13 +24,17 @@ class DrawnRange {
   void use_exact() { coarse_.reset(); }
   void use_coarse(const StreamClient& client, int levels, const ShownRange& shown);
 
-  // What changed since the last update, or everything. wants_values: whether values() are made.
-  [[nodiscard]] BoundarySurface::Change update(bool all, bool wants_values);
+  // Which values() an update makes: the field's, or those of a channel of the client, if it is not null.
+  struct WantedValues {
+    const ChannelValues* channel = nullptr;
+  };
+  // What changed since the last update, or everything.
+  [[nodiscard]] BoundarySurface::Change update(bool all, const std::optional<WantedValues>& wanted);
   // As of the last update; see BoundarySurface.
   [[nodiscard]] SurfacePiece piece(std::uint32_t id, bool edges) { return changing().piece(id, edges); }
   [[nodiscard]] double volume_bound() { return changing().volume_bound(); }
   [[nodiscard]] const BoundarySurface& surface() const { return coarse_ ? coarse_->surface : exact_; }
-  [[nodiscard]] const std::vector<float>& values() const { return values_; }  // of the field, by PointId; empty: not wanted
+  [[nodiscard]] const std::vector<float>& values() const { return values_; }  // by PointId; empty: not wanted
 
  private:
   [[nodiscard]] BoundarySurface& changing() { return coarse_ ? coarse_->surface : exact_; }

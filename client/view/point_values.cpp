@@ -1,6 +1,8 @@
 #include "client/view/point_values.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 
 #include "common/util/bits.h"
@@ -27,6 +29,34 @@ std::vector<float> point_values(const BoundarySurface& surface) {
   if (front.origin.side(Slot()) == Side::inside) place_centre(front.origin, Slot());
   for (const FrontState::Block& block : front.blocks) {
     for (const Slot slot : set_bits<Slot>(block.shown & block.inside)) place_centre(block, slot);
+  }
+  return values;
+}
+
+std::vector<float> point_values(const BoundarySurface& surface, const ChannelValues& channel) {
+  const FrontMesher& mesher = surface.mesher();
+  const MeshChannel source = channel.for_mesh();
+  const double least = channel.channel().components.front().format.least();
+  std::array<double, kMaxComponents> at_centre{}, at_vertex{};
+  std::vector<float> values(mesher.state().points);
+  std::vector<FrontMesher::Point> points;
+  std::vector<FrontMesher::Ends> ends;
+  for (std::size_t number = 0; number < mesher.state().blocks.size(); ++number) {
+    if (mesher.block(number).shown == 0) continue;
+    points.clear();
+    ends.clear();
+    mesher.append_points(number, points, {}, &ends);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double share = double(ends[i].at) / FrontMesher::kSteps;
+      source.values_at(ends[i].centre, std::span(at_centre).first(source.components));
+      if (share != 0) source.values_at(ends[i].vertex, std::span(at_vertex).first(source.components));
+      double value = 0;
+      for (std::size_t c = 0; c < source.components; ++c) {
+        const double here = share == 0 ? at_centre[c] : at_centre[c] * (1 - share) + at_vertex[c] * share;
+        value = source.components == 1 ? here : std::hypot(value, here);
+      }
+      values[points[i].id] = std::isnan(value) ? rounded(least) : rounded(value);
+    }
   }
   return values;
 }

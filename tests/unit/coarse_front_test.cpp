@@ -59,12 +59,12 @@ TEST_P(CoarseFrontOf, AnotherRangeShowsWhatTheFineMeshHasOfTheseLevels) {
 
 TEST_P(CoarseFrontOf, IsDrawnInPlaceOfTheMeshUntilThatIsAskedFor) {
   DrawnRange drawn(client_.front());
-  (void)drawn.update(false, false);
+  (void)drawn.update(false, {});
   const std::uint64_t exact = drawn.surface().triangles();
   const ShownRange within{{client_.front().range().alpha + 0.1, client_.front().range().beta}, Refine::boundary};
   for (const int levels : {6, 3}) {
     drawn.use_coarse(client_, levels, within);
-    EXPECT_TRUE(drawn.update(false, true).reset);
+    EXPECT_TRUE(drawn.update(false, DrawnRange::WantedValues{}).reset);
     Front coarse = coarse_front(client_, levels);
     coarse.set_range(within.range, within.refine);
     BoundarySurface surface(coarse);
@@ -73,10 +73,10 @@ TEST_P(CoarseFrontOf, IsDrawnInPlaceOfTheMeshUntilThatIsAskedFor) {
     EXPECT_EQ(drawn.values(), point_values(surface));
   }
   drawn.use_exact();
-  EXPECT_TRUE(drawn.update(false, false).reset);
+  EXPECT_TRUE(drawn.update(false, {}).reset);
   EXPECT_EQ(drawn.surface().triangles(), exact);
   EXPECT_TRUE(drawn.values().empty());
-  const BoundarySurface::Change none = drawn.update(false, false);
+  const BoundarySurface::Change none = drawn.update(false, {});
   EXPECT_TRUE(!none.reset && none.pieces.empty() && none.removed.empty());
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "client/view/cross_section.h"
 #include "client/view/tets_in_box.h"
 #include "common/selection/stream_plan.h"
+#include "tests/support/channels.h"
 #include "tests/support/interval_volumes.h"
 
 namespace intervale {
@@ -63,6 +65,34 @@ TEST(PointValues, AreTheFieldsOnSurfacesInCutsAndAtTetrahedra) {
   }
   EXPECT_GT(client->tet_count(), 1000u);
   EXPECT_TRUE(cross_section(surface, {{0.6, 0.64, 0.48}, 20}).values.empty());
+}
+
+// Lengths of vectors, which are the samples' places; and where the client has none, the least value.
+TEST(PointValues, AreThoseOfAChannel) {
+  IntervalVolume made = testing::build(testing::digits({13, 9, 10}, 5), {.range = {3, 5.5}});
+  testing::set_channels(made, 5);
+  const auto volume = std::make_shared<const IntervalVolume>(std::move(made));
+  StreamPlan plan(volume);
+  auto client = StreamClient::start(volume->description());
+  ASSERT_TRUE(client);
+  const std::vector<std::size_t> place{1};
+  plan.set_channels(place);
+  plan.set_lod({});
+  while (const auto batch = plan.next(4096)) ASSERT_TRUE(client->apply(batch->payload, 0, {}, {batch->channels, place}));
+  BoundarySurface surface(client->front());
+  (void)surface.update();
+  const std::vector<float> lengths = point_values(surface, client->channels()[1]), unknown = point_values(surface, client->channels()[0]);
+  const double least = volume->description().channels[0].components[0].format.least();
+  std::size_t points = 0;
+  for (const std::uint32_t id : surface.all().pieces) {
+    const SurfacePiece piece = surface.piece(id, false);
+    for (std::size_t i = 0; i < piece.points.size(); ++i) {
+      const SurfaceVertex& v = piece.vertices[i];
+      ASSERT_NEAR(lengths[piece.points[i]], std::hypot(v.x, v.y, v.z), 1e-4);
+      if (surface.surface(piece.points[i]) == Surface::inside) points += unknown[piece.points[i]] == float(least);
+    }
+  }
+  EXPECT_GT(points, 100u);
 }
 
 // Those of the mesh itself, whatever is shown of it.

@@ -11,21 +11,25 @@ const kSpacing = 0.5;
 const kRegion = '-30,-30,-30,90,90,90'; // everything, with its handles beyond the window
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
 let last = seed;
-const samples = Uint16Array.from({ length: kSide ** 3 }, () => {
+const noise = (count) => Uint16Array.from({ length: count }, () => {
   last = (last * 1103515245 + 12345) % 2147483648;
   return last >> 15;
 });
-const valueAt = (i, j, k) => samples[i + kSide * (j + kSide * k)];
+const samples = noise(kSide ** 3);
+const heat = noise(kSide ** 3); // a channel
+const valueAt = (i, j, k, of = samples) => of[i + kSide * (j + kSide * k)];
 
 let server;
 let browser;
 before(async () => {
   console.log(`seed ${seed} (INTERVALE_SEED)`);
   const folder = makeData();
-  const header = `NRRD0004\ntype: uint16\ndimension: 3\nsizes: ${kSide} ${kSide} ${kSide}\nspacings: ${kSpacing} ${kSpacing} ${kSpacing}\nendian: little\nencoding: raw\n\n`;
-  writeFileSync(join(folder, 'digits.nrrd'), Buffer.concat([Buffer.from(header), Buffer.from(samples.buffer)]));
+  const header = `NRRD0004\ntype: uint16\ndimension: 3\nsizes: ${kSide} ${kSide} ${kSide}\nspacings: ${kSpacing} ${kSpacing} ${kSpacing}\nendian: little\n`;
+  const write = (name, lines, values) => writeFileSync(join(folder, name), Buffer.concat([Buffer.from(`${header}${lines}encoding: raw\n\n`), Buffer.from(values.buffer)]));
+  write('digits.nrrd', '', samples);
+  write('heat.nrrd', 'sample units: K\n', heat);
   const whole = ['--range', '-inf', 'inf', '--refine', 'uniform']; // every sample is a vertex of the mesh
-  program('intervale', 'build', join(folder, 'digits.nrrd'), '-o', join(folder, 'digits.ivm'), ...whole, '--unit', 'mm', '--field', 'density', '--field-unit', 'HU');
+  program('intervale', 'build', join(folder, 'digits.nrrd'), '-o', join(folder, 'digits.ivm'), ...whole, '--channel', `heat=${join(folder, 'heat.nrrd')}`, '--unit', 'mm', '--field', 'density', '--field-unit', 'HU');
   server = await serve(folder);
   browser = await launch();
 });
@@ -64,6 +68,11 @@ test('at a sample the probe tells its value exactly, on the side of the box and 
   const [i, j, k] = [5, 4, 2];
   const cut = { normal: [0, -1, 0], offset: -j * kSpacing };
   assert.deepEqual(await toldAt(page, i, j, k, cut), [`density = ${valueAt(i, j, k)} HU`, `${i * kSpacing}, ${j * kSpacing}, ${k * kSpacing} mm`]);
+  await page.evaluate(() => window.intervale.set({ colorBy: 'value', channel: 'heat' }));
+  await page.waitForFunction(() => document.querySelector('#legend-title').textContent === 'heat, K');
+  await settled(page);
+  const [value] = await toldAt(page, i, j, k, cut);
+  assert.equal(value, `heat = ${valueAt(i, j, k, heat)} K`);
   assert.deepEqual(errors, []);
   await close();
 });

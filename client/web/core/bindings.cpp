@@ -95,6 +95,7 @@ class Viewer {
                      .viewport = {camera["viewport"][0].as<int>(), camera["viewport"][1].as<int>()},
                      .pixel_error = view["pixelError"].as<double>()};
     wanted.shown.ranges = ranges_of(view["ranges"]);
+    if (const val channel = view["channel"]; !channel.isNull()) wanted.channels = {channel.as<std::string>()};
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
     stale_ = true;  // a budget hides and shows at once
@@ -196,15 +197,19 @@ class Viewer {
   }
 
   // Whether pieces, caps and tetrahedra have `values`, from the next update_surface() on: the field's at each vertex, as
-  // floats in its units; otherwise null. Pieces that have not changed since then come with update_surface() of all.
-  void want_values(bool wanted) { wants_values_ = wanted; }
+  // floats in its units, or those of the channel of this name (of vectors the lengths), if it is not empty; otherwise
+  // null. Pieces that have not changed since then come with update_surface() of all.
+  void want_values(bool wanted, const std::string& channel) {
+    wants_values_ = wanted;
+    channel_ = channel;
+  }
 
   // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything.
   val update_surface(bool edges, bool all) {
     stale_ = false;
     val pieces = val::array(), removed = val::array(), reset = val::array();
     for (std::size_t i = 0; i < drawn_.size(); ++i) {
-      const BoundarySurface::Change change = drawn_[i].update(all, wants_values_);
+      const BoundarySurface::Change change = drawn_[i].update(all, wanted_values());
       if (change.reset) reset.call<void>("push", double(i));
       for (const std::uint32_t id : change.removed) removed.call<void>("push", piece_id(i, id));
       for (const std::uint32_t id : change.pieces) pieces.call<void>("push", piece(i, id, edges));
@@ -289,6 +294,13 @@ class Viewer {
     return std::any_of(drawn_.begin(), drawn_.end(), [](const DrawnRange& range) { return !range.values().empty(); });
   }
 
+  [[nodiscard]] std::optional<DrawnRange::WantedValues> wanted_values() const {
+    if (!wants_values_) return {};
+    const std::vector<ChannelValues>& channels = session_.mesh()->channels();
+    const auto found = std::find_if(channels.begin(), channels.end(), [this](const ChannelValues& one) { return one.channel().name == channel_; });
+    return DrawnRange::WantedValues{found == channels.end() ? nullptr : &*found};
+  }
+
   // Of a piece of the i-th range.
   static double piece_id(std::size_t i, std::uint32_t id) { return double(std::uint64_t(id) * kMaxRanges + i); }
   val piece(std::size_t i, std::uint32_t id, bool edges) {
@@ -313,7 +325,8 @@ class Viewer {
   std::vector<std::uint8_t> inbox_;
   ClientSession::Event event_;  // of the last message
   bool wants_values_ = false;
-  bool stale_ = true;  // the mesh may have changed since the last surface
+  std::string channel_;  // whose values are wanted; empty: the field's
+  bool stale_ = true;    // the mesh may have changed since the last surface
   bool is_previewing_ = false;
 };
 

@@ -19,7 +19,8 @@ export interface Viewer {
   updates(): number;
   done(): boolean;
   progress(): Omit<Progress, 'surfaceVersion' | 'memory' | 'busy'>;
-  wantValues(wanted: boolean): void; // whether pieces, caps and tetrahedra have values, from the next updateSurface() on; if so, that must be of all
+  // Whether pieces, caps and tetrahedra have values, the field's or a channel's, from the next updateSurface() on; if so, that must be of all.
+  wantValues(wanted: boolean, channel: string): void;
   updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version' | 'hasValues'>; // all: every piece, changed or not
   isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap() and tets() must not be called
   cap(plane: Plane): Pick<Cap, 'vertices' | 'values' | 'triangles'>;

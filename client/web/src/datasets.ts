@@ -11,12 +11,20 @@ export interface Dataset {
   fieldUnit: string; // of the values
   range: [number, number]; // closed, field units; may be infinite
   values: [number, number]; // the least and the greatest of the field
+  channels: ChannelInfo[];
   hasEveryRange: boolean; // range is then from -Infinity to Infinity
   hasRangesWithin: boolean; // any range within `range` can be shown
   maxError: number; // of the coarsest mesh, field units
   updates: number; // of the full mesh
   fullTets: number;
   fullBytes: number; // of the full mesh as indexed arrays
+}
+
+// Another field that a data set has.
+export interface ChannelInfo {
+  name: string;
+  unit: string; // empty if not known
+  values: [number, number]; // the least and the greatest; of vectors, of their lengths
 }
 
 // Of a field, to choose a range by.
@@ -88,6 +96,12 @@ const text = (x: unknown): string => (typeof x === 'string' ? x : '');
 const kIdentity: Affine = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 const affine = (x: unknown): Affine => (Array.isArray(x) && x.length === 12 ? (x.map(number) as Affine) : kIdentity);
 
+function channel(entry: unknown): ChannelInfo {
+  const c = (entry ?? {}) as Record<string, unknown>;
+  const values = (c['values'] ?? {}) as Record<string, unknown>;
+  return { name: text(c['name']), unit: text(c['unit']), values: [number(values['least']), number(values['greatest'])] };
+}
+
 // null: not a data set.
 function parsed(entry: unknown): Dataset | null {
   const d = entry as Record<string, unknown>;
@@ -105,6 +119,7 @@ function parsed(entry: unknown): Dataset | null {
     fieldUnit: text(d['field_unit']),
     range: [number(range[0]), number(range[1])],
     values: [number(values['least']), number(values['greatest'])],
+    channels: Array.isArray(d['channels']) ? d['channels'].map(channel) : [],
     hasEveryRange,
     hasRangesWithin: hasEveryRange || d['refine'] === 'uniform',
     maxError: number(d['max_error']),

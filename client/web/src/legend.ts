@@ -1,8 +1,9 @@
-// The legend (a colour bar), where colours show values of the field, thickness or levels of detail.
+// The legend (a colour bar), where colours show values of the field or a channel, thickness or levels of detail.
 import { type ColorMap, kLevelColors, kThicknessColors } from './color_maps';
 import type { Dataset } from './datasets';
 import { element } from './dom';
 import { short } from './format';
+import { channelOf } from './palette';
 import type { Range } from './range';
 import type { ViewState } from './state';
 import type { Thickness } from './thickness';
@@ -21,7 +22,8 @@ export function showLegend(
   element('legend').hidden = !showsThickness && !view.levels && !values;
   if (values) {
     const [low, high] = values.span;
-    const title = [dataset?.field || 'Field', dataset?.fieldUnit].filter(Boolean).join(', ');
+    const channel = channelOf(dataset, view.channel);
+    const title = (channel ? [channel.name, channel.unit] : [dataset?.field || 'Field', dataset?.fieldUnit]).filter(Boolean).join(', ');
     fill(title, [low, (low + high) / 2, high].map(short), values.colors);
   } else if (showsThickness) {
     const labels = isKnown ? ['0', short(maximum / 2), `${short(maximum)} or more`] : ['0', '', ''];

@@ -8,6 +8,7 @@ import { element, input, onClick } from './dom';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
 import { showLegend } from './legend';
+import { channelOf } from './palette';
 import { watchPanel } from './panel';
 import { watchPointers } from './pointer';
 import { Probe } from './probe';
@@ -149,11 +150,13 @@ class Page {
     const pose = this.viewer.pose();
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
-    const { pixelError, region, maxTets, memory, clip, tets, wireframe, probe, colorBy } = view.value;
+    const { pixelError, region, maxTets, memory, clip, tets, wireframe, probe, colorBy, channel: name } = view.value;
     const viewport: [number, number] = [canvas.width, canvas.height];
     const { dataset } = status.value;
+    const ranges = dataset ? rangesOf(dataset, view.value) : [];
+    const channel = channelOf(dataset, name)?.name ?? null;
     return {
-      view: { camera: { ...pose, viewport }, ranges: dataset ? rangesOf(dataset, view.value) : [], pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
+      view: { camera: { ...pose, viewport }, ranges, channel, pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,

@@ -39,7 +39,7 @@ export type Request =
   | { type: 'clip'; plane: Plane | null }
   | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
   | { type: 'edges'; wanted: boolean } // whether pieces have edges
-  | { type: 'values'; wanted: boolean } // whether pieces, caps and tetrahedra have values
+  | { type: 'values'; wanted: boolean } // whether pieces, caps and tetrahedra have values: those of the view's channel, or the field's
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
   | { type: 'save'; format: MeshFormat }
   | { type: 'digest' }; // answered by a report of the same type
@@ -47,6 +47,7 @@ export type Request =
 export interface View {
   camera: Pose & { viewport: [number, number] }; // viewport: device pixels
   ranges: [number, number][]; // of values, four at most; a mesh is made for each; none: the data set's own
+  channel: string | null; // of the data set, whose values come along; null: none
   pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null;
   maxTets: number | null; // in the mesh; null: no limit
@@ -109,7 +110,7 @@ export interface SurfacePiece {
   id: number; // no other range has it
   range: number; // index among those shown
   vertices: ArrayBuffer;
-  values: ArrayBuffer | null; // of the field at each vertex, float32; null unless wanted
+  values: ArrayBuffer | null; // at each vertex, float32; of a vector the length; null unless wanted
   indices: ArrayBuffer;
   edges: ArrayBuffer | null; // two uint32 indices each, every edge once per group; in the same three groups
   triangles: [number, number, number]; // per group

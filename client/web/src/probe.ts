@@ -1,8 +1,9 @@
-// The probe: a label beside the pointer that tells the field's value and the position of what is drawn there.
-import type { Dataset } from './datasets';
+// The probe: a label beside the pointer that tells the value of the field or of the channel that is shown, and the position of what is drawn there.
+import type { ChannelInfo, Dataset } from './datasets';
 import { element, setText } from './dom';
 import { withDigits } from './format';
 import type { Frame } from './frame';
+import { channelOf } from './palette';
 import type { Probed } from './picture';
 import { rounded } from './range';
 import type { ViewState } from './state';
@@ -56,7 +57,7 @@ export class Probe {
     label.hidden = !found || !this.at || !dataset || !frame;
     if (!found || !this.at || !dataset || !frame) return;
     const [x, y] = this.at;
-    setText(element('probe-value'), found.value === null ? '' : valueText(dataset, found.value));
+    setText(element('probe-value'), found.value === null ? '' : valueText(dataset, channelOf(dataset, this.view.value.channel), found.value));
     setText(element('probe-position'), positionText(dataset, frame, found));
     const { clientWidth, clientHeight } = this.viewer.picture.canvas;
     const beside = (at: number, size: number, end: number) => Math.max(0, at + kOffset + size <= end ? at + kOffset : at - kOffset - size);
@@ -66,9 +67,10 @@ export class Probe {
 }
 
 // With the digits that single precision leaves after interpolation between values of the field.
-function valueText({ field, fieldUnit, values }: Dataset, value: number): string {
+function valueText(dataset: Dataset, channel: ChannelInfo | null, value: number): string {
+  const { name, unit, values } = channel ?? { name: dataset.field || 'field', unit: dataset.fieldUnit, values: dataset.values };
   const step = Math.max(...values.map(Math.abs)) / 2 ** 15;
-  return `${field || 'field'} = ${withDigits(rounded(value, step), 6)} ${fieldUnit}`.trimEnd();
+  return `${name} = ${withDigits(rounded(value, step), 6)} ${unit}`.trimEnd();
 }
 
 // To a hundredth of the distance of samples.

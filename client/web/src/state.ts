@@ -5,7 +5,7 @@
 //
 // and, where they differ from the defaults: range=low,high (either may be -inf or inf), or several
 // range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe,
-// probe), shrink, color=value, palette (a name),
+// probe), shrink, color=value, channel (a name), palette (a name),
 // span=low,high, and alpha, beta and box (each rrggbb,opacity).
 import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
@@ -50,7 +50,8 @@ export class ViewState {
   wireframe = false;
   probe = false; // tells the value and the position under the pointer
   levels = false; // colour by level of detail
-  colorBy: ColorBy = 'surface'; // value: of the field
+  colorBy: ColorBy = 'surface'; // value: of the field, or of `channel`
+  channel: string | null = null; // whose values are shown and probed in place of the field's
   palette: string | null = null; // of values; null: the default
   span: [number, number] | null = null; // of values with colours of their own, ascending; null: see spanOf()
   alpha: SurfaceStyle = { color: '#3d7fd6', opacity: 1 };
@@ -100,6 +101,7 @@ export function toHash(state: ViewState): string {
   if (flags.length > 0) put('show', flags.join(','));
   if (state.shrink !== kDefaults.shrink) put('shrink', write([state.shrink]));
   if (state.colorBy !== kDefaults.colorBy) put('color', state.colorBy);
+  if (state.channel !== null) put('channel', encodeURIComponent(state.channel));
   if (state.palette !== null) put('palette', encodeURIComponent(state.palette));
   if (state.span) put('span', state.span.join(','));
   for (const name of kSurfaces) {
@@ -184,6 +186,7 @@ export function fromHash(hash: string): ViewState {
   for (const flag of kFlags) state[flag] = shown.includes(flag);
   state.tets = state.tets && state.region !== null;
   state.shrink = readClamped(get('shrink'), 0.4, 1) ?? kDefaults.shrink;
+  state.channel = get('channel');
   state.palette = get('palette');
   const span = read(get('span'), 2);
   if (span && span[0]! <= span[1]!) state.span = [span[0]!, span[1]!];

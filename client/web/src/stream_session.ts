@@ -41,6 +41,7 @@ export class StreamSession {
   private isPreviewing = false; // since the last view
   private ranges = ''; // of the last view
 
+  private channel: string | null = null; // of the last view
   private progressTime = 0; // when it was last reported
   private progressTimer = 0;
   private busy = { updates: 0, seconds: 0 };
@@ -70,6 +71,8 @@ export class StreamSession {
     const ranges = JSON.stringify(view.ranges);
     const isOtherRange = ranges !== this.ranges;
     this.ranges = ranges;
+    if (view.channel !== this.channel) this.needsAll = true;
+    this.channel = view.channel;
     const error = this.viewer.look(view);
     if (error) return this.fail(error);
     this.connection.start();
@@ -245,7 +248,7 @@ export class StreamSession {
     const start = performance.now();
     this.isChanged = false;
     const { edges, values: hasValues } = this.extras;
-    this.viewer.wantValues(hasValues);
+    this.viewer.wantValues(hasValues, this.channel ?? '');
     const change = this.viewer.updateSurface(edges, this.needsAll);
     this.needsAll = false;
     if (change.pieces.length > 0 || change.removed.length > 0 || change.reset.length > 0) {

@@ -1,13 +1,15 @@
-// Colours of the field's values: their controls, and the uniforms of the shaders.
+// Colours of the values of the field or a channel: their controls, and the uniforms of the shaders.
 import { DataTexture, LinearFilter } from 'three';
 import type { ColorMap } from './color_maps';
 import { create, element, input, onClick } from './dom';
 import { shared } from './materials';
-import { chosenPalette, type NamedColors, spanOf } from './palette';
+import { channelOf, chosenPalette, type NamedColors, spanOf } from './palette';
 import { boundMoved, type Range, rangesOf } from './range';
 import { type ColorBy, exclusive, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
+
+const kChannel = 'channel:'; // begins the options of the choice that name channels
 
 export class ValueColors {
   private fields = [input('span-low'), input('span-high')];
@@ -17,13 +19,20 @@ export class ValueColors {
   // onChange: the picture is to be drawn again.
   constructor(private view: Store<ViewState>, private status: Store<Status>, private onChange: () => void) {
     const [by, palette] = [element<HTMLSelectElement>('color-by'), element<HTMLSelectElement>('palette')];
-    by.addEventListener('change', () => view.set(exclusive({ colorBy: by.value as ColorBy })));
+    by.addEventListener('change', () => {
+      const [colorBy, channel] = by.value.startsWith(kChannel) ? (['value', by.value.slice(kChannel.length)] as const) : [by.value as ColorBy, null];
+      view.set(exclusive({ colorBy, channel, ...(channel === view.value.channel ? {} : { span: null }) }));
+    });
     palette.addEventListener('change', () => view.set({ palette: palette.value }));
     this.fields.forEach((field, end) => field.addEventListener('change', () => this.setEnd(end as 0 | 1, field.valueAsNumber)));
     onClick('span-reset', () => view.set({ span: null }));
-    view.watch(['colorBy', 'palette', 'span'], () => this.show());
+    view.watch(['colorBy', 'channel', 'palette', 'span'], () => this.show());
     view.watch(['range', 'ranges'], () => this.preview(null));
-    status.watch(['dataset'], () => this.preview(null));
+    status.watch(['dataset'], ({ dataset }) => {
+      for (const option of [...by.options].filter(({ value }) => value.startsWith(kChannel))) option.remove();
+      by.append(...(dataset?.channels ?? []).map(({ name }) => create('option', { value: kChannel + name }, name)));
+      this.preview(null);
+    });
     status.watch(['palettes'], ({ palettes }) => {
       palette.replaceChildren(...palettes.map(({ name }) => create('option', { value: name }, name)));
       this.show();
@@ -44,7 +53,8 @@ export class ValueColors {
 
   private span(): Range | null {
     const { dataset } = this.status.value;
-    return dataset && spanOf(dataset, this.previewed ?? rangesOf(dataset, this.view.value), this.view.value.span);
+    const { channel, span } = this.view.value;
+    return dataset && spanOf(dataset, this.previewed ?? rangesOf(dataset, this.view.value), span, channelOf(dataset, channel));
   }
 
   // What is not a number leaves the end as it is.
@@ -56,7 +66,8 @@ export class ValueColors {
 
   private show(): void {
     const { colorBy, palette, span: asked } = this.view.value;
-    element<HTMLSelectElement>('color-by').value = colorBy;
+    const channel = channelOf(this.status.value.dataset, this.view.value.channel);
+    element<HTMLSelectElement>('color-by').value = colorBy === 'value' && channel ? kChannel + channel.name : colorBy;
     element('value-controls').hidden = colorBy !== 'value';
     element<HTMLButtonElement>('span-reset').disabled = asked === null;
     const span = this.span();

@@ -27,7 +27,7 @@ const kDatasets = ['gyroid', 'lost', 'broken', 'full'].map((name) => ({
   full: { vertices: 41000, tets: 197000, indexed_bytes: 3.6e6 },
 }));
 const { range: _range, refine: _refine, full: _full, coefficients: _coefficients, ...common } = kDatasets[0];
-kDatasets.push({ ...common, name: 'any', scope: 'every' });
+kDatasets.push({ ...common, name: 'any', scope: 'every', channels: [{ name: 'heat', unit: 'K', values: { least: -1, greatest: 3 } }] });
 // Values that are distributed evenly.
 const kAny = {
   ...kDatasets.at(-1), histogram: Array(12).fill(1000), histogram_width: 0.25,

@@ -52,6 +52,7 @@ test('an address restores the view that it was written from', () => {
       probe: i % 4 === 1,
       levels: i % 7 !== 0 && i % 5 === 0,
       colorBy: i % 7 ? 'surface' : 'value',
+      channel: i % 3 ? null : 'T (K)',
       palette: [null, 'grey', 'a b&'][i % 3],
       span: i % 2 ? [Math.min(a[1], b[1]), Math.max(a[1], b[1])] : null,
       alpha: { color: '#012345', opacity: 0.25 },
@@ -120,6 +121,7 @@ test('the span of colours is the part of the range that the values reach, unless
   assert.deepEqual(palette.spanOf(every, [[3, 4], [0, 1]], null), [0, 4], 'of all ranges');
   assert.deepEqual(palette.spanOf(one, [], null), [2, 5], 'this one shows its own range only');
   assert.deepEqual(palette.spanOf(every, [[1, 2]], [-7, 99]), [-7, 99]);
+  for (const channel of [null, 'heat', 'T & v=1, é']) assert.equal(fromHash(toHash({ ...kDefaults, channel })).channel, channel);
   for (const span of [[0, 0], [1 / 3, 1e-9 + 1 / 3], [-1e30, 5e-324]]) assert.deepEqual(fromHash(toHash({ ...kDefaults, span })).span, span);
 });
 

@@ -2,7 +2,7 @@
 // from black to green.
 import assert from 'node:assert/strict';
 import { difference, pixels, share } from './browser.mjs';
-import { settled, sharedPages, state } from './fake_server.mjs';
+import { recordRequests, settled, sharedPages, state } from './fake_server.mjs';
 
 const { onPage } = sharedPages();
 
@@ -90,6 +90,23 @@ onPage('the span follows the range, also while a handle moves', async (page) => 
   await page.mouse.up();
   await page.waitForFunction(() => window.intervale.state.range?.[0] === 0.8);
   assert.equal(await page.inputValue('#span-low'), '0.8');
+}, { hash: '#data=any&color=value' });
+
+onPage('a channel has colours, too, and is asked for', async (page) => {
+  await recordRequests(page);
+  const requested = (channel) => page.waitForFunction((name) => window.requests.some((r) => r.type === 'view' && r.view.channel === name), channel);
+  const titled = (title) => page.waitForFunction((text) => document.getElementById('legend-title').textContent === text, title);
+  assert.deepEqual(await page.$$eval('#color-by option', (options) => options.map(({ value }) => value)), ['surface', 'value', 'channel:heat']);
+  await fill(page, '#span-low', '1');
+  await page.selectOption('#color-by', 'channel:heat');
+  await requested('heat');
+  await titled('heat, K');
+  assert.deepEqual(await labels(page), ['−1', '1', '3']);
+  await page.waitForFunction(() => location.hash.includes('color=value') && location.hash.includes('channel=heat'));
+  await page.evaluate(() => (window.requests.length = 0));
+  await page.selectOption('#color-by', 'value');
+  await requested(null);
+  await titled('Field');
 }, { hash: '#data=any&color=value' });
 
 onPage('thickness and levels of detail take the place of values, and values theirs', async (page) => {
