@@ -53,7 +53,7 @@ Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
   const auto in_order = ranges.empty() ? 0 : out.CreateVectorOfStructs(ranges);
   const auto refine = std::uint8_t(shown.refine ? 1 + int(*shown.refine) : 0);
   const auto channels = message.channels.empty() ? 0 : out.CreateVectorOfStrings(message.channels);
-  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early, channels);
+  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early, message.coarse_error_percent, channels);
 }
 
 Offset<fbs::Credit> encode_body(FlatBufferBuilder& out, const Credit& message) { return fbs::CreateCredit(out, message.bytes); }
@@ -147,7 +147,9 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
                         .pixel_error = c->pixel_error()};
   }
   if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
-  View view{table.epoch(), lod, table.room(), {}, {}, table.early()};
+  const auto coarse = table.coarse_error_percent();
+  if (coarse && !(*coarse >= 0 && *coarse <= 100)) return malformed("the coarse error percent must be a number from 0 to 100");
+  View view{table.epoch(), lod, table.room(), {}, {}, table.early(), coarse};
   if (const auto* ranges = table.ranges(); VectorLength(ranges) > 0) {
     if (ranges->size() > kMaxRanges)
       return malformed("a view of " + std::to_string(ranges->size()) + " ranges, of which at most " + std::to_string(kMaxRanges) + " can be shown");

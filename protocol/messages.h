@@ -72,6 +72,9 @@ struct View {
   // The server may begin before it is known how far the surfaces of the ranges move. The mesh may get finer than the
   // view asks for.
   bool early = false;
+  // After Done, updates of every range follow whose error is greater than this: 0 to 100 percent of the data set's
+  // max_error. Only from a data set of every range.
+  std::optional<double> coarse_error_percent = {};
   std::vector<std::string> channels = {};  // whose values are sent with the updates: names of the data set's
   friend bool operator==(const View&, const View&) = default;
 };

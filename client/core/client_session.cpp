@@ -88,7 +88,7 @@ Result<ClientSession::Event> ClientSession::take(protocol::Opened& opened, Clock
 
 Result<ClientSession::Event> ClientSession::take(const protocol::Batch& batch, Clock::time_point now) {
   if (batch.sequence != sequence_++) return violation("a batch is missing");
-  if (auto accepted = accept_answer(batch.epoch); !accepted) return tl::unexpected(accepted.error());
+  if (auto accepted = accept_answer(batch.epoch, true); !accepted) return tl::unexpected(accepted.error());
   if (!credit_.spend(protocol::cost_of(batch))) return violation("a batch exceeds the credit");
   if (auto applied = apply(batch); !applied) return tl::unexpected(applied.error());
   if (batch.epoch == epoch_) {
@@ -102,7 +102,7 @@ Result<ClientSession::Event> ClientSession::take(const protocol::Batch& batch, C
 }
 
 Result<ClientSession::Event> ClientSession::take(const protocol::Done& done, Clock::time_point /*now*/) {
-  if (auto accepted = accept_answer(done.epoch); !accepted) return tl::unexpected(accepted.error());
+  if (auto accepted = accept_answer(done.epoch, false); !accepted) return tl::unexpected(accepted.error());
   if (done.updates_sent != updates_) return violation("Done, but updates are missing");
   credit_.note_pause();
   if (done.epoch == epoch_) {
@@ -143,9 +143,10 @@ Result<void> ClientSession::start_mesh() {
 }
 
 // A Batch or a Done of that epoch. With the first one, the mesh forgets what that view gave up.
-Result<void> ClientSession::accept_answer(std::uint64_t epoch) {
+Result<void> ClientSession::accept_answer(std::uint64_t epoch, bool may_follow_done) {
   if (state_ == State::greeted) return violation("no Opened at first");
-  if (state_ != State::viewing || epoch < answered_ || epoch > epoch_) return violation("an answer to a view that is not open");
+  const bool follows_done = may_follow_done && state_ == State::idle && view_ && view_->coarse_error_percent;
+  if ((state_ != State::viewing && !follows_done) || epoch < answered_ || epoch > epoch_) return violation("an answer to a view that is not open");
   answered_ = epoch;
   while (shown_.size() > 1 && shown_[1].epoch <= epoch) shown_.pop_front();
   if (!mesh_) return {};
@@ -191,6 +192,7 @@ void ClientSession::send_view() {
   protocol::View view{++epoch_, view_->lod};
   view.shown = view_->shown;
   view.early = view_->early;
+  view.coarse_error_percent = view_->coarse_error_percent;
   view.channels = view_->channels;
   if (shown_.empty() || shown_.back().shown != view.shown || shown_.back().channels != view.channels)
     shown_.push_back({epoch_, view.shown, view.channels});
@@ -199,6 +201,7 @@ void ClientSession::send_view() {
     if (is_open()) view.forget = mesh_->give_up(epoch_, protocol::kMaxHave);
   }
   if (view_->budget.max_updates != UINT64_MAX) view.room = view_->budget.max_updates;
+  if (state_ == State::idle) credit_.note_pause();  // also if coarse updates have followed Done
   if (is_open()) state_ = State::viewing;
   stats_.is_full = false;
   send(view);

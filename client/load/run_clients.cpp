@@ -154,8 +154,9 @@ class LoadClient {
     const Lod lod = views_.lod();
     const bool sets_range = plan_.scenario == Scenario::range && session_.mesh();
     const Time before = LoadClock::now();
-    const bool early = plan_.scenario == Scenario::range;
-    (void)session_.look({lod, lod.camera, plan_.budget, shown(), early});  // these ranges are of the data set
+    const bool drags = plan_.scenario == Scenario::range;  // as the viewer does
+    const auto coarse = drags ? std::optional(kCoarseErrorPercent) : std::nullopt;
+    (void)session_.look({lod, lod.camera, plan_.budget, shown(), drags, coarse});  // these ranges are of the data set
     const std::chrono::duration<double, std::milli> took = LoadClock::now() - before;
     if (sets_range) stats_.set_range_ms.push_back(took.count());
   }

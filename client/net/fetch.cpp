@@ -78,7 +78,7 @@ class Fetch {
 
   Result<void> look(const std::optional<Refine>& refine) {
     return session_.look(
-        {options_.lod, {}, {.max_tets = options_.lod.max_tets.value_or(UINT64_MAX)}, {options_.shown.ranges, refine}, false, options_.channels});
+        {options_.lod, {}, {.max_tets = options_.lod.max_tets.value_or(UINT64_MAX)}, {options_.shown.ranges, refine}, false, {}, options_.channels});
   }
 
   // Fails with `why` once the time for it is over, or as stream() does.

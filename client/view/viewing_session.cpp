@@ -10,10 +10,14 @@ Result<void> ViewingSession::look(const WantedView& view) {
   if (view.budget.max_updates < kMinRoom) return fail("there must be room for at least " + std::to_string(kMinRoom) + " updates");
   if (view_ == view) return session_.preview(view.shown);  // the end of a preview
   if (view.region) lod.camera.reset();
-  if (auto looked =
-          session_.look({.lod = lod, .camera = view.camera, .budget = view.budget, .shown = view.shown, .early = true, .channels = view.channels});
-      !looked)
-    return looked;
+  const ViewRequest request{.lod = lod,
+                            .camera = view.camera,
+                            .budget = view.budget,
+                            .shown = view.shown,
+                            .early = true,
+                            .coarse_error_percent = kCoarseErrorPercent,
+                            .channels = view.channels};
+  if (auto looked = session_.look(request); !looked) return looked;
   view_ = view;
   gave_up_more_ = false;
   return {};

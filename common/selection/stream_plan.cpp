@@ -56,11 +56,12 @@ struct StreamPlan::BatchBuilder {
 
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume)
     : volume_(std::move(volume)), sent_(volume_->size()), channels_(volume_->channel_keys().size()) {
-  set_relevant({volume_, &volume_->relevant()});
+  set_relevant(std::shared_ptr<const RelevantUpdates>(volume_, &volume_->relevant()));
 }
 
-void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant) {
+void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown) {
   relevant_ = std::move(relevant);
+  shown_ = std::move(shown);
   const SupercubeSet& set = volume_->set();
   pending_.assign(set.bricks().size(), {});
   wanted_count_ = pending_bricks_ = 0;
@@ -360,7 +361,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   if (builder.updates == 0) return {};
   std::vector<SlotGroup>& groups = builder.groups;
   std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
-  Batch batch{encode_batch(*volume_, relevant_->shown(), sent_, groups), builder.updates, {}};
+  Batch batch{encode_batch(*volume_, shown_, sent_, groups), builder.updates, {}};
   if (!wanted_channels_.empty()) batch.channels = send_values(groups, {});
   return batch;
 }

@@ -58,7 +58,9 @@ class StreamPlan {
 
   // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice. relevant:
   // of this volume. Before the set_lod() of the same view. O(supercubes).
-  void set_relevant(std::shared_ptr<const RelevantUpdates> relevant);
+  void set_relevant(const std::shared_ptr<const RelevantUpdates>& relevant) { set_relevant(relevant, relevant->shown()); }
+  // The same for a client that shows other ranges: batches are coded for those.
+  void set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown);
 
   // Replaces the channels that are wanted, by number, ascending: their values go with all updates from now on, and
   // before those to the updates that were sent already. O(1) if those have them.
@@ -136,6 +138,7 @@ class StreamPlan {
 
   std::shared_ptr<const IntervalVolume> volume_;
   std::shared_ptr<const RelevantUpdates> relevant_;  // not null
+  ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
   std::vector<Pending> pending_;  // by brick
   // By supercube: bound on the error step of the unsent updates, in pages of 64 supercubes. Page 0: as if none were sent.

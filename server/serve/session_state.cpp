@@ -67,8 +67,11 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   const auto channels = find_channels(volume_->description().channels, view.channels);
   if (!channels) return Fault{CloseCode::no_such_range, channels.error().message.substr(0, protocol::kMaxText)};
   if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
-  plan_->set_room(view.room.value_or(UINT64_MAX));
+  if (!view.forget.empty()) ahead_percent_.reset();
+  room_ = view.room.value_or(UINT64_MAX);
+  plan_->set_room(room_);
   plan_->set_channels(*channels);
+  coarse_percent_ = view.coarse_error_percent;
   epoch_ = view.epoch;
   lod_ = view.lod;
   if (shown_ != shown || !lod_.camera) measurement_.reset();
@@ -93,8 +96,8 @@ std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
   return {};
 }
 
-void SessionState::set_relevant(RangeCache::Relevant relevant, bool is_measured) {
-  plan_->set_relevant(std::move(relevant));
+void SessionState::set_relevant(const RangeCache::Relevant& relevant, bool is_measured) {
+  plan_->set_relevant(relevant);
   planned_ = shown_;
   is_measured_ = is_measured;
 }
@@ -125,11 +128,31 @@ bool SessionState::measure() {
   return true;
 }
 
+// After this view, which is complete.
+bool SessionState::goes_ahead() const {
+  const bool is_known = ahead_percent_ && coarse_percent_ && *ahead_percent_ <= *coarse_percent_;
+  return volume_->description().has_every_range && coarse_percent_ && !is_known && !plan_->is_full();
+}
+
+// A client that keeps a quarter of its room free for the next view gives up nothing for what goes ahead.
+void SessionState::begin_ahead() {
+  if (!std::exchange(is_new_, false)) return;
+  plan_->set_relevant({volume_, &volume_->relevant()}, shown_);
+  planned_.clear();  // no view's: not even one of every range has the same if other ranges are shown now
+  Lod lod;
+  lod.error_percent = coarse_percent_;
+  plan_->set_lod(lod);
+  plan_->set_room(std::min(room_ - room_ / 4, lod_.max_updates.value_or(UINT64_MAX)));
+}
+
 std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
   if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
   if (!has_work()) return {};
-  if (!begin_view()) {
+  const bool is_ahead = view_ == ViewState::ahead;
+  if (is_ahead) {
+    begin_ahead();
+  } else if (!begin_view()) {
     waits_ = true;
     return {};
   }
@@ -142,12 +165,15 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   if (!batch) {
     waits_ = plan_->done() && measurement_;
     if (!plan_->done() || measurement_) return {};
-    view_ = ViewState::done;
+    if (is_ahead && !plan_->is_full()) ahead_percent_ = coarse_percent_;
+    is_new_ = !is_ahead && goes_ahead();
+    view_ = is_new_ ? ViewState::ahead : ViewState::done;
+    if (is_ahead) return {};
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }
-  view_ = ViewState::streaming;
+  if (!is_ahead) view_ = ViewState::streaming;
   target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
-  const StreamPlan::Remaining remaining = plan_->remaining();
+  const StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();
   protocol::Batch message{epoch_,
                           sequence_++,
                           batch->updates,

@@ -51,10 +51,11 @@ class SessionState {
   [[nodiscard]] std::uint64_t updates_sent() const { return plan_ ? plan_->sent() : 0; }
 
  private:
-  // Of the last view: there is none yet; nothing, or something, was sent for it; Done was sent.
-  enum class ViewState { none, unanswered, streaming, done };
+  // Of the last view: there is none yet; nothing, or something, was sent for it; Done was sent, and coarse updates of
+  // every range follow; nothing more follows.
+  enum class ViewState { none, unanswered, streaming, ahead, done };
 
-  [[nodiscard]] bool is_streaming() const { return view_ == ViewState::unanswered || view_ == ViewState::streaming; }
+  [[nodiscard]] bool is_streaming() const { return view_ != ViewState::none && view_ != ViewState::done; }
   std::optional<protocol::Fault> on(const protocol::Open& open);
   std::optional<protocol::Fault> on(const protocol::View& view);
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
@@ -62,7 +63,9 @@ class SessionState {
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
   bool begin_view();
   bool measure();
-  void set_relevant(RangeCache::Relevant relevant, bool is_measured);
+  [[nodiscard]] bool goes_ahead() const;
+  void begin_ahead();
+  void set_relevant(const RangeCache::Relevant& relevant, bool is_measured);
 
   const AtomicSharedPtr<Catalogue>& catalogue_;
   RangeCache& ranges_;
@@ -72,9 +75,12 @@ class SessionState {
   std::optional<StreamPlan> plan_;
   Lod lod_;                                                     // of the last view
   ShownRanges shown_;                                           // of the last view, as distinct() gives them
+  std::uint64_t room_ = 0;                                      // of the last view
+  std::optional<double> coarse_percent_;                        // likewise
+  std::optional<double> ahead_percent_;                         // the client has every range down to this error
   bool is_early_ = false;                                       // the last view takes estimates
-  bool is_new_ = false;                                         // the plan does not have the last view yet
-  ShownRanges planned_;                                         // that the plan has
+  bool is_new_ = false;                                         // the plan does not have the last view yet, or what goes ahead
+  ShownRanges planned_;                                         // that the plan has; none while it goes ahead
   bool is_measured_ = true;                                     // how far surfaces move, of those
   std::shared_ptr<const RangeCache::Measurement> measurement_;  // of shown_; nullptr if there is no need
   bool waits_ = false;                                          // nothing more can be sent before measurement_ is ready

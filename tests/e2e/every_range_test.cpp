@@ -2,13 +2,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "tests/support/complaints.h"
 #include "tests/support/programs.h"
+#include "tests/support/raw_client.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {
@@ -120,6 +123,47 @@ TEST_F(EveryRange, AClientReceivesTheMeshThatExtractMakes) {
   expect_complaint(run({load, server.url("every"), "--clients", "1", "--duration", "0.1"}), 2, "--range LO HI", "intervale-load: ");
   expect_complaint(run({load, server.url("one"), "--range", "0", "9", "--clients", "1", "--duration", "0.1"}), 2, "within [-0.5, 1]",
                    "intervale-load: ");
+}
+
+Lod lod_of(double error_percent) {
+  Lod lod;
+  lod.error_percent = error_percent;
+  return lod;
+}
+
+TEST_F(EveryRange, ADragFindsWhatFollowedDone) {
+  const ServerProgram server(every);
+  const protocol::Open open{"every", "test", protocol::kDefaultWindow};
+  constexpr double kPercent = 10, kInfinity = std::numeric_limits<double>::infinity();
+  RawClient whole(server.port());
+  whole.send(open);
+  whole.send(protocol::View{.epoch = 1, .lod = lod_of(kPercent), .shown = {{{-kInfinity, kInfinity}}, Refine::uniform}});
+  const std::uint64_t all = whole.stream_to_end();
+  EXPECT_GT(all, 100u);
+
+  RawClient client(server.port());
+  client.send(open);
+  client.send(protocol::View{.epoch = 1, .lod = lod_of(50), .shown = {{{-0.5, 0.25}}, {}}, .coarse_error_percent = kPercent});
+  client.expect<protocol::Opened>();
+  std::uint64_t updates = 0, until_done = 0;
+  bool is_done = false;
+  while (!is_done || updates < all) {
+    const auto message = client.receive();
+    ASSERT_TRUE(message);
+    if (const auto* done = std::get_if<protocol::Done>(&*message)) {
+      is_done = true;
+      until_done = updates;
+      EXPECT_EQ(done->updates_sent, updates);
+    } else {
+      updates += std::get<protocol::Batch>(*message).updates;
+    }
+  }
+  EXPECT_LT(until_done, all);
+  EXPECT_EQ(updates, all);
+  client.send(protocol::View{.epoch = 2, .lod = lod_of(kPercent), .shown = {{{0.1, 0.7}}, {}}});
+  EXPECT_EQ(client.expect<protocol::Done>().updates_sent, all) << "no batch before it";
+  client.send(protocol::View{.epoch = 3, .lod = {}, .shown = {{{0.1, 0.7}}, {}}, .coarse_error_percent = std::nan("")});
+  EXPECT_EQ(client.end().code, static_cast<unsigned>(protocol::CloseCode::malformed));
 }
 
 TEST_F(EveryRange, WrongUsageIsSaid) {

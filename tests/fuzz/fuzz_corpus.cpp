@@ -98,10 +98,11 @@ void add_messages(const Corpus& corpus) {
   corpus.add("protocol", "open", {0}, encode(ClientMessage(Open{"buckyball", "fuzz 1", 262144})));
   corpus.add("protocol", "open-older", {0}, encode(ClientMessage(Open{.dataset = "buckyball", .client = {}, .payload = 0})));
   corpus.add("protocol", "view", {0}, encode(ClientMessage(View{7, {0.5, 10.0, Box{{-1, 0, 1}, {2, 0, 3}}, Camera{.eye = {9, 9, 9}}, 5, 6}})));
+  corpus.add("protocol", "view-coarse", {0}, encode(ClientMessage(View{.epoch = 8, .lod = {}, .early = true, .coarse_error_percent = 10})));
   corpus.add("protocol", "view-all", {0}, encode(ClientMessage(View{1, {}})));
   corpus.add("protocol", "view-forget", {0},
              encode(ClientMessage(View{9, {}, 1000, {{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));
-  corpus.add("protocol", "view-channels", {0}, encode(ClientMessage(View{10, {}, {}, {}, {}, true, {"noise", "place"}})));
+  corpus.add("protocol", "view-channels", {0}, encode(ClientMessage(View{10, {}, {}, {}, {}, true, {}, {"noise", "place"}})));
   corpus.add("protocol", "have-channel", {0}, encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}}, 1})));
   corpus.add("protocol", "have", {0},
              encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
@@ -59,6 +61,7 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
     ViewRequest view;
     view.shown = random_request();
     view.early = random() % 2 == 0;
+    if (random() % 3 == 0) view.coarse_error_percent = double(random() % 40);
     for (const char* const name : {"place", "noise"}) {
       if (random() % 3 == 0) view.channels.emplace_back(name);
     }
@@ -104,6 +107,19 @@ class RangeStream : public ::testing::TestWithParam<unsigned> {
       if (random() % 4 != 0) continue;  // this is slow
       ASSERT_EQ(testing::broken_law(front.mesh(), field.volume.grid, front.range().alpha == front.range().beta), "");
     }
+  }
+
+  // Slots by supercube.
+  using Updates = std::map<SupercubeKey, std::uint64_t>;
+  [[nodiscard]] static Updates updates_of(const ClientSession& session) {
+    Updates updates;
+    for (const SlotGroup& group : session.mesh()->front().splits()) updates[group.key] = group.slots;
+    return updates;
+  }
+  [[nodiscard]] static std::uint64_t count(const Updates& updates) {
+    std::uint64_t count = 0;
+    for (const auto& [key, slots] : updates) count += std::uint64_t(std::popcount(slots));
+    return count;
   }
 
   testing::ValueField field = testing::random_value_field(kBoxes[GetParam() % 4], GetParam());
@@ -217,6 +233,7 @@ TEST_P(RangeStream, AFreshClientHasTheMeshesOfItsRanges) {
       ViewRequest with = random_view();
       with.shown = view.shown;
       with.early = false;
+      with.coarse_error_percent.reset();
       return with;
     }();
     ClientSession other({.dataset = "made", .client = "test"});
@@ -265,6 +282,57 @@ TEST_P(RangeStream, AnEarlyViewIsNoCoarser) {
     server.run();
     EXPECT_EQ(session.mesh()->updates(), updates);
   }
+}
+
+// Done comes as if they had not been asked for. Then they come, each once, as far as the client's budgets allow.
+TEST_P(RangeStream, CoarseUpdatesOfEveryRangeFollowDone) {
+  ViewRequest view = random_view();
+  view.early = false;  // what estimates send depends on time
+  view.coarse_error_percent.reset();
+  if (random() % 4 == 0) view.budget.max_updates = 20 + random() % volume->size();
+  ClientSession without({.dataset = "made", .client = "test"}), with({.dataset = "made", .client = "test"}),
+      whole({.dataset = "made", .client = "test"});
+  ASSERT_TRUE(without.look(view));
+  const double percent = view.coarse_error_percent.emplace(double(random() % 40));
+  ASSERT_TRUE(with.look(view));
+  testing::SessionServer one(volume, without), other(volume, with);
+  one.run();
+  while (with.state() != ClientSession::State::idle) ASSERT_NO_FATAL_FAILURE(other.run(1));
+  EXPECT_EQ(updates_of(with), updates_of(without));
+  EXPECT_EQ(with.stats().bytes, without.stats().bytes);
+  EXPECT_EQ(with.stats().is_full, without.stats().is_full);
+  other.run();
+  expect_valid(with);
+  EXPECT_EQ(with.stats().updates, with.mesh()->updates()) << "an update was sent twice";
+
+  ViewRequest coarse;
+  coarse.shown = {{volume->description().range}, Refine::uniform};
+  coarse.lod.error_percent = percent;
+  ASSERT_TRUE(whole.look(coarse));
+  testing::SessionServer third(volume, whole);
+  third.run();
+  Updates expected = updates_of(without);
+  if (volume->description().has_every_range) {
+    for (const auto& [key, slots] : updates_of(whole)) expected[key] |= slots;
+  }
+  const std::uint64_t room = view.budget.max_updates;
+  const std::uint64_t most = std::max(without.mesh()->updates(), std::min(room - room / 4, view.lod.max_updates.value_or(UINT64_MAX)));
+  if (count(expected) > most) {
+    EXPECT_LE(with.mesh()->updates(), most);
+    return;
+  }
+  EXPECT_EQ(updates_of(with), expected);
+
+  // Whatever range is looked at, nothing is missing at that error, and nothing follows twice.
+  for (int i = 0; i < 3; ++i) {
+    ViewRequest next;
+    next.shown = random_request();
+    next.lod.error_percent = percent;
+    next.coarse_error_percent = percent;
+    ASSERT_TRUE(with.look(next));
+    other.run();
+  }
+  EXPECT_EQ(with.mesh()->updates(), volume->description().has_every_range ? count(expected) : with.stats().updates);
 }
 
 TEST_P(RangeStream, RefusesMoreRangesThanCanBeShown) {

@@ -71,7 +71,9 @@ std::vector<ClientMessage> client_messages() {
           View{4, {}, {}, {}, {{{2, 2}}, Refine::uniform}},
           View{7, {}, {}, {}, {{{2, 2}, {0, 1}, {2, 2}, {-1, 5}}, Refine::boundary}},
           View{6, {}, {}, {}, {{}, Refine::boundary}},
-          View{8, {}, {}, {}, {}, true, {"temperature", "velocity"}},
+          View{8, {}, {}, {}, {{{2, 2}}, {}}, true, 12.5},
+          View{9, {}, {}, {}, {}, false, 0.0},
+          View{10, {}, {}, {}, {}, true, {}, {"temperature", "velocity"}},
           View{5, {.camera = Camera{.eye = {1, 2, 3}, .up = {0, 0, 1}, .fov = 30, .viewport = {640, 480}, .pixel_error = 2}}},
           Credit{65536},
           Open{"buckyball", "test 1", 0, 0xfedcba9876543210u},
@@ -296,6 +298,8 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
   ASSERT_FALSE(five);
   EXPECT_EQ(five.error().message, "malformed message: a view of 5 ranges, of which at most 4 can be shown");
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {{}, Refine(2)}}))));
+  for (const double percent : {-1.0, 100.5, kNan, kInfinity, -kInfinity})
+    EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = {}, .coarse_error_percent = percent})))) << percent;
   for (const Lod& lod : wrong) EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, lod})))) << &lod - wrong.data();
 }
 
