@@ -12,8 +12,10 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kSmallBatch = 8 << 10;    // the end of a band closes a batch of this size or more
-constexpr std::uint32_t kMaxVisited = 1 << 16;  // supercubes and updates visited in one call of next()
+constexpr std::size_t kSmallBatch = 8 << 10;  // the end of a band closes a batch of this size or more
+// Supercubes and updates visited in one call of next(), which ends its batch: some 2 ms. Much less would cut what a drag of
+// a range needs, a few updates in many places, into small batches that name the same supercubes again.
+constexpr std::uint32_t kMaxVisited = 1 << 18;
 
 }  // namespace
 
