@@ -4,7 +4,6 @@
 #include <bit>
 
 #include "common/ivm/saturate.h"
-#include "server/builder/all_cores.h"
 #include "server/builder/surface_deviation.h"
 
 namespace intervale {
@@ -12,12 +11,13 @@ namespace intervale {
 // An object error is half of the deviation, but no less than twice the mean deviation of surface points, so that 99 % of
 // them are within it also where all of a surface moves alike, as with labels.
 std::vector<ErrorToDistance> measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
-                                                       const std::function<double(UpdateIndex)>& error_of, double max_error) {
-  SurfaceDeviation deviation = surface_deviation(volume, range, domain, set);
-  saturate(set, deviation.largest, domain.levels(), on_all_cores);
+                                                       const std::function<double(UpdateIndex)>& error_of, double max_error,
+                                                       const ParallelFor& parallel) {
+  SurfaceDeviation deviation = surface_deviation(volume, range, domain, set, parallel);
+  saturate(set, deviation.largest, domain.levels(), parallel);
   const double unit = error_to_distance_unit(volume.grid, max_error);
   std::vector<ErrorToDistance> result(set.supercubes());
-  on_all_cores(set.bricks().size(), [&](std::size_t b) {
+  parallel(set.bricks().size(), [&](std::size_t b) {
     const BrickIndex brick{std::uint32_t(b)};
     set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
       const UpdateIndex first = set.first(brick, s), end = first + std::popcount(set.occupancy()[s]);

@@ -6,14 +6,15 @@
 
 #include "common/diamond/domain.h"
 #include "common/ivm/relevant_updates.h"
+#include "common/util/parallel.h"
 #include "server/volume/volume.h"
 
 namespace intervale {
 
 // By supercube of the set, the relevant diamonds. Samples are finite. error: of an update, saturated; max_error: the
-// largest of the data set. Uses all cores that oneTBB may.
+// largest of the data set. range: as of surface_deviation(). Throws what `parallel` throws.
 [[nodiscard]] std::vector<ErrorToDistance> measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain,
                                                                      const SupercubeSet& set, const std::function<double(UpdateIndex)>& error,
-                                                                     double max_error);
+                                                                     double max_error, const ParallelFor& parallel);
 
 }  // namespace intervale

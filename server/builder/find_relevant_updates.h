@@ -6,32 +6,60 @@
 // Only refinement of the inside, too, is a matter of both.
 #pragma once
 
+#include <functional>
 #include <memory>
-#include <span>
+#include <optional>
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
+#include "server/builder/all_cores.h"
+#include "server/builder/restored_field.h"
 
 namespace intervale {
 
-// What RelevantUpdates::object_error() tells.
+// What RelevantUpdates::object_error() tells. Each tells more than those before.
 enum class Distances {
   none,       // 0; levels of detail without a camera need no more
   estimated,  // estimate_distances.h: within a factor of 4 for most; some 15 ns for each relevant update
-  measured,   // error_to_distance.h; about a microsecond for each relevant update, and some 8 bytes a sample meanwhile
+  measured,   // error_to_distance.h; about half a microsecond for each relevant update
 };
 
-// The ranges that a range consists of, one at least: those with one surface; and itself, if its inside is refined.
-[[nodiscard]] std::vector<ShownRange> parts_of(const ShownRange& shown);
+// What is found of a range at once. Surfaces with the same values of keys on each side are one part, whichever end they
+// are of; but where surfaces are measured at their own place (has_few_keys()), each place is another part.
+struct RangePart {
+  ShownRange shown;  // with one finite end, boundary; or refined inside, or without ends
+  Distances distances = Distances::none;
+  friend bool operator==(const RangePart&, const RangePart&) = default;
+};
 
-// The range whose ends are values of keys, with the same values of keys inside. So it has the same needs, but for how
-// far surfaces move, which depends on where they are between the values.
-[[nodiscard]] ShownRange between_keys(const ValueFormat& format, const ShownRange& shown);
+// One at least. distances: of the surfaces; parts that are refined inside have none.
+[[nodiscard]] std::vector<RangePart> parts_of(const ValueFormat& format, const ShownRange& shown, Distances distances);
 
-// What such a part needs. Refined inside: without distances. Uses all cores that oneTBB may.
-[[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_part(const IntervalVolume& volume, const ShownRange& part, Distances distances);
+// Finds what parts need of one interval volume. One thread at a time.
+class PartFinder {
+ public:
+  // The volume was refined uniformly and must outlive this. What `parallel` throws, find() throws.
+  explicit PartFinder(const IntervalVolume& volume, ParallelFor parallel = on_all_cores) : volume_(volume), parallel_(std::move(parallel)) {}
 
-// shown: one range at least, as check_held() accepts it for the volume.
+  // The first part with measured distances restores the field, which is kept for the next ones: 1, 2 or 8 bytes a sample.
+  [[nodiscard]] std::shared_ptr<const RelevantUpdates> find(const RangePart& part);
+  [[nodiscard]] const IntervalVolume& volume() const { return volume_; }
+
+ private:
+  [[nodiscard]] std::vector<ErrorToDistance> measure(const Range& range, const std::vector<std::uint64_t>& slots);
+
+  const IntervalVolume& volume_;
+  ParallelFor parallel_;
+  std::optional<RestoredField> field_;
+};
+
+using FindPart = std::function<std::shared_ptr<const RelevantUpdates>(const RangePart& part)>;
+
+// Of parts that `find` finds. shown: one range at least, as check_held() accepts it for the volume. The data set's own
+// range has measured distances in any case.
+[[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume,
+                                                                           const ShownRanges& shown, Distances distances, const FindPart& find);
+// Uses all cores that oneTBB may.
 [[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume,
                                                                            const ShownRanges& shown, Distances distances);
 

@@ -1,7 +1,5 @@
 #include "server/builder/surface_deviation.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -357,7 +355,8 @@ class Descent {
 
 }  // namespace
 
-SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set) {
+SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
+                                   const ParallelFor& parallel) {
   SurfaceDeviation result{std::vector<float>(set.size(), 0), std::vector<float>(set.supercubes())};
   std::vector<float>& largest = result.largest;
   std::vector<Mean> means(set.supercubes());
@@ -368,9 +367,9 @@ SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, con
     const Descent<T> descent(field, range, volume.grid, domain, set, largest, means);
     std::vector<Diamond> cubes;  // shared out one by one: they are few, and bricks even fewer
     set.for_each(top, 0, [&](const Place& p) { cubes.emplace_back(set.centre(p)); });
-    tbb::parallel_for(std::size_t(0), cubes.size(), [&](std::size_t i) { descent.measure(cubes[i]); });
-    tbb::parallel_for(std::uint32_t(0), std::uint32_t(set.bricks().size()), [&](std::uint32_t b) {
-      set.for_each_in_brick(BrickIndex(b), ~std::uint64_t(0), [&](const Place& p) {
+    parallel(cubes.size(), [&](std::size_t i) { descent.measure(cubes[i]); });
+    parallel(set.bricks().size(), [&](std::size_t b) {
+      set.for_each_in_brick(BrickIndex(std::uint32_t(b)), ~std::uint64_t(0), [&](const Place& p) {
         const double tip = descent.measure_tip(Diamond(SupercubeSet::centre(p), scale_of_key(p.key), kTypeOfSlot[p.slot]));
         if (tip > kLeastDeviation * width) largest[p.index] = std::max(largest[p.index], round_up(tip));
       });

@@ -19,6 +19,7 @@
 #include "common/diamond/domain.h"
 #include "common/diamond/supercube.h"
 #include "common/patch/description.h"
+#include "common/util/parallel.h"
 #include "server/volume/volume.h"
 
 namespace intervale {
@@ -31,7 +32,9 @@ struct SurfaceDeviation {
   std::vector<float> mean;
 };
 
-// Of the diamonds of `set`, the relevant ones. Samples are finite. Uses all cores that oneTBB may.
-[[nodiscard]] SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set);
+// Of the diamonds of `set`, the relevant ones. Samples are finite. Of `range` only the surfaces count: alpha may be
+// greater than beta. Throws what `parallel` throws.
+[[nodiscard]] SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
+                                                 const ParallelFor& parallel = serial);
 
 }  // namespace intervale

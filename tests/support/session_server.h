@@ -23,7 +23,7 @@ template <class Client>
 class SessionServer {
  public:
   // find: as of RangeCache.
-  SessionServer(const std::shared_ptr<const IntervalVolume>& volume, Client& client, RangeCache::Find find = find_relevant_part)
+  SessionServer(const std::shared_ptr<const IntervalVolume>& volume, Client& client, RangeCache::Find find = &PartFinder::find)
       : ranges_(std::move(find)), client_(client) {
     Catalogue catalogue;
     EXPECT_TRUE(catalogue.add(volume));

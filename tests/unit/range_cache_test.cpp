@@ -20,9 +20,9 @@ namespace {
 struct RangeCacheTest : ::testing::Test {
   std::shared_ptr<const IntervalVolume> volume = testing::build_shared(testing::gyroid({9, 9, 9}), {.range = {-1, 1}, .refine = Refine::uniform});
   std::atomic<int> found = 0;
-  RangeCache::Find find = [this](const IntervalVolume& of, const ShownRange& part, Distances distances) {
+  RangeCache::Find find = [this](PartFinder& finder, const RangePart& part) {
     ++found;
-    return find_relevant_part(of, part, distances);
+    return finder.find(part);
   };
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   // A range with one surface.
@@ -69,8 +69,7 @@ TEST_F(RangeCacheTest, EachSurfaceIsFoundOnce) {
 }
 
 TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
-  const std::size_t bytes = find(*volume, above(1).front(), Distances::none)->memory_bytes();
-  found = 0;
+  const std::size_t bytes = PartFinder(*volume).find({above(1).front(), Distances::none})->memory_bytes();
   RangeCache cache(find, 2 * bytes + bytes / 2);
   (void)get(cache, volume, above(1));
   (void)get(cache, volume, above(2));
@@ -84,12 +83,18 @@ TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
 }
 
 TEST_F(RangeCacheTest, DropsWhatBelongsToDataSetsThatAreGone) {
-  RangeCache cache(find);
-  std::weak_ptr<const RelevantUpdates> old = get(cache, volume, above(1));
-  EXPECT_FALSE(old.expired());
+  std::vector<std::weak_ptr<const RelevantUpdates>> parts;
+  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
+    const auto relevant = find(finder, part);
+    parts.push_back(relevant);
+    return relevant;
+  });
+  (void)get(cache, volume, above(1));
+  ASSERT_EQ(parts.size(), 1u);
+  EXPECT_FALSE(parts[0].expired());
   volume = testing::build_shared(testing::gyroid({9, 9, 9}), {.range = {-1, 1}, .refine = Refine::uniform});
   (void)get(cache, volume, above(1));
-  EXPECT_TRUE(old.expired());
+  EXPECT_TRUE(parts[0].expired());
   EXPECT_EQ(found, 2);
 }
 
@@ -121,11 +126,63 @@ TEST_F(RangeCacheTest, EstimatesDoForAllRangesBetweenTwoKeys) {
   EXPECT_EQ(found, 3 + 4);
 }
 
+// With few keys all surfaces between two of them are one, as lower ends and as upper ones.
+TEST_F(RangeCacheTest, WithFewKeysWhatIsMeasuredDoesForAllRangesBetweenTwoKeys) {
+  volume = testing::build_shared(testing::digits({9, 9, 9}, 1), {.range = {0, 9}, .refine = Refine::uniform});
+  RangeCache cache(find);
+  const auto measured = [&](double low, double high) { return cache.get(volume, between(low, high), Distances::measured); };
+  const auto first = measured(2.25, 5), second = measured(3, 5.75), turned = measured(5.5, 8.5);
+  EXPECT_EQ(found, 3) << "2 to 3, 5 to 6, and 8 to 9";
+  EXPECT_EQ(first->shown(), between(2.25, 5));
+  EXPECT_EQ(second->shown(), between(3, 5.75));
+  EXPECT_EQ(measured(2.25, 5), first) << "shared while it is in use";
+  for (SupercubeIndex s{0}; s < volume->set().supercubes(); ++s) {
+    ASSERT_EQ(first->slots(s, 0), second->slots(s, 0));
+    ASSERT_EQ(first->error_to_distance()[s].code(), second->error_to_distance()[s].code());
+  }
+  (void)get(cache, volume, between(2.5, 8.25));
+  EXPECT_EQ(found, 3) << "better known than by estimates";
+  EXPECT_TRUE(cache.measure(volume, between(2.75, 8.25), [] {})->is_ready());
+}
+
+TEST_F(RangeCacheTest, StopsWhileItMeasures) {
+  std::binary_semaphore began(0);
+  RangeCache cache([&](PartFinder& finder, const RangePart& part) -> RangeCache::Relevant {
+    began.release();
+    for (;;) (void)finder.find(part);
+  });
+  const auto request = cache.measure(volume, above(1), [] {});
+  began.acquire();
+  cache.stop();
+  EXPECT_THROW((void)request->result(), Stopped);
+}
+
+// One surface is done when its last requests are: those of others that have it need not wait for their turn.
+TEST_F(RangeCacheTest, HandsASurfaceToAllThatWaitForIt) {
+  std::counting_semaphore<> may_go(0), began(0), ready(0);
+  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
+    began.release();
+    may_go.acquire();
+    return find(finder, part);
+  });
+  const auto first = cache.measure(volume, between(-0.5, 0.5), [&] { ready.release(); });
+  began.acquire();
+  const auto second = cache.measure(volume, {{{-0.5, kInfinity}, Refine::boundary}}, [&] { ready.release(); });
+  may_go.release();
+  ready.acquire();
+  EXPECT_TRUE(second->is_ready());
+  EXPECT_FALSE(first->is_ready());
+  may_go.release();
+  ready.acquire();
+  EXPECT_TRUE(first->is_ready());
+  EXPECT_EQ(found, 2);
+}
+
 TEST_F(RangeCacheTest, TriesAgainAfterAFailure) {
   bool fails = true;
-  RangeCache cache([&](const IntervalVolume& of, const ShownRange& part, Distances distances) {
+  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
     if (std::exchange(fails, false)) throw std::runtime_error("no memory");
-    return find(of, part, distances);
+    return find(finder, part);
   });
   EXPECT_THROW((void)get(cache, volume, above(1)), std::runtime_error);
   EXPECT_NE(get(cache, volume, above(1)), nullptr);
@@ -142,11 +199,11 @@ TEST_F(RangeCacheTest, MeasuresTheNewestThatIsStillWanted) {
   std::vector<double> measured;
   const auto whole = ShownRanges{volume->description().whole()};
   std::counting_semaphore<> ready(0);
-  RangeCache cache([&](const IntervalVolume& of, const ShownRange& part, Distances distances) {
-    measured.push_back(part.range.alpha);
+  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
+    measured.push_back(part.shown.range.alpha);
     began.release();
     may_go.acquire();
-    return find(of, part, distances);
+    return find(finder, part);
   });
   const auto request = [&](int number) { return cache.measure(volume, above(number), [&] { ready.release(); }); };
   const auto first = request(1);

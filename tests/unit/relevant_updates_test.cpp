@@ -96,7 +96,8 @@ TEST(FindRelevantUpdates, EstimatesDistances) {
   for (const double alpha : {-0.8, -0.2, 0.1, 0.5}) {
     const auto volume = testing::build_shared(testing::gyroid({40, 33, 36}), {.range = {-1.5, 1.5}, .refine = Refine::uniform});
     const ShownRange part{{alpha, std::numeric_limits<double>::infinity()}, Refine::boundary};
-    const auto measured = find_relevant_part(*volume, part, Distances::measured), estimated = find_relevant_part(*volume, part, Distances::estimated);
+    PartFinder finder(*volume);
+    const auto measured = finder.find({part, Distances::measured}), estimated = finder.find({part, Distances::estimated});
     const SupercubeSet& set = volume->set();
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {

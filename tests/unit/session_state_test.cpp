@@ -39,9 +39,9 @@ struct MeasuredLate : ::testing::Test {
   std::shared_ptr<const IntervalVolume> volume = testing::build_shared(testing::gyroid({33, 33, 33}), {.range = {-1, 1}, .refine = Refine::uniform});
   std::counting_semaphore<> may_measure{0};
   ClientSession session{{.dataset = "made", .client = "test"}};
-  testing::SessionServer<ClientSession> server{volume, session, [this](const IntervalVolume& of, const ShownRange& part, Distances distances) {
-                                                 if (distances == Distances::measured) may_measure.acquire();
-                                                 return find_relevant_part(of, part, distances);
+  testing::SessionServer<ClientSession> server{volume, session, [this](PartFinder& finder, const RangePart& part) {
+                                                 if (part.distances == Distances::measured) may_measure.acquire();
+                                                 return finder.find(part);
                                                }};
   static ViewRequest view_of(Range range, bool early) {
     ViewRequest view;
