@@ -76,14 +76,14 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const UpdateIndex first = set.first(b, s);
       const std::uint64_t occupancy = set.occupancy()[s], relevant = this->slots(s, occupancy);
-      std::uint8_t most = 0;
-      if (relevant == occupancy) {
-        for (UpdateIndex i = first; i < first + std::popcount(occupancy); ++i) most = std::max(most, errors.steps[i]);
-      } else {
-        for (const Slot slot : set_bits<Slot>(relevant)) most = std::max(most, errors.steps[first + count_below(occupancy, slot)]);
+      if (relevant == 0) return;
+      // Often one of the first relevant updates has the highest step of all.
+      std::uint8_t most = 0, most_of_all = 0;
+      for (UpdateIndex i = first; i < first + std::popcount(occupancy); ++i) most_of_all = std::max(most_of_all, errors.steps[i]);
+      for (std::uint64_t left = relevant; left != 0 && most < most_of_all; left &= left - 1) {
+        most = std::max(most, errors.steps[first + count_below(occupancy, Slot(std::countr_zero(left)))]);
       }
       supercube_step_[s] = most;
-      if (relevant == 0) return;
       brick_step_[b] = std::max(brick_step_[b], most);
       brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
     });

@@ -85,7 +85,7 @@ TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
 TEST_F(RangeCacheTest, DropsWhatBelongsToDataSetsThatAreGone) {
   std::vector<std::weak_ptr<const RelevantUpdates>> parts;
   RangeCache cache([&](PartFinder& finder, const RangePart& part) {
-    const auto relevant = find(finder, part);
+    auto relevant = find(finder, part);
     parts.push_back(relevant);
     return relevant;
   });

@@ -251,6 +251,7 @@ TEST_P(Moves, AreThoseOfTheFurthestCrossing) {
         double most = tip;
         bool is_lost = false;  // some crossing has no patch to be near to
         std::vector<double> values;
+        values.reserve(std::size_t(d.row->vertices));
         for (int i = 0; i < d.row->vertices; ++i) values.push_back(value_at(c.volume, domain, d.vertex(i)));
         const std::array<bool, 2> has_patch{lies_between(values, c.range, false), lies_between(values, c.range, true)};
         for (int t = 0; t < d.row->tets; ++t) {
