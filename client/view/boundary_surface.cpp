@@ -341,6 +341,7 @@ BoundarySurface::Change BoundarySurface::update() {
   std::vector<std::uint8_t> pieces(members_.size());
   for (std::size_t i = 0; i < dirty.size(); ++i) {
     if (!dirty[i]) continue;
+    change.is_other_mesh = true;
     remake(i);
     pieces[parts_[i].piece] = 1;
   }
@@ -359,7 +360,7 @@ BoundarySurface::Change BoundarySurface::update() {
 BoundarySurface::Change BoundarySurface::all() {
   (void)update();
   Change change;
-  change.reset = true;
+  change.reset = change.is_other_mesh = true;
   for (std::uint32_t id = 0; id < members_.size(); ++id) {
     if (drawn_[id]) change.pieces.push_back(id);
   }

@@ -43,6 +43,7 @@ class BoundarySurface {
 
   struct Change {
     bool reset = false;                  // nothing of the former surface stays
+    bool is_other_mesh = false;          // tetrahedra changed; perhaps only some inside
     std::vector<std::uint32_t> pieces;   // ids of pieces that exist and changed
     std::vector<std::uint32_t> removed;  // ids of pieces that have become empty
   };

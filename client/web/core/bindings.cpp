@@ -20,6 +20,7 @@
 #include "client/view/point_values.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
+#include "client/view/volume_tets.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/mesh_digest.h"
 #include "common/view/palette.h"
@@ -95,6 +96,8 @@ class Viewer {
                      .viewport = {camera["viewport"][0].as<int>(), camera["viewport"][1].as<int>()},
                      .pixel_error = view["pixelError"].as<double>()};
     wanted.shown.ranges = ranges_of(view["ranges"]);
+    if (view["uniform"].as<bool>()) wanted.shown.refine = Refine::uniform;
+    refine_ = wanted.shown.refine;
     if (const val channel = view["channel"]; !channel.isNull()) wanted.channels = {channel.as<std::string>()};
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
@@ -109,7 +112,7 @@ class Viewer {
   // differ from the last view's (coarse_front.h).
   std::string preview(const val& ranges, int levels) {
     if (drawn_.empty()) return {};
-    const RangeRequest request{.ranges = ranges_of(ranges), .refine = {}};
+    const RangeRequest request{.ranges = ranges_of(ranges), .refine = refine_};
     const StreamClient& client = *session_.mesh();
     const ShownRanges shown = resolve(client.description(), request);
     stale_ = is_previewing_ = true;
@@ -204,13 +207,16 @@ class Viewer {
     channel_ = channel;
   }
 
-  // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything.
+  // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything. isOtherMesh:
+  // whether tetrahedra changed; perhaps only some inside.
   val update_surface(bool edges, bool all) {
     stale_ = false;
     val pieces = val::array(), removed = val::array(), reset = val::array();
+    bool is_other_mesh = ranges_sent_ != drawn_.size();
     for (std::size_t i = 0; i < drawn_.size(); ++i) {
       const BoundarySurface::Change change = drawn_[i].update(all, wanted_values());
       if (change.reset) reset.call<void>("push", double(i));
+      is_other_mesh = is_other_mesh || change.is_other_mesh;
       for (const std::uint32_t id : change.removed) removed.call<void>("push", piece_id(i, id));
       for (const std::uint32_t id : change.pieces) pieces.call<void>("push", piece(i, id, edges));
     }
@@ -220,6 +226,7 @@ class Viewer {
     result.set("reset", reset);
     result.set("pieces", pieces);
     result.set("removed", removed);
+    result.set("isOtherMesh", is_other_mesh);
     return result;
   }
 
@@ -263,6 +270,20 @@ class Viewer {
     tets.set("outOf", double(all.out_of));
     return tets;
   }
+
+  // What a Volume of messages.ts has of the core, and has no values without want_values(true); and the order of its
+  // tetrahedra. None once drop_volume() was called.
+  val volume() {
+    volume_ = {};
+    if (have_values())
+      for (const DrawnRange& range : drawn_) volume_.add(range.surface(), range.values());
+    val volume = val::object();
+    volume.set("points", buffer_of(volume_.points()));
+    volume.set("tets", buffer_of(volume_.tets()));
+    return volume;
+  }
+  val volume_order(const val& eye) const { return buffer_of(volume_.order(three(eye))); }
+  void drop_volume() { volume_ = {}; }
 
   // The mesh as a file of the format of this path's extension: its bytes, or a text that says why there are none.
   [[nodiscard]] val save(const std::string& path) const {
@@ -322,6 +343,8 @@ class Viewer {
   ViewingSession session_;
   std::deque<DrawnRange> drawn_;  // none before the first mesh; of the ranges that are shown, in their order
   std::size_t ranges_sent_ = 0;   // with the last surface
+  std::optional<Refine> refine_;  // of the last look()
+  VolumeTets volume_;             // the last volume()'s
   std::vector<std::uint8_t> inbox_;
   ClientSession::Event event_;  // of the last message
   bool wants_values_ = false;
@@ -354,6 +377,9 @@ EMSCRIPTEN_BINDINGS(intervale) {
       .function("updateSurface", &Viewer::update_surface)
       .function("cap", &Viewer::cap)
       .function("tets", &Viewer::tets)
+      .function("volume", &Viewer::volume)
+      .function("volumeOrder", &Viewer::volume_order)
+      .function("dropVolume", &Viewer::drop_volume)
       .function("save", &Viewer::save)
       .function("digest", &Viewer::digest);
 }

@@ -1,6 +1,6 @@
 // The client core as the module '@core/core.js': what core/bindings.cpp binds. INTERVALE_CORE_DIR says where it is when
 // the page is built; tsconfig.json gives it these types.
-import type { Box, Cap, Palette, Plane, Progress, SurfaceChange, Tets, View } from './messages';
+import type { Box, Cap, Palette, Plane, Progress, SurfaceChange, Tets, Vec3, View, Volume } from './messages';
 
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
@@ -21,10 +21,14 @@ export interface Viewer {
   progress(): Omit<Progress, 'surfaceVersion' | 'memory' | 'busy'>;
   // Whether pieces, caps and tetrahedra have values, the field's or a channel's, from the next updateSurface() on; if so, that must be of all.
   wantValues(wanted: boolean, channel: string): void;
-  updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version' | 'hasValues'>; // all: every piece, changed or not
-  isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap() and tets() must not be called
+  // all: every piece, changed or not. isOtherMesh: tetrahedra changed, perhaps only some inside.
+  updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version' | 'hasValues'> & { isOtherMesh: boolean };
+  isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap(), tets() and volume() must not be called
   cap(plane: Plane): Pick<Cap, 'vertices' | 'values' | 'triangles'>;
   tets(box: Box): Omit<Tets, 'box'>;
+  volume(): Pick<Volume, 'points' | 'tets'>; // empty without wantValues()
+  volumeOrder(eye: Vec3): ArrayBuffer; // of the last volume()
+  dropVolume(): void; // frees what volumeOrder() needs
   save(path: string): ArrayBuffer | string; // the file, in the format of the path's extension; or an error
   digest(): string;
   delete(): void;

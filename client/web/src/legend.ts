@@ -5,7 +5,7 @@ import { element } from './dom';
 import { short } from './format';
 import { channelOf } from './palette';
 import type { Range } from './range';
-import type { ViewState } from './state';
+import { showsValues, type ViewState } from './state';
 import type { Thickness } from './thickness';
 
 let drawn: ColorMap | null = null; // in the legend's bar
@@ -18,11 +18,11 @@ export function showLegend(
   bar: { span: Range; colors: ColorMap } | null,
 ): void {
   const showsThickness = view.thickness && isAvailable;
-  const values = view.colorBy === 'value' ? bar : null;
+  const values = showsValues(view) ? bar : null;
   element('legend').hidden = !showsThickness && !view.levels && !values;
   if (values) {
     const [low, high] = values.span;
-    const channel = channelOf(dataset, view.channel);
+    const channel = channelOf(dataset, view);
     const title = (channel ? [channel.name, channel.unit] : [dataset?.field || 'Field', dataset?.fieldUnit]).filter(Boolean).join(', ');
     fill(title, [low, (low + high) / 2, high].map(short), values.colors);
   } else if (showsThickness) {

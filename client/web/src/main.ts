@@ -17,12 +17,13 @@ import { rangesOf } from './range';
 import { watchRanges } from './range_controls';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
-import { exclusive, fromHash, kDefaults, toHash, type ViewState } from './state';
+import { exclusive, fromHash, kDefaults, showsValues, toHash, type ViewState } from './state';
 import { Status } from './status';
 import { Store } from './store';
 import { watchTheme } from './theme';
 import { ValueColors } from './value_colors';
 import { Viewer } from './viewer';
+import { kMostVolumeTets, VolumeControls } from './volume_controls';
 import { updatesIn, type Wanted, WorkerClient } from './worker_client';
 
 const kNoWebGl = 'The viewer needs WebGL 2, which this browser does not provide: it may be outdated, or hardware acceleration may be disabled.';
@@ -38,12 +39,17 @@ class Page {
   private readonly region: RegionControls;
   private readonly valueColors: ValueColors;
   private readonly probe: Probe;
+  private volume: VolumeControls | null = null;
 
   constructor(private readonly viewer: Viewer, private readonly worker: WorkerClient) {
     this.handles = new Handles(viewer);
     this.clip = new ClipControls(view, viewer, this.handles);
     this.region = new RegionControls(view, viewer, this.handles);
-    this.valueColors = new ValueColors(view, status, () => viewer.invalidate());
+    this.valueColors = new ValueColors(view, status, () => {
+      viewer.invalidate();
+      this.volume?.update();
+    });
+    this.volume = new VolumeControls(view, status, viewer, this.valueColors);
     this.probe = new Probe(view, status, viewer);
     this.watchViewer();
     view.watch([], (value) => {
@@ -137,6 +143,7 @@ class Page {
       { key: 'G', description: 'Region at full detail', run: () => this.region.toggle() },
       { key: 'S', description: 'Shrunken tetrahedra', run: () => this.region.toggleTets() },
       { key: 'T', description: 'Thickness', run: () => toggle('thickness') },
+      { key: 'O', description: 'Volume rendering', run: () => this.volume?.toggle() },
       { key: 'W', description: 'Wireframe', run: () => toggle('wireframe') },
       { key: 'L', description: 'Colour by level of detail', run: () => toggle('levels') },
       { key: 'V', description: 'Colour by value', run: toggleValueColors },
@@ -150,17 +157,20 @@ class Page {
     const pose = this.viewer.pose();
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
-    const { pixelError, region, maxTets, memory, clip, tets, wireframe, probe, colorBy, channel: name } = view.value;
+    const { pixelError, region, memory, clip, tets, wireframe, probe } = view.value;
     const viewport: [number, number] = [canvas.width, canvas.height];
     const { dataset } = status.value;
-    const ranges = dataset ? rangesOf(dataset, view.value) : [];
-    const channel = channelOf(dataset, name)?.name ?? null;
+    const volume = view.value.render === 'volume' && this.viewer.picture.volume.isAvailable;
+    const maxTets = volume ? Math.min(view.value.maxTets ?? Infinity, kMostVolumeTets) : view.value.maxTets;
+    const [ranges, uniform] = [dataset ? rangesOf(dataset, view.value) : [], volume && !!dataset?.hasRangesWithin];
+    const channel = channelOf(dataset, view.value)?.name ?? null;
     return {
-      view: { camera: { ...pose, viewport }, ranges, channel, pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
+      view: { camera: { ...pose, viewport }, ranges, uniform, channel, pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,
-      values: colorBy === 'value' || probe,
+      values: showsValues(view.value) || probe,
+      volume,
     };
   }
 

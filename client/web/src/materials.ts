@@ -1,10 +1,11 @@
 // The materials, and the uniforms that they share.
 import {
-  Color, CustomBlending, type DataTexture, DoubleSide, GLSL3, type IUniform, Matrix3, NoBlending, OneFactor, OneMinusSrcAlphaFactor,
+  BackSide, Color, CustomBlending, type DataTexture, DoubleSide, GLSL3, type IUniform, Matrix3, NoBlending, OneFactor, OneMinusSrcAlphaFactor,
   RawShaderMaterial, type ShaderMaterialParameters, SrcAlphaFactor, Vector2, Vector3, Vector4, ZeroFactor,
 } from 'three';
 import * as shaders from './shaders';
 import { kMostRanges, kSurfaces, type Styles, type SurfaceName } from './state';
+import * as volumeShaders from './volume_shaders';
 
 const colors = (): { value: Vector3[] } => ({ value: Array.from({ length: kMostRanges }, () => new Vector3()) });
 
@@ -140,5 +141,13 @@ export const compositeMaterial = (fragment: string, uniforms: Uniforms) =>
 // opacity: 0 to 1.
 export const lineMaterial = (depthTest: boolean, opacity: number) =>
   material(shaders.kLineVertex, shaders.kLineFragment, { lineColor: { value: new Vector4(1, 1, 1, opacity) } }, { ...kAlphaBlending, depthTest });
+
+// See kVolumeVertex and kVolumeFragment; light is added in front of what is there.
+export const volumeMaterial = (uniforms: Uniforms) =>
+  material(volumeShaders.kVolumeVertex, volumeShaders.kVolumeFragment, uniforms, {
+    side: BackSide, blending: CustomBlending, blendSrc: OneFactor, blendDst: OneMinusSrcAlphaFactor, depthTest: false, depthWrite: false, transparent: true,
+  });
+export const volumeCompositeMaterial = (uniforms: Uniforms) =>
+  material(shaders.kFullScreenVertex, volumeShaders.kVolumeCompositeFragment, uniforms, { depthTest: false, depthWrite: false });
 
 export const uploadMaterial = () => material(shaders.kUploadVertex, shaders.kUploadFragment, {});

@@ -40,6 +40,7 @@ export type Request =
   | { type: 'tets'; box: Box | null } // from now on, after each change of the mesh: the tetrahedra in this box
   | { type: 'edges'; wanted: boolean } // whether pieces have edges
   | { type: 'values'; wanted: boolean } // whether pieces, caps and tetrahedra have values: those of the view's channel, or the field's
+  | { type: 'volume'; wanted: boolean } // from now on, after each change of the mesh: all tetrahedra, for which values must be wanted, too; after each 'view', their order
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
   | { type: 'save'; format: MeshFormat }
   | { type: 'digest' }; // answered by a report of the same type
@@ -47,6 +48,7 @@ export type Request =
 export interface View {
   camera: Pose & { viewport: [number, number] }; // viewport: device pixels
   ranges: [number, number][]; // of values, four at most; a mesh is made for each; none: the data set's own
+  uniform: boolean; // whether the inside of the ranges is refined, too, and not only their surfaces; the data set must have it
   channel: string | null; // of the data set, whose values come along; null: none
   pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null;
@@ -63,6 +65,8 @@ export type Report =
   | { type: 'surface'; change: SurfaceChange }
   | { type: 'cap'; cap: Cap }
   | { type: 'tets'; tets: Tets }
+  | { type: 'volume'; volume: Volume }
+  | { type: 'order'; version: number; order: ArrayBuffer } // another order of the volume of this version; see Volume
   | { type: 'preview' }
   | { type: 'saved'; format: MeshFormat; name: string; bytes: ArrayBuffer }
   | { type: 'digest'; digest: string; updates: number; tets: number }
@@ -149,4 +153,13 @@ export interface Tets {
   values: ArrayBuffer | null; // as in a SurfacePiece
   count: number;
   outOf: number; // tetrahedra in the box: more than count where they are too many to show
+}
+
+// All tetrahedra. 16 bytes per point: x, y, z and the field's value as float32. 16 bytes per tetrahedron: four uint32,
+// numbers of points, of which the first has the index of the range in its upper two bits; positive in the world.
+export interface Volume {
+  version: number; // of the boundary surface made from the same mesh
+  points: ArrayBuffer;
+  tets: ArrayBuffer;
+  order: ArrayBuffer; // uint32: all tetrahedra, the farthest from the view's camera first
 }

@@ -3,6 +3,7 @@ import type { ColorMap } from './color_maps';
 import type { ChannelInfo, Dataset } from './datasets';
 import type { Palette } from './messages';
 import type { Range } from './range';
+import type { ViewState } from './state';
 import { clamp } from './vec';
 
 export interface NamedColors {
@@ -31,6 +32,6 @@ export function spanOf(dataset: Dataset, ranges: Range[], asked: Range | null, c
   return [reached(Math.min(...shown.map(([low]) => low))), reached(Math.max(...shown.map(([, high]) => high)))];
 }
 
-// The channel whose values are shown; null: the field's are.
-export const channelOf = (dataset: Dataset | null, name: string | null): ChannelInfo | null =>
-  dataset?.channels.find((channel) => channel.name === name) ?? null;
+// The channel whose values are shown; null: the field's are, as in volume rendering always.
+export const channelOf = (dataset: Dataset | null, { render, channel }: Pick<ViewState, 'render' | 'channel'>): ChannelInfo | null =>
+  (render === 'volume' ? null : dataset?.channels.find(({ name }) => name === channel)) ?? null;

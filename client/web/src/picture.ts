@@ -13,6 +13,7 @@ import { TetsView } from './tets';
 import { Thickness } from './thickness';
 import { Transparency } from './transparency';
 import { Uploader } from './upload';
+import { VolumeView } from './volume';
 import { along, corners, dot, length, sub, unit } from './vec';
 
 const kMaxPixelRatio = 2; // device pixels per CSS pixel
@@ -31,6 +32,7 @@ export class Picture {
   readonly uploader: Uploader;
   readonly cap: CapView;
   readonly tets: TetsView;
+  readonly volume: VolumeView;
   private materials = surfaceMaterials(false);
   private valueMaterials = surfaceMaterials(true);
   private transparency = new Transparency();
@@ -50,6 +52,7 @@ export class Picture {
     this.cap = new CapView(this.uploader);
     this.tets = new TetsView(this.uploader);
     this.thickness = new Thickness(this.renderer);
+    this.volume = new VolumeView(this.renderer);
     this.insideScene.add(this.cap.mesh, this.tets.group);
     this.insideScene.matrixWorldAutoUpdate = false; // all is in drawing space
   }
@@ -76,6 +79,7 @@ export class Picture {
     this.setCap(frame, null);
     this.tets.discardPending();
     this.showTets(frame, null);
+    this.volume.show(null);
     this.resize();
   }
 
@@ -120,7 +124,9 @@ export class Picture {
     renderer.setRenderTarget(null);
     renderer.setClearColor(this.background, 1);
     renderer.clear();
-    if (view.thickness && this.thickness.isAvailable) {
+    if (view.render === 'volume' && this.volume.isAvailable) {
+      this.volume.draw(renderer, camera, frame, this.background);
+    } else if (view.thickness && this.thickness.isAvailable) {
       this.thickness.draw(renderer, camera, () => this.drawThicknessLayers(frame, pose));
     } else {
       this.drawOpaque(materials.map(({ opaque }) => opaque), cap, tets);

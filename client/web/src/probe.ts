@@ -57,7 +57,7 @@ export class Probe {
     label.hidden = !found || !this.at || !dataset || !frame;
     if (!found || !this.at || !dataset || !frame) return;
     const [x, y] = this.at;
-    setText(element('probe-value'), found.value === null ? '' : valueText(dataset, channelOf(dataset, this.view.value.channel), found.value));
+    setText(element('probe-value'), found.value === null ? '' : valueText(dataset, channelOf(dataset, this.view.value), found.value));
     setText(element('probe-position'), positionText(dataset, frame, found));
     const { clientWidth, clientHeight } = this.viewer.picture.canvas;
     const beside = (at: number, size: number, end: number) => Math.max(0, at + kOffset + size <= end ? at + kOffset : at - kOffset - size);

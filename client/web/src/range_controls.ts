@@ -25,7 +25,7 @@ class RangeControls {
 
   constructor(private view: Store<ViewState>, private status: Store<Status>, private preview: (ranges: Range[]) => void) {
     onClick('range-add', () => this.add());
-    view.watch(['range', 'ranges'], () => this.show());
+    view.watch(['range', 'ranges', 'render'], () => this.show());
     status.watch(['dataset', 'statistics'], () => {
       this.moving = null;
       const { statistics } = status.value;
@@ -109,8 +109,9 @@ class RangeControls {
 
   private show(): void {
     const { dataset, statistics } = this.status.value;
-    const [now, { ranges }] = [this.current(), this.view.value];
-    element('range-section').hidden = !dataset?.hasRangesWithin;
+    const [now, { ranges, render }] = [this.current(), this.view.value];
+    element('range-section').hidden = !dataset?.hasRangesWithin && render !== 'volume';
+    element('ranges').hidden = !dataset?.hasRangesWithin;
     setText(element('h-range'), now.length > 1 ? 'Ranges of values' : 'Range of values');
     element('histogram').hidden = !statistics;
     element('range-add').hidden = !dataset?.hasEveryRange || now.length >= kMostRanges;

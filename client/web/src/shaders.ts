@@ -3,13 +3,13 @@
 import { colorMapGlsl, kLevelColors, kThicknessColors } from './color_maps';
 import { kMostRanges } from './state';
 
-const kPrecision = `
+export const kPrecision = `
 precision highp float;
 precision highp int;
 `;
 
 // Vertex shaders: from samples to drawing space (vPosition, see frame.ts) and to clip space.
-const kTransform = `
+export const kTransform = `
 uniform mat4 viewMatrix, projectionMatrix;
 uniform mat3 fromSamples;
 uniform vec3 shift;

@@ -6,9 +6,10 @@
 // and, where they differ from the defaults: range=low,high (either may be -inf or inf), or several
 // range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe,
 // probe), shrink, color=value, channel (a name), palette (a name),
-// span=low,high, and alpha, beta and box (each rrggbb,opacity).
+// span=low,high, render=volume, opacity=value:opacity,value:opacity,..., and alpha, beta and box (each rrggbb,opacity).
 import { kFov, type Pose } from './camera';
 import type { Box, Plane, Vec3 } from './messages';
+import { type OpacityCurve, readOpacity, writeOpacity } from './opacity';
 import { clamp, cross, length, sub, unit } from './vec';
 
 export interface SurfaceStyle {
@@ -33,6 +34,7 @@ export interface StyledRange {
 export const kRangeColors: readonly string[] = ['#3d7fd6', '#e69f00', '#009e73', '#cc79a7'];
 
 export type ColorBy = 'surface' | 'value';
+export type Render = 'surface' | 'volume';
 
 export class ViewState {
   dataset: string | null = null; // null: the server's first
@@ -54,6 +56,8 @@ export class ViewState {
   channel: string | null = null; // whose values are shown and probed in place of the field's
   palette: string | null = null; // of values; null: the default
   span: [number, number] | null = null; // of values with colours of their own, ascending; null: see spanOf()
+  render: Render = 'surface'; // volume: all tetrahedra, as a cloud
+  opacity: OpacityCurve | null = null; // of values, in volume rendering; null: see defaultOpacity()
   alpha: SurfaceStyle = { color: '#3d7fd6', opacity: 1 };
   beta: SurfaceStyle = { color: '#f0862a', opacity: 1 };
   box: SurfaceStyle = { color: '#d8c49a', opacity: 1 };
@@ -67,10 +71,13 @@ export const stylesOf = ({ ranges, alpha, beta, box }: Readonly<ViewState>): Sty
 
 const kFlags = ['tets', 'thickness', 'levels', 'wireframe', 'probe'] as const;
 
+// Whether colours are those of values of the field.
+export const showsValues = ({ colorBy, render }: Readonly<ViewState>): boolean => colorBy === 'value' || render === 'volume';
+
 // A change of the view, with what it rules out: colours show one thing at a time.
 export function exclusive(change: Partial<ViewState>): Partial<ViewState> {
-  if (change.colorBy === 'value') return { ...change, thickness: false, levels: false };
-  return change.thickness || change.levels ? { ...change, colorBy: 'surface' } : change;
+  if (change.colorBy === 'value' || change.render === 'volume') return { ...change, thickness: false, levels: false };
+  return change.thickness || change.levels ? { ...change, colorBy: 'surface', render: 'surface' } : change;
 }
 
 // Seven digits: precise to a hundredth of a pixel on any screen.
@@ -104,6 +111,8 @@ export function toHash(state: ViewState): string {
   if (state.channel !== null) put('channel', encodeURIComponent(state.channel));
   if (state.palette !== null) put('palette', encodeURIComponent(state.palette));
   if (state.span) put('span', state.span.join(','));
+  if (state.render !== kDefaults.render) put('render', state.render);
+  if (state.opacity) put('opacity', writeOpacity(state.opacity));
   for (const name of kSurfaces) {
     const style = state[name];
     const standard = kDefaults[name];
@@ -190,8 +199,11 @@ export function fromHash(hash: string): ViewState {
   state.palette = get('palette');
   const span = read(get('span'), 2);
   if (span && span[0]! <= span[1]!) state.span = [span[0]!, span[1]!];
+  state.opacity = readOpacity(get('opacity'));
   for (const name of kSurfaces) {
     state[name] = readStyle(get(name)) ?? state[name];
   }
-  return get('color') === 'value' ? { ...state, ...exclusive({ colorBy: 'value' }) } : state;
+  const colored = get('color') === 'value' ? exclusive({ colorBy: 'value' }) : {};
+  const rendered = get('render') === 'volume' ? exclusive({ render: 'volume' }) : {};
+  return { ...state, ...colored, ...rendered };
 }

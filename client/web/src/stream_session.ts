@@ -5,7 +5,7 @@
 import type { Core, Viewer } from '@core/core.js';
 
 import { Connection, kGoingAway } from './connection';
-import type { Box, MeshFormat, Plane, Report, Request, View } from './messages';
+import type { Box, MeshFormat, Plane, Report, Request, Vec3, View } from './messages';
 import { PreviewPace } from './preview_pace';
 
 const kSurfaceIntervalMs = 40; // least time between two versions
@@ -21,6 +21,7 @@ export interface Extras {
   values: boolean;
   plane: Plane | null;
   box: Box | null;
+  volume: boolean;
 }
 
 export class StreamSession {
@@ -40,6 +41,8 @@ export class StreamSession {
   private pace = new PreviewPace();
   private isPreviewing = false; // since the last view
   private ranges = ''; // of the last view
+  private eye: Vec3 = [0, 0, 0]; // of the last view
+  private volume: { version: number; eye: Vec3 } | null = null; // the last one sent, and the eye of its last order
 
   private channel: string | null = null; // of the last view
   private progressTime = 0; // when it was last reported
@@ -73,6 +76,7 @@ export class StreamSession {
     this.ranges = ranges;
     if (view.channel !== this.channel) this.needsAll = true;
     this.channel = view.channel;
+    this.eye = view.camera.eye;
     const error = this.viewer.look(view);
     if (error) return this.fail(error);
     this.connection.start();
@@ -147,6 +151,25 @@ export class StreamSession {
     if (this.viewer.isStale()) return this.scheduleSurface();
     const tets = this.viewer.tets(box);
     this.report({ type: 'tets', tets: { ...tets, box } }, buffersOf(tets));
+  }
+
+  // Before its surface is sent, so that the page has it when it answers that. isOther: the mesh is not the last volume's.
+  private sendVolume(version: number, isOther: boolean): void {
+    const { eye, viewer } = this;
+    if (isOther || !this.volume) {
+      const volume = { ...viewer.volume(), order: viewer.volumeOrder(eye), version };
+      this.volume = { version, eye };
+      return this.report({ type: 'volume', volume }, [volume.points, volume.tets, volume.order]);
+    }
+    if (this.volume.eye.every((x, i) => x === eye[i])) return;
+    this.volume.eye = eye;
+    const order = viewer.volumeOrder(eye);
+    this.report({ type: 'order', version: this.volume.version, order }, [order]);
+  }
+
+  private dropVolume(): void {
+    this.volume = null;
+    this.viewer.dropVolume();
   }
 
   close(): void {
@@ -247,12 +270,15 @@ export class StreamSession {
     if (this.isEnded || !this.isChanged || this.shown !== this.version) return;
     const start = performance.now();
     this.isChanged = false;
-    const { edges, values: hasValues } = this.extras;
+    const { edges, values: hasValues, volume } = this.extras;
     this.viewer.wantValues(hasValues, this.channel ?? '');
-    const change = this.viewer.updateSurface(edges, this.needsAll);
+    const { isOtherMesh, ...change } = this.viewer.updateSurface(edges, this.needsAll);
     this.needsAll = false;
-    if (change.pieces.length > 0 || change.removed.length > 0 || change.reset.length > 0) {
-      ++this.version;
+    const isOther = change.pieces.length > 0 || change.removed.length > 0 || change.reset.length > 0 || (volume && isOtherMesh);
+    if (isOther) ++this.version;
+    if (volume) this.sendVolume(this.version, isOther);
+    else if (this.volume) this.dropVolume();
+    if (isOther) {
       const buffers = change.pieces.flatMap((piece) => [...buffersOf(piece), piece.indices, ...(piece.edges ? [piece.edges] : [])]);
       this.report({ type: 'surface', change: { ...change, version: this.version, hasValues } }, buffers);
     }

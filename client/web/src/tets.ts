@@ -8,7 +8,7 @@ import { setValues, type Uploader } from './upload';
 
 const kChunk = 1 << 12; // tetrahedra per mesh: 460 kB
 const kTetWords = 28; // 32-bit words of a tetrahedron's four vertices
-const kTriangles = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]; // of a tetrahedron; their orientation is not used
+export const kTetTriangles = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]; // of a positive tetrahedron, counterclockwise from outside
 
 export class TetsView {
   readonly group = new Group();
@@ -45,7 +45,7 @@ export class TetsView {
       const mesh = staticMesh(this.chunk(new Uint32Array(tets.vertices, 4 * kTetWords * first, kTetWords * n)));
       if (tets.values) setValues(mesh.geometry, new Float32Array(tets.values, 16 * first, 4 * n));
       this.uploader.send(mesh.geometry, (4 * kTetWords + (tets.values ? 16 : 0)) * n);
-      mesh.geometry.setDrawRange(0, kTriangles.length * n);
+      mesh.geometry.setDrawRange(0, kTetTriangles.length * n);
       this.chunks.push(mesh);
     }
     return this.chunks.length === chunkCount ? tets : null;
@@ -85,9 +85,9 @@ export class TetsView {
 }
 
 function chunkTriangles(): Uint32Array {
-  const n = kTriangles.length;
+  const n = kTetTriangles.length;
   const indices = new Uint32Array(n * kChunk);
-  for (let tet = 0; tet < kChunk; ++tet) for (let i = 0; i < n; ++i) indices[n * tet + i] = 4 * tet + kTriangles[i]!;
+  for (let tet = 0; tet < kChunk; ++tet) for (let i = 0; i < n; ++i) indices[n * tet + i] = 4 * tet + kTetTriangles[i]!;
   return indices;
 }
 

@@ -5,7 +5,7 @@ import { create, element, input, onClick } from './dom';
 import { shared } from './materials';
 import { channelOf, chosenPalette, type NamedColors, spanOf } from './palette';
 import { boundMoved, type Range, rangesOf } from './range';
-import { type ColorBy, exclusive, type ViewState } from './state';
+import { type ColorBy, exclusive, showsValues, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
 
@@ -26,7 +26,7 @@ export class ValueColors {
     palette.addEventListener('change', () => view.set({ palette: palette.value }));
     this.fields.forEach((field, end) => field.addEventListener('change', () => this.setEnd(end as 0 | 1, field.valueAsNumber)));
     onClick('span-reset', () => view.set({ span: null }));
-    view.watch(['colorBy', 'channel', 'palette', 'span'], () => this.show());
+    view.watch(['colorBy', 'channel', 'render', 'palette', 'span'], () => this.show());
     view.watch(['range', 'ranges'], () => this.preview(null));
     status.watch(['dataset'], ({ dataset }) => {
       for (const option of [...by.options].filter(({ value }) => value.startsWith(kChannel))) option.remove();
@@ -51,10 +51,15 @@ export class ValueColors {
     return span && this.drawn && { span, colors: this.drawn.colors };
   }
 
+  // Those that are shown.
+  get ranges(): Range[] {
+    const { dataset } = this.status.value;
+    return this.previewed ?? (dataset ? rangesOf(dataset, this.view.value) : []);
+  }
+
   private span(): Range | null {
     const { dataset } = this.status.value;
-    const { channel, span } = this.view.value;
-    return dataset && spanOf(dataset, this.previewed ?? rangesOf(dataset, this.view.value), span, channelOf(dataset, channel));
+    return dataset && spanOf(dataset, this.ranges, this.view.value.span, channelOf(dataset, this.view.value));
   }
 
   // What is not a number leaves the end as it is.
@@ -66,9 +71,9 @@ export class ValueColors {
 
   private show(): void {
     const { colorBy, palette, span: asked } = this.view.value;
-    const channel = channelOf(this.status.value.dataset, this.view.value.channel);
+    const channel = channelOf(this.status.value.dataset, this.view.value);
     element<HTMLSelectElement>('color-by').value = colorBy === 'value' && channel ? kChannel + channel.name : colorBy;
-    element('value-controls').hidden = colorBy !== 'value';
+    element('value-controls').hidden = !showsValues(this.view.value);
     element<HTMLButtonElement>('span-reset').disabled = asked === null;
     const span = this.span();
     this.fields.forEach((field, end) => (field.value = span ? String(Number(span[end]!.toPrecision(7))) : ''));

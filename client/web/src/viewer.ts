@@ -4,7 +4,7 @@ import { fitted, type Pose } from './camera';
 import type { Dataset } from './datasets';
 import { type Frame, frameOf } from './frame';
 import { GpuFence } from './gpu_fence';
-import type { Cap, Report } from './messages';
+import type { Cap, Report, Volume } from './messages';
 import { Picture, type Probed } from './picture';
 import type { ViewState } from './state';
 import type { Store } from './store';
@@ -15,6 +15,7 @@ export class Stats {
   longestBlock = 0; // ms: longest block of this thread by uploads, since it was last set to 0
   surfaceVersion = 0; // of the boundary surface shown; 0: none
   capTriangles = 0; // shown
+  volumeTets = 0; // shown by volume rendering
   tets = 0; // shrunken tetrahedra shown
   probes = 0; // answered
   firstMeshMs = 0; // from navigation to the first picture with triangles; 0: none yet
@@ -29,6 +30,7 @@ export class Viewer {
   onProbed: (found: Probed | null) => void = () => {}; // the answer to probe(); null: nothing is drawn there
   onResize: () => void = () => {};
   onContext: (isLost: boolean) => void = () => {}; // the WebGL context was lost or restored
+  private pendingVolume: Volume | null = null; // as pendingCap
   private pendingCap: Cap | null = null; // shown with its surface, or at once if that is shown already
   private probedAt: readonly [x: number, y: number] | null = null; // asked for and not yet answered
   private isDirty = true; // a draw is needed
@@ -63,7 +65,7 @@ export class Viewer {
   }
 
   open(dataset: Dataset): void {
-    this.pendingCap = null;
+    this.pendingCap = this.pendingVolume = null;
     this.frame = frameOf(dataset);
     this.picture.open(this.frame);
     this.invalidate();
@@ -88,8 +90,16 @@ export class Viewer {
     if (report.type === 'surface') this.picture.surface.take(report.change);
     else if (report.type === 'cap') this.pendingCap = report.cap;
     else if (report.type === 'tets') this.picture.tets.take(report.tets);
+    else if (report.type === 'volume') this.pendingVolume = report.volume;
+    else if (report.type === 'order') this.takeOrder(report.version, report.order);
     else return;
     this.schedule();
+  }
+
+  private takeOrder(version: number, order: ArrayBuffer): void {
+    if (this.pendingVolume?.version === version) this.pendingVolume.order = order;
+    else this.picture.volume.reorder(version, order);
+    this.isDirty = true;
   }
 
   // Requests a draw.
@@ -154,7 +164,7 @@ export class Viewer {
   }
 
   private isUploading(): boolean {
-    return this.picture.surface.isBusy || this.picture.tets.isBusy || this.pendingCap !== null;
+    return this.picture.surface.isBusy || this.picture.tets.isBusy || this.pendingCap !== null || this.pendingVolume !== null;
   }
 
   // Uploads for one frame's budget. Returns the version of the surface that this completed; 0: none.
@@ -174,6 +184,13 @@ export class Viewer {
       this.pendingCap = null;
       this.picture.setCap(frame, cap);
       this.stats.capTriangles = cap.plane ? cap.triangles.reduce((sum, count) => sum + count, 0) : 0;
+      this.isDirty = true;
+    }
+    const volume = this.pendingVolume;
+    if (volume && (!surface.isBusy || volume.version <= surface.version)) {
+      this.pendingVolume = null;
+      this.picture.volume.show(volume);
+      this.stats.volumeTets = this.picture.volume.tets;
       this.isDirty = true;
     }
     const complete = surface.isBusy ? null : tets.upload();

@@ -11,7 +11,7 @@ const report = (message: Report, transfer: Transferable[] = []) => scope.postMes
 const core = createCore({ locateFile: () => wasmUrl });
 let session: StreamSession | null = null;
 let view: View | null = null;
-const extras: Extras = { edges: false, values: false, plane: null, box: null };
+const extras: Extras = { edges: false, values: false, plane: null, box: null, volume: false };
 
 async function handle(request: Request): Promise<void> {
   const loaded = await core;
@@ -39,6 +39,10 @@ async function handle(request: Request): Promise<void> {
     case 'values':
       if (extras.values === request.wanted) return;
       extras.values = request.wanted;
+      return session?.remake();
+    case 'volume':
+      if (extras.volume === request.wanted) return;
+      extras.volume = request.wanted;
       return session?.remake();
     case 'shown':
       return session?.pageShows(request.version);

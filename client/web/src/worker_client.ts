@@ -21,7 +21,8 @@ export interface Wanted {
   plane: Plane | null;
   tetsBox: Box | null;
   edges: boolean;
-  values: boolean; // of the field, for colours and the probe
+  values: boolean; // of the field, for colours, the probe and the volume
+  volume: boolean; // all tetrahedra
 }
 
 export class WorkerClient {
@@ -79,6 +80,7 @@ export class WorkerClient {
     this.send({ type: 'tets', box: wanted.tetsBox });
     this.send({ type: 'edges', wanted: wanted.edges });
     this.send({ type: 'values', wanted: wanted.values });
+    this.send({ type: 'volume', wanted: wanted.volume });
   }
 
   // Sends what differs from what was wanted before.
@@ -90,6 +92,7 @@ export class WorkerClient {
     if (!sameJson(wanted.tetsBox, last?.tetsBox ?? null)) this.requestTets();
     if (wanted.edges !== (last?.edges ?? false)) this.send({ type: 'edges', wanted: wanted.edges });
     if (wanted.values !== (last?.values ?? false)) this.send({ type: 'values', wanted: wanted.values });
+    if (wanted.volume !== (last?.volume ?? false)) this.send({ type: 'volume', wanted: wanted.volume });
   }
 
   // Shows ranges of what was received, until the next view. One request at a time: the latest ranges are sent when the

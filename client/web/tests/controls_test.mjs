@@ -237,7 +237,7 @@ onPage('Tab reaches every control, and the help lists the keys', async (page) =>
   assert.ok(seen.size >= expected, `${seen.size} of ${expected}`);
   await page.keyboard.press('h');
   assert.ok(await page.isVisible('#help-dialog'));
-  assert.equal(await page.locator('#keys dt').count(), 15);
+  assert.equal(await page.locator('#keys dt').count(), 16);
   await page.keyboard.press('Escape');
   assert.ok(!(await page.isVisible('#help-dialog')));
 });

@@ -201,6 +201,18 @@ class Mesh {
   }
 }
 
+// All tetrahedra of the meshes, and their order from an eye, in samples.
+function volumeOf(all) {
+  const points = all.flatMap(({ vertices }) => vertices.flatMap(({ p, f }) => [...p, f]));
+  const firsts = all.map((_, i) => all.slice(0, i).reduce((sum, { vertices }) => sum + vertices.length, 0));
+  const tets = all.flatMap((mesh, i) => mesh.tets.flatMap((tet) => tet.map((v, k) => v + firsts[i] + (k === 0 ? mesh.index * 2 ** 30 : 0))));
+  return { points: Float32Array.from(points).buffer, tets: Uint32Array.from(tets).buffer };
+}
+function orderOf(all, eye) {
+  const distances = all.flatMap((mesh) => mesh.tets.map((tet) => Math.hypot(...mesh.center(tet).map((x, d) => x - eye[d]))));
+  return Uint32Array.from(distances.keys()).sort((a, b) => distances[b] - distances[a]).buffer;
+}
+
 let ranges = [kRange];
 let meshes = []; // of each range
 let step = -1; // the index of the mesh's grid
@@ -209,6 +221,8 @@ let plane = null;
 let box = null;
 let wantsEdges = false;
 let wantsValues = false;
+let wantsVolume = false;
+let eye = [0, 0, 0];
 let name = '';
 let timer = 0;
 
@@ -242,8 +256,12 @@ function postTets() {
   const count = parts.reduce((total, part) => total + part.count, 0);
   post({ type: 'tets', tets: { box, vertices: joined(parts.map(({ vertices }) => vertices)), values: joinedValues(parts), count, outOf: count } });
 }
+function postVolume() {
+  post({ type: 'volume', volume: { ...volumeOf(meshes), order: orderOf(meshes, eye), version } });
+}
 function postSurface(reset) {
   version++;
+  if (wantsVolume) postVolume();
   const pieces = meshes.flatMap((mesh) => mesh.boundary());
   post({ type: 'surface', change: { version, hasValues: wantsValues, reset: reset ? [0, 1, 2, 3] : [], pieces, removed: [] } });
   if (plane) postCap();
@@ -253,13 +271,15 @@ function makeMeshes() {
   meshes = ranges.map((range, index) => new Mesh(kGrids[step], range, index));
 }
 function refine() {
-  if (step + 1 >= kGrids.length) return postProgress(true);
+  if (step + 1 >= kGrids.length - (wantsVolume ? 1 : 0)) return postProgress(true); // all tetrahedra take long to draw without a graphics card
   ++step;
   makeMeshes();
   postSurface(step === 0);
   postProgress(false);
 }
 function look(view) {
+  eye = toSamples(view.camera.eye);
+  if (wantsVolume && meshes.length > 0) post({ type: 'order', version, order: orderOf(meshes, eye) });
   const wanted = view.ranges.length > 1 ? view.ranges : [kRange];
   if (JSON.stringify(wanted) === JSON.stringify(ranges)) return;
   ranges = wanted;
@@ -311,6 +331,10 @@ self.onmessage = ({ data }) => {
   } else if (data.type === 'values') {
     const isOther = data.wanted !== wantsValues;
     wantsValues = data.wanted;
+    if (isOther && meshes.length > 0) postSurface(false);
+  } else if (data.type === 'volume') {
+    const isOther = data.wanted !== wantsVolume;
+    wantsVolume = data.wanted;
     if (isOther && meshes.length > 0) postSurface(false);
   } else if (data.type === 'save') {
     post({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });

@@ -11,8 +11,8 @@ const server = await createServer({
   appType: 'custom',
 });
 const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
-const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette'];
-const [{ exclusive, fromHash, toHash, kDefaults, stylesOf }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette] = await Promise.all(kModules.map(load));
+const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette', 'opacity'];
+const [{ exclusive, fromHash, toHash, kDefaults, stylesOf }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette, opacity] = await Promise.all(kModules.map(load));
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -55,6 +55,8 @@ test('an address restores the view that it was written from', () => {
       channel: i % 3 ? null : 'T (K)',
       palette: [null, 'grey', 'a b&'][i % 3],
       span: i % 2 ? [Math.min(a[1], b[1]), Math.max(a[1], b[1])] : null,
+      render: i % 7 !== 0 && (i % 3 === 0 || i % 5 === 0) || i % 2 ? 'surface' : 'volume',
+      opacity: i % 4 ? null : [{ value: -random(), opacity: 0 }, { value: 1e-9, opacity: random() }, { value: 1 + random(), opacity: 1 }],
       alpha: { color: '#012345', opacity: 0.25 },
       beta: kDefaults.beta,
       box: { color: '#ffffff', opacity: 0 },
@@ -127,7 +129,8 @@ test('the span of colours is the part of the range that the values reach, unless
 
 test('colours show one thing at a time', () => {
   assert.deepEqual(exclusive({ colorBy: 'value' }), { colorBy: 'value', thickness: false, levels: false });
-  for (const name of ['thickness', 'levels']) assert.deepEqual(exclusive({ [name]: true }), { [name]: true, colorBy: 'surface' });
+  assert.deepEqual(exclusive({ render: 'volume' }), { render: 'volume', thickness: false, levels: false });
+  for (const name of ['thickness', 'levels']) assert.deepEqual(exclusive({ [name]: true }), { [name]: true, colorBy: 'surface', render: 'surface' });
   for (const change of [{ colorBy: 'surface' }, { thickness: false }, { wireframe: true }]) assert.deepEqual(exclusive(change), change);
   const { colorBy, thickness, levels } = fromHash('#color=value&show=thickness,levels');
   assert.deepEqual([colorBy, thickness, levels], ['value', false, false]);
@@ -308,4 +311,32 @@ test('a preview gets coarser until a step is done in time, and not finer again i
     assert.ok(last === 0 || msOf(last - 1) > 25, 'no coarser than needed');
     assert.deepEqual(new Set(levels.slice(15)), new Set([last]), 'at rest');
   }
+});
+
+test('opacities are linear between their points, and points keep their order', () => {
+  const curve = opacity.readOpacity('-1:0.5,0:0,3:0.6');
+  assert.deepEqual([-9, -1, -0.5, 0, 1, 3, 9].map((x) => opacity.opacityAt(curve, x)), [0.5, 0.5, 0.25, 0, 0.6 / 3, 0.6, 0.6]);
+  for (const text of ['', '1', '1:', ':1', '1:2', '1:-1', '1:0,1:1', '2:0,1:1', '1:0:3', 'a:0', '1:0,', Array.from({ length: 257 }, (_, i) => `${i}:0`).join()]) {
+    assert.equal(opacity.readOpacity(text), null, text);
+  }
+  for (let i = 0; i < 100; ++i) {
+    let changed = opacity.pointMoved(curve, i % 3, { value: random(-5, 5), opacity: random(-1, 2) }, 0.01);
+    changed = opacity.pointAdded(changed, { value: random(-5, 5), opacity: random() });
+    assert.equal(changed.length, 4);
+    assert.ok(opacity.readOpacity(opacity.writeOpacity(changed)), JSON.stringify(changed));
+    for (let k = 0; k < 9; ++k) changed = opacity.pointRemoved(changed, 0);
+    assert.equal(changed.length, 1);
+  }
+});
+
+test('a transfer table has rates and their integrals; what is hidden has none', () => {
+  const look = { values: [2, 4], opacity: [{ value: 2, opacity: 0 }, { value: 4, opacity: 0.5 }], colors: [[0, 0, 0], [1, 0.5, 0]], span: [2, 4] };
+  const [cells, table, half] = [opacity.kCells, opacity.transferTable(look, []), opacity.transferTable(look, [[2, 3]])];
+  const rate = (of, i) => [...of.subarray(4 * i, 4 * i + 4)];
+  const sum = (of, i) => rate(of, cells + 1 + i);
+  assertNear(rate(table, cells), [Math.log(2), Math.log(2) * 0.5 ** 2.2, 0, Math.log(2)]);
+  assertNear(rate(table, cells / 2), [0.5 ** 2.2, 0.25 ** 2.2, 0, 1].map((x) => -Math.log(0.75) * x));
+  // The integral of -log(1 - x / 2) from 0 to 1
+  assertNear(sum(table, cells)[3], 1 - Math.log(2));
+  assert.deepEqual([sum(half, cells / 2), rate(half, cells / 2), rate(half, cells)], [[0, 0, 0, 0], [0, 0, 0, 0], rate(table, cells)]);
 });
