@@ -227,6 +227,7 @@ class Viewer {
     result.set("pieces", pieces);
     result.set("removed", removed);
     result.set("isOtherMesh", is_other_mesh);
+    result.set("ranges", double(drawn_.size()));
     return result;
   }
 

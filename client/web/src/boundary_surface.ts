@@ -19,6 +19,7 @@ export class BoundarySurfaceView {
   readonly edges = new Scene();
   version = 0; // of what is shown; 0: nothing yet
   hasValues = false; // what is shown
+  ranges = 0; // that are shown; 0: nothing yet
   private pieces = new Map<number, PieceObjects>(); // shown, by id
   private pending: SurfaceChange[] = []; // oldest first
   private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
@@ -63,6 +64,7 @@ export class BoundarySurfaceView {
     this.uploaded = [];
     this.version = change.version;
     this.hasValues = change.hasValues;
+    this.ranges = change.ranges;
   }
 
   clear(): void {
@@ -70,7 +72,7 @@ export class BoundarySurfaceView {
     this.uploaded = [];
     this.pending = [];
     for (const id of this.pieces.keys()) this.remove(id);
-    this.version = 0;
+    this.version = this.ranges = 0;
     this.hasValues = false;
   }
 

@@ -128,6 +128,7 @@ export interface SurfacePiece {
 export interface SurfaceChange {
   version: number; // from 1
   hasValues: boolean; // all pieces have, also those from earlier changes
+  ranges: number; // how many are shown
   reset: number[]; // ranges: delete all their earlier pieces first
   pieces: SurfacePiece[];
   removed: number[]; // ids

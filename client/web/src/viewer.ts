@@ -59,9 +59,15 @@ export class Viewer {
     });
     this.picture.thickness.onMaximum = () => this.invalidate();
     view.watch([], () => {
-      this.picture.setStyles(view.value);
+      this.restyle();
       this.invalidate();
     });
+  }
+
+  // Once what is shown has as many ranges as the view: before, each would have the style of another one.
+  private restyle(): void {
+    const { ranges } = this.picture.surface;
+    if (ranges === 0 || ranges === Math.max(1, this.view.value.ranges.length)) this.picture.setStyles(this.view.value);
   }
 
   open(dataset: Dataset): void {
@@ -175,6 +181,7 @@ export class Viewer {
     if (surface.upload(frame)) {
       if (this.pendingCap && !uploader.hasBudget) return 0; // surface and cap together, in the next frame
       surface.swap();
+      this.restyle();
       this.picture.thickness.surfaceChanged();
       shown = surface.version;
       this.isDirty = true;

@@ -263,7 +263,7 @@ function postSurface(reset) {
   version++;
   if (wantsVolume) postVolume();
   const pieces = meshes.flatMap((mesh) => mesh.boundary());
-  post({ type: 'surface', change: { version, hasValues: wantsValues, reset: reset ? [0, 1, 2, 3] : [], pieces, removed: [] } });
+  post({ type: 'surface', change: { version, hasValues: wantsValues, ranges: meshes.length, reset: reset ? [0, 1, 2, 3] : [], pieces, removed: [] } });
   if (plane) postCap();
   if (box) postTets();
 }

@@ -1,6 +1,6 @@
 // The controls of the ranges, of one and of several, in a real browser with a fake worker.
 import assert from 'node:assert/strict';
-import { pixels, share } from './browser.mjs';
+import { decode, difference, pixels, share } from './browser.mjs';
 import { changesPicture, openPage, recordRequests, refined, settled, sharedPages, state } from './fake_server.mjs';
 
 const shared = sharedPages();
@@ -152,3 +152,19 @@ onPage('the address restores ranges with their colours; values span all of them'
   assert.deepEqual([(await state(other)).ranges, (await state(other)).range], [[], null], 'another data set has its own range');
   await other.context().close();
 }, kTwo);
+
+onPage('where one of several ranges is removed, the others keep their colours until they are drawn anew', async (page) => {
+  await settled(page);
+  const before = await pixels(page);
+  const photograph = () => page.evaluate(async () => {
+    document.querySelector('#range-remove').click();
+    return new Uint8Array(await (await window.intervale.photograph()).arrayBuffer()).reduce((text, byte) => text + String.fromCharCode(byte), '');
+  });
+  const atOnce = await decode(page, Buffer.from(await photograph(), 'latin1').toString('base64'));
+  assert.equal(difference(before, atOnce).share, 0);
+  assert.equal((await state(page)).ranges.length, 2);
+  for (const end = Date.now() + 15_000; share(await pixels(page), isOrange) > 0.001 && Date.now() < end; ) await settled(page);
+  const after = await pixels(page);
+  assert.equal(share(after, isOrange), 0, 'the first is gone');
+  assert.ok(share(after, isGreen) > 0.01, 'the second is still green');
+}, { ...kSmall, hash: `${kTwo.hash}&range=0,0.2,cc79a7,1` });
