@@ -27,7 +27,7 @@ interface Colors {
 
 export class VolumeControls {
   private strip = element('opacity');
-  private area = createSvg('path', { fill: 'url(#opacity-colors)' });
+  private area = createSvg('path', { fill: 'url(#opacity-colors)', stroke: 'none' });
   private line = createSvg('path', { class: 'line', 'vector-effect': 'non-scaling-stroke' });
   private gradient = createSvg('linearGradient', { id: 'opacity-colors', gradientUnits: 'userSpaceOnUse', y1: '0', y2: '0' });
   private points: HTMLElement[] = [];
