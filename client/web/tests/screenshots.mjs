@@ -22,6 +22,7 @@ const kPictures = {
   thickness: { hash: '#data=gyroid&show=thickness' },
   'thickness-clip': { hash: '#data=gyroid&show=thickness&clip=1,0,0,3', theme: 'light' },
   wire: { hash: '#data=gyroid&show=wireframe' },
+  volume: { hash: '#data=any&render=volume&opacity=0:0.02,0.8:0.1,1.5:0.6' },
   levels: { hash: '#data=gyroid&show=levels,wireframe' },
   ranges: { hash: '#data=any&range=-1.2,-0.6,e69f00,0.4&range=0.4,1.2,009e73,1' },
   lost: { hash: '#data=lost', isIncomplete: true },
