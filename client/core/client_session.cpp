@@ -159,6 +159,7 @@ Result<void> ClientSession::accept_answer(std::uint64_t epoch, bool may_follow_d
 Result<void> ClientSession::apply(const protocol::Batch& batch) {
   updates_ += batch.updates;
   stats_.updates += batch.updates;
+  if (updates_ > description_->updates) return violation("more updates than the data set has");
   if (!mesh_) return {};
   const auto start = Clock::now();
   const ShownFrom& shown = shown_in(batch.epoch);

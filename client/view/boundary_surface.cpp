@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <utility>
 
@@ -22,14 +21,6 @@ constexpr double kStepsCubed = double(FrontMesher::kSteps) * FrontMesher::kSteps
 
 constexpr int kCellsAcross = 8;  // pieces along the virtual grid's side, at most
 constexpr int kLeastCell = 16;   // samples
-
-// To 1e-5 (Abramowitz and Stegun 4.4.47), several times faster than std::atan2. y: above 0.
-double arc_tangent(double y, double x) {
-  const double along = std::abs(x), t = std::min(y, along) / std::max(y, along), s = t * t;
-  const double part = t * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))));
-  const double angle = y > along ? std::numbers::pi / 2 - part : part;
-  return x < 0 ? std::numbers::pi - angle : angle;
-}
 
 // Appends the edges of triangles, each once; returns how many.
 std::size_t add_edges(std::span<const std::uint32_t> triangles, std::vector<std::uint32_t>& edges) {
@@ -115,7 +106,7 @@ std::vector<std::uint8_t> BoundarySurface::find_changes() {
     items.resize(points);
   };
   grow(position_);
-  grow(surface_);
+  grow(kinds_);
   grow(normal_);
   grow(vertex_of_);
   parts_.resize(count);
@@ -136,9 +127,10 @@ std::vector<std::uint8_t> BoundarySurface::find_changes() {
     if (before != 0) mark_parents(i, changed, dirty);  // otherwise all are to be made
     points_.clear();
     mesher_.append_points(i, points_);
+    const bool is_border = is_at_border(i);
     for (const FrontMesher::Point& p : points_) {
       position_[p.id] = p.position;
-      surface_[p.id] = p.surface;
+      kinds_[p.id] = kinds_of(p, is_border);
     }
   }
   return dirty;
@@ -164,16 +156,22 @@ double BoundarySurface::volume_under(const std::vector<Triangle>& triangles) con
   return sum / 6;
 }
 
-// A bit for each kind of what the point lies on.
-unsigned BoundarySurface::kinds_of(PointId point) const {
+// A bit for each kind of what the point lies on. is_border: whether it may lie on the box.
+std::uint8_t BoundarySurface::kinds_of(const FrontMesher::Point& point, bool is_border) const {
+  unsigned kinds = point.surface == Surface::alpha ? 1u << kAlpha : point.surface == Surface::beta ? 1u << kBeta : 0;
+  if (!is_border) return std::uint8_t(kinds);
   const Vertex last = mesher_.state().domain.last();
   const std::array<std::int32_t, 3> far{last.x * FrontMesher::kSteps, last.y * FrontMesher::kSteps, last.z * FrontMesher::kSteps};
-  unsigned kinds = surface_[point] == Surface::alpha ? 1u << kAlpha : surface_[point] == Surface::beta ? 1u << kBeta : 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::int32_t at = position_[point][axis];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int32_t at = point.position[axis];
     kinds |= unsigned(at == 0) << (kBox + 2 * axis) | unsigned(at == far[axis]) << (kBox + 2 * axis + 1);
   }
-  return kinds;
+  return std::uint8_t(kinds);
+}
+
+Surface BoundarySurface::surface(PointId id) const {
+  const unsigned kinds = kinds_[id];
+  return (kinds >> kAlpha & 1) != 0 ? Surface::alpha : (kinds >> kBeta & 1) != 0 ? Surface::beta : Surface::inside;
 }
 
 bool BoundarySurface::is_at_border(std::size_t number) const {
@@ -188,12 +186,13 @@ void BoundarySurface::add_normals(const std::vector<Triangle>& triangles, int si
   const Affine& affine = mesher_.state().grid.affine;
   for (const Triangle& t : triangles) {
     if (t.kind >= kBox) continue;
-    std::array<Vec3, 3> corners;
-    for (std::size_t k = 0; k < 3; ++k) {
+    std::array<Vec3, 3> corners{};  // from the first one
+    const Position& first = position_[t.points[0]];
+    for (std::size_t k = 1; k < 3; ++k) {
       const Position& p = position_[t.points[k]];
-      corners[k] = affine.direction({double(p[0]), double(p[1]), double(p[2])});
+      corners[k] = affine.direction({double(p[0] - first[0]), double(p[1] - first[1]), double(p[2] - first[2])});
     }
-    const auto added = angle_weighted_normals(corners, arc_tangent);
+    const auto added = angle_weighted_normals(corners, quick_arc_tangent);
     for (std::size_t k = 0; k < 3; ++k)
       for (std::size_t i = 0; i < 3; ++i) normal_[t.points[k]][i] += sign * added[k][i];
   }
@@ -248,7 +247,7 @@ void BoundarySurface::add_box_faces(std::size_t number) {
   mesher_.append_tets(number, tets_);
   for (const Tet& tet : tets_) {
     std::array<unsigned, 4> kinds;
-    for (std::size_t k = 0; k < 4; ++k) kinds[k] = kinds_of(tet[k]);
+    for (std::size_t k = 0; k < 4; ++k) kinds[k] = kinds_[tet[k]];
     for (const auto& face : kTetFaces) {
       const unsigned common = kinds[face[0]] & kinds[face[1]] & kinds[face[2]];
       if (common < 1u << kBox || (common & (1u << kAlpha | 1u << kBeta)) != 0) continue;
@@ -275,7 +274,7 @@ SurfaceVertex BoundarySurface::vertex(PointId point, const Triangle& t) const {
     const double squared = dot(normal, normal);
     normal = scaled(squared > 0 ? 1 / std::sqrt(squared) : 0, normal);
   }
-  const auto coded = [](double c) { return std::int8_t(std::rint(127 * c)); };
+  const auto coded = [](double c) { return std::int8_t(nearest_int(127 * c)); };
   v.nx = coded(normal[0]);
   v.ny = coded(normal[1]);
   v.nz = coded(normal[2]);
@@ -304,13 +303,23 @@ void BoundarySurface::add_triangles(const std::vector<const Triangle*>& triangle
 }
 
 SurfacePiece BoundarySurface::piece(std::uint32_t id, bool edges) {
+  std::array<std::size_t, kKinds> counts{};
+  std::size_t triangles = 0;
+  for (const std::uint32_t number : members_[id]) {
+    triangles += parts_[number].triangles.size();
+    for (const Triangle& t : parts_[number].triangles) ++counts[t.kind];
+  }
   std::array<std::vector<const Triangle*>, kKinds> by_kind;
+  for (std::size_t kind = 0; kind < kKinds; ++kind) by_kind[kind].reserve(counts[kind]);
   for (const std::uint32_t number : members_[id]) {
     for (const Triangle& t : parts_[number].triangles) by_kind[t.kind].push_back(&t);
   }
   SurfacePiece piece;
   piece.id = id;
-  std::vector<PointId> points;  // of the vertices
+  std::vector<PointId> points;  // of the vertices: about one for two triangles
+  points.reserve(triangles);
+  piece.vertices.reserve(triangles);
+  piece.indices.reserve(3 * triangles);
   for (int kind = 0; kind < kKinds; ++kind) {
     const int group = std::min(kind, kBox);
     const std::size_t first = piece.indices.size();

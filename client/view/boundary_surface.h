@@ -67,7 +67,7 @@ class BoundarySurface {
   // What the mesh is made of, and its points.
   [[nodiscard]] const FrontMesher& mesher() const { return mesher_; }
   [[nodiscard]] const FrontMesher::Position& position(PointId id) const { return position_[id]; }
-  [[nodiscard]] Surface surface(PointId id) const { return surface_[id]; }
+  [[nodiscard]] Surface surface(PointId id) const;
 
  private:
   // What a triangle lies on: alpha, beta, or a side of the box: kBox + 2 * axis + (1 at the far side).
@@ -94,7 +94,7 @@ class BoundarySurface {
   void find_triangles(std::size_t number);
   void add_box_faces(std::size_t number);
   [[nodiscard]] double volume_under(const std::vector<Triangle>& triangles) const;
-  [[nodiscard]] unsigned kinds_of(PointId point) const;
+  [[nodiscard]] std::uint8_t kinds_of(const FrontMesher::Point& point, bool is_border) const;
   [[nodiscard]] bool is_at_border(std::size_t number) const;
   void add_normals(const std::vector<Triangle>& triangles, int sign);
   [[nodiscard]] bool is_empty(std::uint32_t piece) const;
@@ -107,7 +107,7 @@ class BoundarySurface {
   std::array<Vec3, 3> box_normals_;  // by axis, in the world: of the box's far side
   std::uint64_t point_generation_ = 0;
   std::vector<FrontMesher::Position> position_;      // by PointId
-  std::vector<Surface> surface_;                     // by PointId
+  std::vector<std::uint8_t> kinds_;                  // by PointId: what it lies on, a bit each
   std::vector<NormalSum> normal_;                    // by PointId: of the triangles of the point's own surface
   std::vector<std::uint32_t> vertex_of_;             // by PointId: its vertex in the piece being assembled, if that vertex has this id
   std::vector<Part> parts_;                          // by number of the supercube

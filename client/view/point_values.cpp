@@ -37,7 +37,8 @@ std::vector<float> point_values(const BoundarySurface& surface, const ChannelVal
   const FrontMesher& mesher = surface.mesher();
   const MeshChannel source = channel.for_mesh();
   const double least = channel.channel().components.front().format.least();
-  std::array<double, kMaxComponents> at_centre{}, at_vertex{};
+  std::array<double, kMaxComponents> components{};
+  const std::span<double> here = std::span(components).first(source.components);
   std::vector<float> values(mesher.state().points);
   std::vector<FrontMesher::Point> points;
   std::vector<FrontMesher::Ends> ends;
@@ -47,14 +48,8 @@ std::vector<float> point_values(const BoundarySurface& surface, const ChannelVal
     ends.clear();
     mesher.append_points(number, points, {}, &ends);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double share = double(ends[i].at) / FrontMesher::kSteps;
-      source.values_at(ends[i].centre, std::span(at_centre).first(source.components));
-      if (share != 0) source.values_at(ends[i].vertex, std::span(at_vertex).first(source.components));
-      double value = 0;
-      for (std::size_t c = 0; c < source.components; ++c) {
-        const double here = share == 0 ? at_centre[c] : at_centre[c] * (1 - share) + at_vertex[c] * share;
-        value = source.components == 1 ? here : std::hypot(value, here);
-      }
+      FrontMesher::set_values(source, ends[i], here);
+      const double value = source.components == 1 ? here[0] : std::hypot(here[0], here[1], here[2]);
       values[points[i].id] = std::isnan(value) ? rounded(least) : rounded(value);
     }
   }

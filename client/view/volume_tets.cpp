@@ -41,28 +41,39 @@ void VolumeTets::add(const BoundarySurface& surface, std::span<const float> valu
   }
 }
 
+// By how much farther each centre is than the first one. With p from the first centre to another one, and e from there to
+// the eye, |p - e| - |e| = (|p|^2 - 2 p e) / (|p - e| + |e|). Divided by |e| above and below, nothing overflows or cancels
+// however far the eye is.
 std::vector<std::uint32_t> VolumeTets::order(const Vec3& eye) const {
   constexpr std::size_t kBins = 65536;
+  if (centres_.empty()) return {};
+  const auto first = centres_.front();
   // In samples of the widest spacing, so that squares do not overflow.
-  const Vec3 from = affine_.inverse().point(eye), spacing = affine_.spacing();
-  const double unit = std::max({spacing[0], spacing[1], spacing[2]});
+  const Vec3 spacing = affine_.spacing(), to_eye = subtract(eye, affine_.point({first[0], first[1], first[2]}));
+  const double unit = std::max({spacing[0], spacing[1], spacing[2]}), reach = std::max(length(to_eye), unit);
   std::array<float, 9> to_world;
-  for (std::size_t j = 0; j < 3; ++j)
+  std::array<float, 3> e;
+  for (std::size_t j = 0; j < 3; ++j) {
+    e[j] = float(to_eye[j] / reach);
     for (std::size_t i = 0; i < 3; ++i) to_world[3 * j + i] = float(affine_.column(j)[i] / unit);
+  }
+  const float scale = float(unit / reach), e_length = std::sqrt(dot(e, e));  // scale: at most 1; 0 if the eye is very far
   std::vector<float> distances;
   distances.reserve(centres_.size());
-  float least = INFINITY, most = 0;
+  float least = INFINITY, most = -INFINITY;
   for (const auto& centre : centres_) {
-    const float x = float(centre[0] - from[0]), y = float(centre[1] - from[1]), z = float(centre[2] - from[2]);
-    const std::array<float, 3> d{to_world[0] * x + to_world[3] * y + to_world[6] * z, to_world[1] * x + to_world[4] * y + to_world[7] * z,
+    const float x = centre[0] - first[0], y = centre[1] - first[1], z = centre[2] - first[2];
+    const std::array<float, 3> p{to_world[0] * x + to_world[3] * y + to_world[6] * z, to_world[1] * x + to_world[4] * y + to_world[7] * z,
                                  to_world[2] * x + to_world[5] * y + to_world[8] * z};
-    distances.push_back(std::sqrt(dot(d, d)));
+    const std::array<float, 3> from_eye{p[0] * scale - e[0], p[1] * scale - e[1], p[2] * scale - e[2]};
+    const float sum = std::sqrt(dot(from_eye, from_eye)) + e_length;
+    distances.push_back(sum > 0 ? (dot(p, p) * scale - 2 * dot(p, e)) / sum : 0);
     least = std::min(least, distances.back());
     most = std::max(most, distances.back());
   }
   // A counting sort.
   const float bins = most > least ? float(kBins - 1) / (most - least) : 0;
-  const auto bin_of = [&](std::size_t tet) { return std::size_t((most - distances[tet]) * bins); };
+  const auto bin_of = [&](std::size_t tet) { return std::min(std::size_t((most - distances[tet]) * bins), kBins - 1); };
   std::vector<std::uint32_t> ends(kBins + 1), order(distances.size());
   for (std::size_t tet = 0; tet < order.size(); ++tet) ++ends[bin_of(tet) + 1];
   for (std::size_t bin = 1; bin < kBins; ++bin) ends[bin] += ends[bin - 1];

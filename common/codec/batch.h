@@ -25,9 +25,9 @@ namespace intervale {
 inline constexpr std::size_t kBatchUpdatesMost = 1 << 17;  // in one batch
 
 // Calls visit(group number, class) in the order in which updates are applied; stops when it returns false. key(g): of
-// group g.
+// group g. Inlined, so that a coder that visit() refers to may stay in registers.
 template <class Key, class Visit>
-void for_each_class(std::size_t groups, const Key& key, Visit&& visit) {
+[[gnu::always_inline]] inline void for_each_class(std::size_t groups, const Key& key, Visit&& visit) {
   for (std::size_t begin = 0, end = 0; begin < groups; begin = end) {
     const int scale = scale_of_key(key(begin));
     while (end < groups && scale_of_key(key(end)) == scale) ++end;
@@ -45,15 +45,19 @@ inline constexpr int kNearness = 8;
 [[nodiscard]] int nearness(const KeySides& sides, Refine refine, const VertexKeys& around, int vertices);
 // The same, from the span of those keys.
 [[nodiscard]] inline int nearness(const KeySides& sides, Refine refine, const KeySpan& span) {
+  const auto low = std::size_t(sides.side(span.least)), high = std::size_t(sides.side(span.greatest));
   constexpr std::int64_t kNone = std::int64_t(1) << 40;
   const std::array<std::int64_t, 4> bound{-kNone, std::int64_t(sides.first_inside()), std::int64_t(sides.first_above()), kNone};
-  const auto low = std::size_t(sides.side(span.least)), high = std::size_t(sides.side(span.greatest));
   // How many keys further one of the values would lie on another side.
   const std::int64_t distance = std::min(std::int64_t(span.least) + 1 - bound[low], bound[low + 1] - std::int64_t(span.greatest));
   const std::int64_t spread = std::int64_t(span.greatest) - std::int64_t(span.least) + 1;
-  int near = 1;
-  for (int octave = 1; octave < kNearness - 1; ++octave) near += int(8 * distance >= spread << octave);
-  return low != high || (refine == Refine::uniform && low == std::size_t(Side::inside)) ? 0 : near;
+  // The octaves by which eight times the distance exceeds the spread.
+  const int octaves = int(std::bit_width(std::uint64_t(8 * distance))) - int(std::bit_width(std::uint64_t(spread)));
+  const bool is_less = 8 * distance < spread << std::clamp(octaves, 0, kNearness - 1);
+  const int near = 1 + std::clamp(octaves - int(is_less), 0, kNearness - 2);
+  // Without a branch: whether a diamond is relevant is what the flag is for.
+  const bool is_relevant = low != high || (refine == Refine::uniform && low == std::size_t(Side::inside));
+  return near & (int(is_relevant) - 1);
 }
 
 // The ranges that flags are coded for: those of the view that a batch answers. A diamond is as near to them as to the

@@ -4,6 +4,10 @@
 
 namespace intervale {
 
+namespace {
+constexpr std::uint64_t kMostPerByte = 1 << 15;  // a block of 128 KiB that repeats one byte takes 4 bytes (RFC 8878, 3.1.1.2)
+}  // namespace
+
 void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> plane, int compression) {
   append_varint(out, plane.size());
   if (plane.empty()) return;
@@ -30,7 +34,7 @@ std::optional<std::vector<std::uint8_t>> take_plane(std::span<const std::uint8_t
   if (!size || *size > most) return {};
   if (*size == 0) return std::vector<std::uint8_t>();
   const auto stored = take_varint(bytes);
-  if (!stored || *stored > bytes.size() || *stored > *size) return {};
+  if (!stored || *stored > bytes.size() || *stored > *size || *size / kMostPerByte > *stored) return {};
   const auto from = bytes.first(*stored);
   bytes = bytes.subspan(*stored);
   if (*stored == *size) return std::vector<std::uint8_t>(from.begin(), from.end());

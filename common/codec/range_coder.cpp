@@ -2,24 +2,15 @@
 
 namespace intervale {
 
-std::vector<std::uint8_t> RangeEncoder::finish() {
-  // Some number in [low_, low_ + range_) whose lower half is 0.
-  const std::uint64_t rounded = low_ + 0xffffffffu;
-  if (rounded < low_) carry();
-  low_ = rounded;
-  shift();
-  return std::move(out_);
-}
-
-void RangeEncoder::carry() {
-  for (std::size_t i = out_.size(); i-- > 0 && ++out_[i] == 0;) {
+void RangeEncoder::carry(Bytes& out) {
+  for (std::size_t i = out.size(); i-- > 0 && ++out[i] == 0;) {
   }
 }
 
-void RangeEncoder::shift() {
-  for (int s = 56; s >= 32; s -= 8) out_.push_back(std::uint8_t(low_ >> s));
-  low_ <<= 32;
-  range_ <<= 32;
+void RangeEncoder::append(Bytes& out, std::uint32_t word) {
+  const std::size_t at = out.size();
+  out.resize(at + 4);
+  for (std::size_t i = 0; i < 4; ++i) out[at + i] = std::uint8_t(word >> (24 - 8 * i));
 }
 
 }  // namespace intervale

@@ -9,7 +9,9 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace intervale {
@@ -25,7 +27,14 @@ class BitModel {
     } else {
       zero_ = std::uint16_t(zero_ + ((65536 - zero_) * kRates[seen_] >> 16));
     }
-    seen_ = std::uint8_t(seen_ + unsigned(seen_ + 1u < kRates.size()));
+    seen_ = std::uint8_t(seen_ + unsigned(seen_ < kRates.size() - 1));
+  }
+  // The same without a branch.
+  void learn_even(bool bit) {
+    const std::uint32_t zeros = std::uint32_t(bit) - 1, zero = zero_;  // all bits set if the probability grows
+    const std::uint32_t change = ((zero ^ zeros) - zeros + (65536 & zeros)) * kRates[seen_] >> 16;
+    zero_ = std::uint16_t(zero - ((change ^ zeros) - zeros));
+    seen_ = std::uint8_t(seen_ + unsigned(seen_ < kRates.size() - 1));
   }
 
  private:
@@ -38,6 +47,8 @@ class BitModel {
   std::uint8_t seen_ = 0;
 };
 
+// A coder that is a local variable keeps its numbers in registers, as long as the compiler inlines what codes with it:
+// so no function gets its address.
 class RangeEncoder {
  public:
   bool bit(BitModel& model, bool value) {
@@ -46,24 +57,44 @@ class RangeEncoder {
     narrow(value ? split : 0, value ? range_ - split : split);
     return value;
   }
+  // The same without a branch: for a bit that is 0 about as often as 1, which no processor foresees.
+  bool even_bit(BitModel& model, bool value) {
+    const std::uint64_t split = (range_ >> 16) * model.of_zero(), ones = 0 - std::uint64_t(value);
+    model.learn_even(value);
+    narrow(split & ones, split + ((range_ - 2 * split) & ones));
+    return value;
+  }
   unsigned raw_bits(int count, unsigned value) {  // without a model, highest first
-    for (int i = count; i-- > 0;) narrow((value >> i & 1) != 0 ? range_ >> 1 : 0, (value >> i & 1) != 0 ? range_ - (range_ >> 1) : range_ >> 1);
+    for (int i = count; i-- > 0;) {
+      const std::uint64_t half = range_ >> 1, ones = 0 - std::uint64_t(value >> i & 1);
+      narrow(half & ones, half + (range_ & ones & 1));
+    }
     return value;
   }
   // Returns the bytes, a multiple of four. Call it once, last.
-  [[nodiscard]] std::vector<std::uint8_t> finish();
+  [[nodiscard]] std::vector<std::uint8_t> finish() {
+    // Some number in [low_, low_ + range_) whose lower half is 0.
+    const std::uint64_t rounded = low_ + 0xffffffffu;
+    if (rounded < low_) carry(*out_);
+    append(*out_, std::uint32_t(rounded >> 32));
+    return std::move(*out_);
+  }
 
  private:
+  using Bytes = std::vector<std::uint8_t>;
   void narrow(std::uint64_t from, std::uint64_t range) {
     low_ += from;
-    if (low_ < from) carry();
+    if (low_ < from) carry(*out_);
     range_ = range;
-    if (range_ >> 32 == 0) shift();
+    if (range_ >> 32 != 0) return;
+    append(*out_, std::uint32_t(low_ >> 32));
+    low_ <<= 32;
+    range_ <<= 32;
   }
-  void carry();
-  void shift();
+  static void carry(Bytes& out);
+  static void append(Bytes& out, std::uint32_t word);  // highest byte first
   std::uint64_t low_ = 0, range_ = ~std::uint64_t(0);  // range_ >= 2^32 between bits
-  std::vector<std::uint8_t> out_;
+  std::unique_ptr<Bytes> out_ = std::make_unique<Bytes>();
 };
 
 // Decodes bytes from outside: any bytes give some bits. Never reads beyond their end.
@@ -80,12 +111,21 @@ class RangeDecoder {
     narrow(value ? split : 0, value ? range_ - split : split);
     return value;
   }
+  bool even_bit(BitModel& model, bool = false) {
+    const std::uint64_t split = (range_ >> 16) * model.of_zero();
+    const bool value = code_ >= split;
+    const std::uint64_t ones = 0 - std::uint64_t(value);
+    model.learn_even(value);
+    narrow(split & ones, split + ((range_ - 2 * split) & ones));
+    return value;
+  }
   unsigned raw_bits(int count, unsigned = 0) {
     unsigned value = 0;
     for (; count > 0; --count) {
-      const std::uint64_t split = range_ >> 1;
-      const bool one = code_ >= split;
-      narrow(one ? split : 0, one ? range_ - split : split);
+      const std::uint64_t half = range_ >> 1;
+      const bool one = code_ >= half;
+      const std::uint64_t ones = 0 - std::uint64_t(one);
+      narrow(half & ones, half + (range_ & ones & 1));
       value = 2 * value + unsigned(one);
     }
     return value;

@@ -22,9 +22,10 @@ struct SignedModel {
   template <class Coder>
   std::int64_t code(Coder& coder, std::int64_t value = 0, std::uint8_t quarter = 0) {
     if (coder.bit(is_zero[quarter], value == 0)) return 0;
-    const bool negative = coder.bit(is_negative[quarter], value < 0);
-    const std::uint64_t size = std::uint64_t(negative ? -value : value);
-    const int length = int(std::bit_width(size)) - 1;  // below the highest bit
+    const bool negative = coder.even_bit(is_negative[quarter], value < 0);
+    const std::int64_t sign = -std::int64_t(negative);
+    const auto size = std::uint64_t((value ^ sign) - sign);  // without a branch
+    const int length = int(std::bit_width(size)) - 1;        // below the highest bit
     int n = 0;
     while (n < kLengths && coder.bit(longer[std::size_t(n)], n < length)) ++n;
     std::uint64_t number = 1;
@@ -34,7 +35,7 @@ struct SignedModel {
     } else {
       for (unsigned path = 0; left > 0 && left > n - 2;) {
         --left;
-        const bool bit = coder.bit(below[std::size_t(n)][path], (size >> left & 1) != 0);
+        const bool bit = coder.even_bit(below[std::size_t(n)][path], (size >> left & 1) != 0);
         path = 1 + unsigned(bit);
         number = 2 * number + unsigned(bit);
       }
@@ -44,7 +45,7 @@ struct SignedModel {
       left -= some;
       number = number << some | coder.raw_bits(some, unsigned(size >> left) & ((1u << some) - 1));
     }
-    return negative ? -std::int64_t(number) : std::int64_t(number);
+    return (std::int64_t(number) ^ sign) - sign;
   }
 };
 

@@ -8,8 +8,8 @@
 namespace intervale {
 namespace {
 
-constexpr unsigned kWidth = 8;   // bytes a value
-constexpr int kCompression = 9;  // zstd
+constexpr unsigned kWidth = 8;        // bytes a value
+constexpr int kTableCompression = 9;  // zstd
 constexpr std::uint64_t kSign = std::uint64_t(1) << 63;
 
 std::uint64_t order_number(double value) {
@@ -36,7 +36,7 @@ std::vector<std::uint8_t> encode_value_table(std::span<const double> table) {
     words.push_back(number - std::exchange(before, number));
   }
   std::vector<std::uint8_t> bytes;
-  append_plane(bytes, split_bytes(words, kWidth), kCompression);
+  append_plane(bytes, split_bytes(words, kWidth), kTableCompression);
   return bytes;
 }
 

@@ -11,6 +11,7 @@ struct Parents {
     int where = 0;
     Vertex to;                           // from the supercube's position, or from half of it for a coarser one
     std::uint64_t children = 0;          // slots of the supercube
+    std::uint64_t any_parent = 0;        // slots of the neighbour
     std::vector<std::uint64_t> parents;  // slots of the neighbour, for each of `children`
   };
   std::array<std::uint64_t, kSlots> here{};
@@ -28,10 +29,11 @@ Parents parents_of(const std::array<Links, kSlots>& links) {
   Parents all;
   all.here = parents[kHere];
   for (int where = 0; where < kCorner; ++where) {
-    Parents::Neighbour some{where, neighbour_at(where, 0, {}).position, 0, {}};
+    Parents::Neighbour some{where, neighbour_at(where, 0, {}).position, 0, 0, {}};
     for (Slot slot{0}; slot < kSlots && where != kHere; ++slot) {
       if (parents[std::size_t(where)][slot] == 0) continue;
       some.children |= std::uint64_t(1) << slot;
+      some.any_parent |= parents[std::size_t(where)][slot];
       some.parents.push_back(parents[std::size_t(where)][slot]);
     }
     if (some.children != 0) all.neighbours.push_back(std::move(some));
@@ -69,22 +71,28 @@ void AncestorInserter::add(const SetFinder::Found& here, std::uint64_t slots) {
   const int scale = scale_of_key(here.key);
   const Vertex position = position_of_key(here.key);
   const Parents& table = parents_of(position);
+  // Most parents are split by now, so those of the diamonds are looked at only if there is one that is not.
   const std::uint64_t unsplit = here.occupancy & ~split_.slots(here.first, here.occupancy);
-  for (const std::size_t cls : {2, 1}) {
-    for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[cls])) slots |= table.here[slot] & unsplit;
+  if ((unsplit & ~slots & ~kSlotsOfClass[2]) != 0) {
+    for (const std::size_t cls : {2, 1}) {
+      for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[cls])) slots |= table.here[slot] & unsplit;
+    }
   }
   SetFinder& finder = finders_[std::size_t(scale)];
   for (const Parents::Neighbour& n : table.neighbours) {
-    std::uint64_t parents = 0;
-    for (const Slot slot : set_bits<Slot>(slots & n.children)) parents |= n.parents[std::size_t(count_below(n.children, slot))];
-    if (parents == 0) continue;
+    const std::uint64_t children = slots & n.children;
+    if (children == 0) continue;
     const int up = n.where < kCoarser ? 0 : 1;
     const SupercubePlace place{scale + up, {(position.x >> up) + n.to.x, (position.y >> up) + n.to.y, (position.z >> up) + n.to.z}};
     if (!place.exists()) continue;
     finder.move_to(scale, position);  // a neighbour's ancestors may have moved it
     const SetFinder::Found found = finder.find(n.where, place);
-    parents &= found.occupancy;
-    if (parents != 0) parents &= ~split_.slots(found.first, found.occupancy);
+    if ((found.occupancy & n.any_parent) == 0) continue;
+    const std::uint64_t candidates = found.occupancy & n.any_parent & ~split_.slots(found.first, found.occupancy);
+    if (candidates == 0) continue;
+    std::uint64_t parents = 0;
+    for (const Slot slot : set_bits<Slot>(children)) parents |= n.parents[std::size_t(count_below(n.children, slot))];
+    parents &= candidates;
     if (parents != 0) add(found, parents);
   }
   split_.insert(here.first, here.occupancy, slots);

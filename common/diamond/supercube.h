@@ -155,6 +155,10 @@ class SupercubeSet {
       for (int cls = 2; cls >= 0; --cls) for_each(scale, cls, visit);
     }
   }
+  // The number of a brick's diamonds.
+  [[nodiscard]] unsigned updates(BrickIndex brick) const {
+    return (brick + 1 < bricks_.size() ? std::uint32_t(bricks_[brick + 1].first) : size_) - bricks_[brick].first;
+  }
   // The number of a supercube's first diamond.
   [[nodiscard]] UpdateIndex first(BrickIndex brick, SupercubeIndex supercube) const { return bricks_[brick].first + first_in_brick_[supercube]; }
   [[nodiscard]] Place place_in(BrickIndex brick, SupercubeIndex supercube, SupercubeKey key, Slot slot) const {

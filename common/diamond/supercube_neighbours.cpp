@@ -135,17 +135,11 @@ BrickIndex& SetFinder::brick_at(int where, Vertex at) {
 }
 
 SetFinder::Found SetFinder::find(int where, const SupercubePlace& place) {
-  const Vertex p = place.position, at{p.x >> 2, p.y >> 2, p.z >> 2};
+  const Vertex at{place.position.x >> 2, place.position.y >> 2, place.position.z >> 2};
   BrickIndex looked_up = kUnknown;  // bricks around a corner are not kept
   BrickIndex& brick = where >= kCorner && where < kFiner ? looked_up : brick_at(where, at);
   if (brick == kUnknown) brick = set_.find_brick(place.scale, at).value_or(kNone);
-  if (brick == kNone) return none();
-  constexpr std::array<std::uint8_t, 4> kSpread{0, 1, 8, 9};
-  const unsigned bit = kSpread[std::size_t(p.x & 3)] | unsigned(kSpread[std::size_t(p.y & 3)]) << 1 | unsigned(kSpread[std::size_t(p.z & 3)]) << 2;
-  const SupercubeSet::Brick& b = set_.bricks()[brick];
-  if (!(b.mask >> bit & 1)) return none();
-  const SupercubeIndex s = b.first_supercube + count_below(b.mask, int(bit));
-  return {b.key + bit, set_.occupancy()[s], brick, s, set_.first(brick, s)};
+  return brick == kNone ? none() : find_in(brick, place.position);
 }
 
 }  // namespace intervale

@@ -181,6 +181,15 @@ class SetFinder {
   void move_to(int scale, Vertex position);
   [[nodiscard]] Found find(int where, const SupercubePlace& place);
   [[nodiscard]] static Found none() { return {}; }
+  // The supercube at a position in a brick of the set.
+  [[nodiscard]] Found find_in(BrickIndex brick, Vertex p) const {
+    constexpr std::array<std::uint8_t, 4> kSpread{0, 1, 8, 9};
+    const unsigned bit = kSpread[std::size_t(p.x & 3)] | unsigned(kSpread[std::size_t(p.y & 3)]) << 1 | unsigned(kSpread[std::size_t(p.z & 3)]) << 2;
+    const SupercubeSet::Brick& b = set_.bricks()[brick];
+    if (!(b.mask >> bit & 1)) return none();
+    const SupercubeIndex s = b.first_supercube + count_below(b.mask, int(bit));
+    return {b.key + bit, set_.occupancy()[s], brick, s, set_.first(brick, s)};
+  }
 
  private:
   static constexpr BrickIndex kUnknown{~std::uint32_t(0)}, kNone{kUnknown - 1};

@@ -13,8 +13,6 @@ namespace {
 
 using Block = FrontState::Block;
 
-constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
-
 // Removes a split that is not shown.
 void remove_split(FrontState& state, Block& block, Slot slot) {
   state.values.withheld -= block.is_counting(slot);

@@ -11,7 +11,6 @@
 
 #include "common/front/front.h"
 #include "common/front/front_mesher.h"
-#include "common/patch/channel.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -162,15 +161,9 @@ class FrontMesh {
   }
 
   void place_channels(const FrontMesher::Ends& ends, std::size_t point, Mesh& mesh) const {
-    std::array<double, kMaxComponents> centre{}, vertex{};
     for (std::size_t i = 0; i < channels_.size(); ++i) {
       const std::size_t n = channels_[i].components;
-      channels_[i].values_at(ends.centre, std::span(centre).first(n));
-      if (ends.at != 0) channels_[i].values_at(ends.vertex, std::span(vertex).first(n));
-      const double share = double(ends.at) / FrontMesher::kSteps;
-      for (std::size_t c = 0; c < n; ++c) {
-        mesh.channels[i].value[point * n + c] = ends.at == 0 ? centre[c] : centre[c] * (1 - share) + vertex[c] * share;
-      }
+      FrontMesher::set_values(channels_[i], ends, std::span(mesh.channels[i].value).subspan(point * n, n));
     }
   }
 

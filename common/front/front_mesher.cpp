@@ -3,7 +3,9 @@
 #include <bit>
 #include <memory>
 
+#include "common/front/front.h"
 #include "common/front/shown_splits.h"
+#include "common/patch/channel.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -26,6 +28,15 @@ struct OwnIds {  // numbers points by their ids
 };
 
 }  // namespace
+
+void FrontMesher::set_values(const MeshChannel& channel, const Ends& ends, std::span<double> values) {
+  channel.values_at(ends.centre, values);
+  if (ends.at == 0) return;
+  std::array<double, kMaxComponents> far{};
+  channel.values_at(ends.vertex, std::span(far).first(values.size()));
+  const double share = double(ends.at) / kSteps;
+  for (std::size_t c = 0; c < values.size(); ++c) values[c] = values[c] * (1 - share) + far[c] * share;
+}
 
 FrontMesher::Corners FrontMesher::corners_of(const TetShape& s) {
   Corners corners;
@@ -251,6 +262,21 @@ void FrontMesher::visit_halves(FrontCursor& cursor, unsigned children, const Vis
   }
 }
 
+// Those of the children that get a half with vertices on different sides, a bit each.
+unsigned FrontMesher::children_with_mixed_halves(FrontCursor& cursor, unsigned children) {
+  const FrontState::Split split = cursor.here().split_at(cursor.slot());
+  const DiamondType& row = *cursor.context().row;
+  const Ring ring(cursor.context().sides | std::uint32_t(split.side()) << (2 * kCentre), row.belt);
+  unsigned mixed = 0;
+  for (const int k : set_bits(children)) {
+    for (const Duet::Half& half : row.child[k].half) {
+      const unsigned sides = ring.half(half.tet, half.end);
+      mixed |= unsigned(sides != (sides & 3) * 0x55) << k;  // of a half that does not exist, perhaps needlessly
+    }
+  }
+  return mixed;
+}
+
 bool FrontMesher::can_change(FrontCursor& cursor, Vertex centre) {
   const Diamond d(centre);
   const int up = d.scale + 2;
@@ -299,10 +325,12 @@ void FrontMesher::append_faces(std::size_t number, std::vector<Face>& faces) con
     });
     return;
   }
-  // What does not count lies on one side.
+  // What does not count lies on one side. Of what does, only halves with vertices on different sides have faces.
   visit_splits(number, block(number).shown & block(number).counts, [&](FrontCursor& cursor, unsigned children) {
+    const unsigned mixed = children_with_mixed_halves(cursor, children);
+    if (mixed == 0) return;
     gather_points_with_centre(cursor, OwnIds(), points);
-    visit_halves(cursor, children, [&](Duet::Half, const TetShape& shape, const Corners& corners, std::uint32_t sides, bool has_patch) {
+    visit_halves(cursor, mixed, [&](Duet::Half, const TetShape& shape, const Corners& corners, std::uint32_t sides, bool has_patch) {
       if (has_patch) append_patch_faces(shape, corners, sides, points, faces);
     });
   });

@@ -19,6 +19,8 @@
 
 namespace intervale {
 
+struct MeshChannel;
+
 class FrontMesher {
  public:
   // Which must outlive it, and may change between calls
@@ -41,6 +43,8 @@ class FrontMesher {
     Vertex centre, vertex;
     std::int32_t at = 0;
   };
+  // Sets the channel's values at a point: as many as it has components, linear between the ends of the point's edge.
+  static void set_values(const MeshChannel& channel, const Ends& ends, std::span<double> values);
   struct Run {  // points with the ids [first, first + count)
     PointId first = 0;
     std::uint32_t count = 0;
@@ -107,6 +111,7 @@ class FrontMesher {
   static void gather_points_with_centre(FrontCursor& cursor, const Numbers& numbers, PointsAround& points);
   template <class Visit>
   void visit_halves(FrontCursor& cursor, unsigned children, const Visit& visit) const;
+  [[nodiscard]] static unsigned children_with_mixed_halves(FrontCursor& cursor, unsigned children);
   [[nodiscard]] Tet* make_room(Tets& tets) const;
   Tet* place_patch(Tet* to, const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points) const;
   void append_patch_faces(const TetShape& shape, const Corners& corners, std::uint32_t sides, const PointsAround& points,

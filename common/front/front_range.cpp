@@ -23,8 +23,6 @@ using Split = FrontState::Split;
 
 constexpr std::size_t kPiece = 32;  // supercubes
 
-constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
-
 // Makes what is shown of a front from its splits and their keys, whatever was shown before.
 class Reclassification {
  public:

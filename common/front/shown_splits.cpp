@@ -12,8 +12,6 @@ namespace {
 using Block = FrontState::Block;
 using Split = FrontState::Split;
 
-constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
-
 }  // namespace
 
 bool counts(const KeySides& sides, const KeySpan& around, Side centre, Refine refine) {

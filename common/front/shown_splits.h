@@ -13,6 +13,9 @@
 
 namespace intervale {
 
+// A slot's bit in the words of a supercube.
+constexpr std::uint64_t bit(Slot slot) { return std::uint64_t(1) << slot; }
+
 // Whether a diamond counts for a range. context: of the diamond, with its sides; centre: the side of its centre.
 [[nodiscard]] bool counts(const DiamondContext& context, Side centre, Refine refine);
 // The same, from the span of the keys at its vertices.

@@ -30,14 +30,12 @@ class BatchEncoder {
     first_.reserve(groups.size());
     candidates_.reserve(16 * groups.size());  // about as many as there are
     for (const SlotGroup& g : groups) {
-      lattice.move_to(g.key);
+      lattice.move_to(g);
       ready_.push_back(lattice.splittable(kAllSlots & (~split.slots(set.first(g.brick, g.supercube), set.occupancy()[g.supercube]) | g.slots)));
       first_.push_back(candidates_.size());
-      candidates_.resize(candidates_.size() + std::size_t(std::popcount(ready_.back())));
-      Candidate* c = candidates_.data() + first_.back();
-      c = add<0>(lattice, g, c);
-      c = add<1>(lattice, g, c);
-      add<2>(lattice, g, c);
+      add<0>(lattice, g);
+      add<1>(lattice, g);
+      add<2>(lattice, g);
     }
   }
 
@@ -49,9 +47,9 @@ class BatchEncoder {
   }
 
  private:
-  // Sets the candidates of a class of the last group, from `c` on. Returns the end of those.
+  // Adds the candidates of a class of the last group.
   template <int Class>
-  Candidate* add(const SplitLattice& lattice, const SlotGroup& g, Candidate* c) {
+  void add(const SplitLattice& lattice, const SlotGroup& g) {
     const Description& d = volume_.description();
     const PredictorWeights& weights = d.weights.of[std::size_t(scale_of_key(g.key))][Class];
     const std::uint64_t occupancy = volume_.set().occupancy()[g.supercube];
@@ -59,15 +57,15 @@ class BatchEncoder {
     VertexKeys around;
     for (const Slot slot : set_bits<Slot>(ready_.back() & kSlotsOfClass[Class])) {
       const KeySpan span = lattice.gather<Class>(slot, around);
-      c->near = std::uint8_t(ranges_.nearness(span));
+      Candidate c;
+      c.near = std::uint8_t(ranges_.nearness(span));
       if ((g.slots >> slot & 1) != 0) {
         ++updates_;
-        c->key = volume_.key(first + count_below(occupancy, slot));
-        c->predicted = predict_value<Class>(around, span, weights, d.format.last);
+        c.key = volume_.key(first + count_below(occupancy, slot));
+        c.predicted = predict_value<Class>(around, span, weights, d.format.last);
       }
-      ++c;
+      candidates_.push_back(c);
     }
-    return c;
   }
 
   [[nodiscard]] std::vector<std::uint8_t> coded(bool is_plain) const {

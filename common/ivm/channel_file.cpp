@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "common/codec/coding_rate.h"
 #include "common/diamond/domain.h"
 #include "common/ivm/paged_values.h"
 #include "common/ivm/value_streams.h"
@@ -107,8 +108,9 @@ Result<StoredChannels> read_channels(const Container& file, const Grid& grid, co
     for (std::size_t c = 0; c < *components; ++c) {
       auto component = take_component(bytes, levels);
       if (!component) return tl::unexpected(component.error());
-      if (set.size() / kValuesPerByte > pages.size()) return fail("the file claims more values than it can hold");
-      ValueKeys& to = keys.emplace_back(set.size(), component->format.last);
+      if (set.size() > most_coded_bits(pages.size())) return fail("the file claims more values than it can hold");
+      ValueKeys& to = keys.emplace_back(0, component->format.last);
+      file.claim(set.size() * std::uint64_t(to.width()));
       if (auto ok = take_pages(bytes, pages, {grid, set, *component, to}, parallel); !ok) return tl::unexpected(ok.error());
       channel.components.push_back(std::move(*component));
     }

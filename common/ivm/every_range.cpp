@@ -89,8 +89,9 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   parts.statistics = std::make_shared<const FieldStatistics>(std::move(values.description.statistics));
   parts.set = std::move(values.set);
   parts.keys = std::move(values.keys);
-  auto made = IntervalVolume::assemble(std::move(parts), parallel);
+  auto made = IntervalVolume::assemble(std::move(parts));
   if (!made) return made;
+  (void)made->bounds(parallel);  // whoever asks for a range first would wait for them
   if (auto ok = made->set_channels(std::move(values.description.channels), std::move(values.channel_keys)); !ok) return tl::unexpected(ok.error());
   return made;
 }

@@ -1,13 +1,23 @@
 #include "common/ivm/interval_volume.h"
 
 #include <algorithm>
+#include <atomic>
+#include <cassert>
 #include <cmath>
+#include <mutex>
 
+#include "common/ivm/paged_values.h"
 #include "common/ivm/value_bounds.h"
 
 namespace intervale {
 
-IntervalVolume::IntervalVolume(Parts parts, std::shared_ptr<const ValueBounds> bounds)
+struct IntervalVolume::LazyBounds {
+  std::mutex finding;
+  std::optional<ValueBounds> found;
+  std::atomic<std::size_t> bytes = 0;  // of what was found
+};
+
+IntervalVolume::IntervalVolume(Parts parts)
     : description_(std::move(parts.description)),
       domain_(description_.grid.dims),
       set_(std::move(parts.set)),
@@ -15,10 +25,10 @@ IntervalVolume::IntervalVolume(Parts parts, std::shared_ptr<const ValueBounds> b
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
       relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, {}, std::move(parts.error_to_distance)),
-      bounds_(std::move(bounds)),
+      bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
 
-Result<IntervalVolume> IntervalVolume::assemble(Parts parts, const ParallelFor& parallel) {
+Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
   if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.error_to_distance.size() != parts.set.supercubes())
@@ -40,9 +50,14 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts, const ParallelFor& 
     if (parts.keys[i] > d.format.last) return fail("an update's value is out of range");
   }
   parts.description.updates = parts.set.size();
-  std::shared_ptr<const ValueBounds> bounds;
-  if (d.refine == Refine::uniform) bounds = std::make_shared<const ValueBounds>(parts, parallel);
-  return IntervalVolume(std::move(parts), std::move(bounds));
+  return IntervalVolume(std::move(parts));
+}
+
+const ValueBounds& IntervalVolume::bounds(const ParallelFor& parallel) const {
+  assert(description_.refine == Refine::uniform && "it has other ranges");
+  const std::lock_guard lock(bounds_->finding);
+  if (!bounds_->found) bounds_->bytes = bounds_->found.emplace(PagedValues(*this), parallel).memory_bytes();
+  return *bounds_->found;
 }
 
 Result<void> IntervalVolume::set_channels(std::vector<Channel> channels, std::vector<ChannelKeys> keys) {
@@ -67,8 +82,7 @@ std::size_t IntervalVolume::memory_bytes() const {
     for (const ValueKeys& keys : channel) of_channels += keys.memory_bytes();
   }
   return of_channels + sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
-         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + (bounds_ ? bounds_->memory_bytes() : 0) +
-         (statistics_ ? statistics_->memory_bytes() : 0);
+         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + bounds_->bytes + (statistics_ ? statistics_->memory_bytes() : 0);
 }
 
 }  // namespace intervale

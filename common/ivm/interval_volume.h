@@ -43,7 +43,7 @@ class IntervalVolume {
     std::shared_ptr<const FieldStatistics> statistics = {};
   };
   // Fails where sizes or ranges of the parts do not match; validate() checks the meaning.
-  static Result<IntervalVolume> assemble(Parts parts, const ParallelFor& parallel = serial);
+  static Result<IntervalVolume> assemble(Parts parts);
 
   [[nodiscard]] const Description& description() const { return description_; }
   [[nodiscard]] const Domain& domain() const { return domain_; }
@@ -59,8 +59,9 @@ class IntervalVolume {
   [[nodiscard]] const ValueKeys& keys() const { return keys_; }
   // What the range of the description needs: all updates.
   [[nodiscard]] const RelevantUpdates& relevant() const { return relevant_; }
-  // Null if it was not refined uniformly: then it has no other ranges.
-  [[nodiscard]] const ValueBounds* bounds() const { return bounds_.get(); }
+  // For other ranges than its own; it must have been refined uniformly. The first call finds them, in O(updates);
+  // calls meanwhile wait for it. Any thread.
+  [[nodiscard]] const ValueBounds& bounds(const ParallelFor& parallel = serial) const;
   // Null: a data set of one range has none.
   [[nodiscard]] const FieldStatistics* statistics() const { return statistics_.get(); }
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -71,7 +72,8 @@ class IntervalVolume {
   [[nodiscard]] Result<void> set_channels(std::vector<Channel> channels, std::vector<ChannelKeys> keys);
 
  private:
-  IntervalVolume(Parts parts, std::shared_ptr<const ValueBounds> bounds);
+  struct LazyBounds;
+  explicit IntervalVolume(Parts parts);
   Description description_;
   Domain domain_;
   SupercubeSet set_;
@@ -79,7 +81,7 @@ class IntervalVolume {
   std::vector<std::uint8_t> steps_;
   std::vector<float> error_steps_;
   RelevantUpdates relevant_;
-  std::shared_ptr<const ValueBounds> bounds_;
+  std::shared_ptr<LazyBounds> bounds_;  // not null; of all copies
   std::shared_ptr<const FieldStatistics> statistics_;
   std::vector<ChannelKeys> channel_keys_;
 };

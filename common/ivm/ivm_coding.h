@@ -9,19 +9,23 @@
 
 #include "common/codec/range_coder.h"
 #include "common/ivm/interval_volume.h"
+#include "common/util/parallel.h"
 
 namespace intervale {
 
+inline bool is_overdrawn(const RangeDecoder& coder) { return coder.is_overdrawn(); }
+inline bool is_overdrawn(const RangeEncoder&) { return false; }
+
 // Error steps, by update, from fine to coarse: an error is no smaller than its children's, and often equal to the
 // largest of them. Coder is a RangeEncoder, which writes `steps`, each below kMaxErrorSteps; or a RangeDecoder, which
-// fills it.
+// fills it. `parallel` may stop it. False if what was decoded is more than the bytes hold.
 template <class Coder>
-void code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> steps) {
+bool code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> steps, const ParallelFor& parallel) {
   std::array<std::array<NumberModel<8>, 2>, 3> without_children;
   std::array<std::array<SmallNumberModel, 2>, 3> above_children;
   std::vector<std::uint16_t> least(set.size());  // the largest step of a child plus 1; 0 without children
   static_assert(kMaxErrorSteps == 256);
-  set.for_each_up([&](const Place& p) {
+  const auto visit = [&](const Place& p) {
     const int cls = class_of_slot(p.slot), finest = scale_of_key(p.key) == 0;
     std::uint8_t& step = steps[p.index];
     const unsigned from = least[p.index];
@@ -31,7 +35,18 @@ void code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint
       step = std::uint8_t(from - 1 + above_children[cls][finest].code(coder, (step - from + 1) & 255u));
     }
     for_each_parent(set, p, [&](UpdateIndex parent) { least[parent] = std::max(least[parent], std::uint16_t(step + 1)); });
-  });
+  };
+  for (int scale = 0; scale < kMaxLevels; ++scale) {
+    const auto [begin, end] = set.of_scale(scale);
+    for (int cls = 2; cls >= 0; --cls) {
+      for (BrickIndex brick = begin; brick < end; ++brick) {
+        may_stop(parallel);
+        set.for_each_in_brick(brick, kSlotsOfClass[std::size_t(cls)], visit);
+        if (is_overdrawn(coder)) return false;
+      }
+    }
+  }
+  return true;
 }
 
 }  // namespace intervale

@@ -34,6 +34,7 @@ struct Entry {
   std::uint64_t checksum;  // XXH3 of its bytes; 0 for the pages, each of which has its own
 };
 static_assert(sizeof(Header) == 40 && sizeof(Entry) == 32, "no padding");
+constexpr std::uint64_t kReadBytes = 4 << 20;  // at a time
 constexpr std::size_t kMostHeadBytes = sizeof(Header) + kMaxStreams * sizeof(Entry);
 
 constexpr std::uint32_t bit_of(StreamType type) { return std::uint32_t(1) << std::uint32_t(type); }
@@ -145,7 +146,7 @@ Result<std::vector<std::byte>> read_start(std::ifstream& in, std::uint64_t& byte
   return start;
 }
 
-Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std::optional<FileScope> scope) {
+Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std::optional<FileScope> scope, const ParallelFor& parallel) {
   std::error_code code;
   if (std::filesystem::is_directory(path, code)) return fail("is a folder, not an interval volume file (.ivm)");
   std::ifstream in(path, std::ios::binary | std::ios::ate);
@@ -154,10 +155,14 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
   auto bytes = read_start(in, size);
   if (!bytes) return bytes;
   if (auto head = read_head(*bytes, size, scope); !head) return tl::unexpected(head.error());
-  const std::size_t read = bytes->size();
-  bytes->resize(std::size_t(size));
-  in.read(reinterpret_cast<char*>(bytes->data() + read), std::streamsize(bytes->size() - read));
-  if (!in) return fail("could not be read to its end");
+  bytes->reserve(std::size_t(size));  // takes memory only as it is filled
+  while (bytes->size() < size) {
+    may_stop(parallel);
+    const std::size_t read = bytes->size();
+    bytes->resize(std::size_t(std::min<std::uint64_t>(size, read + kReadBytes)));
+    in.read(reinterpret_cast<char*>(bytes->data() + read), std::streamsize(bytes->size() - read));
+    if (!in) return fail("could not be read to its end");
+  }
   return bytes;
 }
 
@@ -194,13 +199,19 @@ std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
   return file;
 }
 
-Result<Container> Container::open(std::span<const std::byte> file, FileScope scope) {
+void Container::claim(std::uint64_t bytes) const {
+  if (bytes > room_) throw NoRoom();
+  if (room_ != kAnyRoom) room_ -= bytes;
+}
+
+Result<Container> Container::open(std::span<const std::byte> file, FileScope scope, std::uint64_t room) {
   const auto head = read_head(file, file.size(), scope);
   if (!head) return tl::unexpected(head.error());
   if (head->header.content_hash != hash_of_contents(head->entries)) return fail("the header is damaged (content hash)");
   Container container;
   container.content_hash_ = head->header.content_hash;
   container.file_bytes_ = file.size();
+  container.room_ = room;
   for (const Entry& e : head->entries) {
     const auto bytes = file.subspan(e.offset, e.bytes);
     const bool is_pages = StreamType(e.type) == StreamType::pages;
@@ -236,8 +247,8 @@ std::optional<FileScope> scope_of(const std::filesystem::path& path) {
   return head->scope();
 }
 
-Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<FileScope> scope) {
-  auto bytes = read_bytes(path, scope);
+Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<FileScope> scope, const ParallelFor& parallel) {
+  auto bytes = read_bytes(path, scope, parallel);
   if (!bytes) return fail(path.string() + ": " + bytes.error().message);
   return bytes;
 }

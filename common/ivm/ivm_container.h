@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <new>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "common/util/parallel.h"
 #include "common/util/result.h"
 
 namespace intervale {
@@ -43,6 +45,12 @@ inline constexpr std::uint32_t kStreamTypes = 18;  // and one more, as 0 is none
 
 enum class FileScope { every_range, one_range };  // of which ranges a data set is
 
+// Thrown where contents would take more memory than there is room for.
+struct NoRoom : std::bad_alloc {
+  [[nodiscard]] const char* what() const noexcept override { return "takes more memory than is left"; }
+};
+inline constexpr std::uint64_t kAnyRoom = ~std::uint64_t(0);  // as much as the system has
+
 // The streams of a file, by type. A scope has some of the types; the others are empty.
 class Streams {
  public:
@@ -72,8 +80,12 @@ void append(std::vector<std::byte>& out, std::span<const T> values) {
 // reads them must check. value_table and the streams of channels are empty if the file has none.
 class Container {
  public:
-  // The file must outlive the result. Fails, in one line, if it is not a file of this scope.
-  static Result<Container> open(std::span<const std::byte> file, FileScope scope);
+  // The file must outlive the result. Fails, in one line, if it is not a file of this scope. room: of bytes, for claim().
+  static Result<Container> open(std::span<const std::byte> file, FileScope scope, std::uint64_t room = kAnyRoom);
+
+  // What will be allocated for its contents, at most: throws NoRoom if all claims exceed the room. Called before anything
+  // is allocated.
+  void claim(std::uint64_t bytes) const;
 
   [[nodiscard]] std::uint64_t content_hash() const { return content_hash_; }  // Description::content_hash: that of the header, and of channels
   [[nodiscard]] std::size_t file_bytes() const { return file_bytes_; }
@@ -85,6 +97,7 @@ class Container {
  private:
   std::uint64_t content_hash_ = 0;
   std::size_t file_bytes_ = 0;
+  mutable std::uint64_t room_ = kAnyRoom;  // that is left
   std::array<std::span<const std::byte>, kStreamTypes> streams_;
 };
 
@@ -96,8 +109,9 @@ class Container {
 [[nodiscard]] std::optional<FileScope> scope_of(std::span<const std::byte> file);
 
 // The bytes of a file, for Container::open. Checks the header, the scope if one is given, and the length first, and
-// allocates nothing for another file. Errors begin with the path.
-[[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<FileScope> scope);
+// allocates nothing for another file. Errors begin with the path. `parallel` may stop it.
+[[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<FileScope> scope,
+                                                            const ParallelFor& parallel = serial);
 
 // Writes a temporary file and renames it. Errors name the path.
 [[nodiscard]] Result<void> save_container(const std::filesystem::path& path, std::span<const std::byte> bytes);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/codec/byte_planes.h"
+#include "common/codec/coding_rate.h"
 #include "common/ivm/channel_file.h"
 #include "common/ivm/ivm_coding.h"
 #include "common/ivm/value_streams.h"
@@ -67,7 +68,7 @@ constexpr std::array kCompressed{StreamType::bricks, StreamType::masks, StreamTy
 std::vector<std::uint8_t> coded_error_steps(const IntervalVolume& volume) {
   std::vector<std::uint8_t> steps(volume.steps().begin(), volume.steps().end());
   RangeEncoder coder;
-  code_error_steps(coder, volume.set(), steps);
+  (void)code_error_steps(coder, volume.set(), steps, serial);
   return coder.finish();
 }
 
@@ -101,10 +102,13 @@ Result<RangeRecord> read_range(const Container& file, Description& d) {
   if (r.refine > 1) return fail("the refinement mode is unknown");
   if (!(r.alpha <= r.beta)) return fail("invalid range: alpha is greater than beta");
   if (r.errors > std::uint32_t(kMaxErrorSteps)) return fail("the number of errors is out of range");
-  if (r.updates / kValuesPerByte > file.file_bytes()) return fail("the file claims more values than it can hold");
+  if (r.updates > most_coded_bits(std::min(file[StreamType::pages].size(), file[StreamType::error_steps].size())))
+    return fail("the file claims more values than it can hold");
   if (r.updates > std::numeric_limits<std::uint32_t>::max()) return fail("more updates than this program can read");
   if (r.bricks > r.supercubes || r.supercubes > r.updates || r.updates > r.supercubes * kSlots || r.coefficients > r.updates * kMostCuts)
     return fail("the counts contradict each other");
+  // An update's key, its bounds, its error step and what that is decoded with; what makes the set, and its supercubes.
+  file.claim(r.updates * (3 * ValueKeys(0, d.format.last).width() + 3) + r.supercubes * 56 + r.bricks * 128);
   d.refine = Refine(r.refine);
   d.range = {r.alpha, r.beta};
   d.coefficients = r.coefficients;
@@ -114,11 +118,12 @@ Result<RangeRecord> read_range(const Container& file, Description& d) {
 
 // The supercubes' keys from bricks and masks; ascending. levels: of the domain
 Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> steps, std::span<const std::uint64_t> masks, std::uint64_t count,
-                                                 int levels) {
+                                                 int levels, const ParallelFor& parallel) {
   std::vector<SupercubeKey> keys;
   keys.reserve(count);
   std::uint64_t brick = 0;
   for (std::size_t b = 0; b < masks.size(); ++b) {
+    may_stop(parallel);
     const auto step = take_varint(steps);
     if (!step || (b > 0 && *step == 0) || *step >= (std::uint64_t(1) << 56) - brick || masks[b] == 0) return fail("bricks do not ascend");
     brick += *step;
@@ -135,14 +140,14 @@ Result<std::vector<SupercubeKey>> supercube_keys(std::span<const std::uint8_t> s
   return keys;
 }
 
-Result<SupercubeSet> read_set(const Container& file, const RangeRecord& r, int levels) {
+Result<SupercubeSet> read_set(const Container& file, const RangeRecord& r, int levels, const ParallelFor& parallel) {
   const auto bricks = read_at_most(file, StreamType::bricks, r.bricks * kMostVarintBytes);
   if (!bricks) return tl::unexpected(bricks.error());
   const auto masks = read_exactly(file, StreamType::masks, r.bricks * 8);
   if (!masks) return tl::unexpected(masks.error());
   const auto slots = read_exactly(file, StreamType::occupancy, r.supercubes * kSlotBytes);
   if (!slots) return tl::unexpected(slots.error());
-  const auto keys = supercube_keys(*bricks, join_bytes(*masks, 8), r.supercubes, levels);
+  const auto keys = supercube_keys(*bricks, join_bytes(*masks, 8), r.supercubes, levels, parallel);
   if (!keys) return tl::unexpected(keys.error());
   auto occupancy = join_bytes(*slots, kSlotBytes);
   std::uint64_t occupied = 0;
@@ -155,7 +160,7 @@ Result<SupercubeSet> read_set(const Container& file, const RangeRecord& r, int l
 }
 
 // Errors, and what converts them to distances. The set is known.
-Result<void> read_errors(const Container& file, const RangeRecord& r, IntervalVolume::Parts& parts) {
+Result<void> read_errors(const Container& file, const RangeRecord& r, IntervalVolume::Parts& parts, const ParallelFor& parallel) {
   const auto errors = read_exactly(file, StreamType::errors, r.errors * sizeof(float));
   if (!errors) return tl::unexpected(errors.error());
   parts.error_steps.resize(r.errors);
@@ -166,8 +171,7 @@ Result<void> read_errors(const Container& file, const RangeRecord& r, IntervalVo
   for (const std::uint8_t code : *codes) parts.error_to_distance.emplace_back(code);
   parts.steps.resize(r.updates);
   RangeDecoder coder(octets(file[StreamType::error_steps]));
-  code_error_steps(coder, parts.set, parts.steps);
-  if (!coder.is_spent()) return does_not_decompress(StreamType::error_steps);
+  if (!code_error_steps(coder, parts.set, parts.steps, parallel) || !coder.is_spent()) return does_not_decompress(StreamType::error_steps);
   return {};
 }
 
@@ -192,8 +196,8 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
   return make_container(FileScope::one_range, streams);
 }
 
-Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {
-  const auto file = Container::open(bytes, FileScope::one_range);
+Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room) {
+  const auto file = Container::open(bytes, FileScope::one_range, room);
   if (!file) return tl::unexpected(file.error());
   IntervalVolume::Parts parts;
   Description& d = parts.description;
@@ -205,15 +209,15 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   if (!record) return tl::unexpected(record.error());
   const int levels = Domain(d.grid.dims).levels();
   if (auto ok = read_weights(*file, levels, d.weights); !ok) return tl::unexpected(ok.error());
-  auto set = read_set(*file, *record, levels);
+  auto set = read_set(*file, *record, levels, parallel);
   if (!set) return tl::unexpected(set.error());
   parts.set = std::move(*set);
-  parts.keys = ValueKeys(parts.set.size(), d.format.last);
+  parts.keys = ValueKeys(0, d.format.last);
   if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_errors(*file, *record, parts); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_errors(*file, *record, parts, parallel); !ok) return tl::unexpected(ok.error());
   auto channels = read_channels(*file, d.grid, parts.set, parallel);
   if (!channels) return tl::unexpected(channels.error());
-  auto volume = IntervalVolume::assemble(std::move(parts), parallel);
+  auto volume = IntervalVolume::assemble(std::move(parts));
   if (!volume) return volume;
   if (auto ok = volume->set_channels(std::move(channels->channels), std::move(channels->keys)); !ok) return tl::unexpected(ok.error());
   return volume;
@@ -224,7 +228,7 @@ Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& v
 }
 
 Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel) {
-  const auto bytes = read_container(path, FileScope::one_range);
+  const auto bytes = read_container(path, FileScope::one_range, parallel);
   if (!bytes) return tl::unexpected(bytes.error());
   auto volume = decode_ivm(*bytes, path.stem().string(), parallel);
   if (!volume) return fail(path.string() + ": " + volume.error().message);

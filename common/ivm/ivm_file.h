@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
+#include "common/ivm/ivm_container.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 
@@ -18,9 +19,11 @@ namespace intervale {
 // the box has not are 0.
 [[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
-// The inverse, for bytes from outside: checks every checksum, and every count against the number of bytes before it
-// allocates.
-[[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial);
+// The inverse, for bytes from outside: checks every checksum, and every count against what the bytes can hold before it
+// allocates; what is decoded grows with what was read. `parallel` may stop it. Throws NoRoom if it would take more memory
+// than `room`, besides the bytes.
+[[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
+                                                std::uint64_t room = kAnyRoom);
 
 // Writes a temporary file and renames it.
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);

@@ -9,17 +9,19 @@
 
 namespace intervale {
 
-Result<std::vector<std::byte>> read_volume_file(const std::filesystem::path& path) { return read_container(path, {}); }
+Result<std::vector<std::byte>> read_volume_file(const std::filesystem::path& path, const ParallelFor& parallel) {
+  return read_container(path, {}, parallel);
+}
 
-Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {
-  if (scope_of(bytes) != FileScope::every_range) return decode_ivm(bytes, std::move(name), parallel);
-  auto values = decode_values(bytes, std::move(name), parallel);
+Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room) {
+  if (scope_of(bytes) != FileScope::every_range) return decode_ivm(bytes, std::move(name), parallel, room);
+  auto values = decode_values(bytes, std::move(name), parallel, room);
   if (!values) return tl::unexpected(values.error());
   return of_every_range(std::move(*values).take(), parallel);
 }
 
 Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel) {
-  const auto bytes = read_volume_file(path);
+  const auto bytes = read_volume_file(path, parallel);
   if (!bytes) return tl::unexpected(bytes.error());
   auto volume = decode_volume(*bytes, path.stem().string(), parallel);
   if (!volume) return fail(path.string() + ": " + volume.error().message);

@@ -18,7 +18,7 @@ class Finder {
   Finder(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel)
       : volume_(volume),
         set_(volume.set()),
-        bounds_(*volume.bounds()),
+        bounds_(volume.bounds(parallel)),
         counts_(KeySides(volume.description().format, shown.range), shown.refine),
         parallel_(parallel),
         all_(set_.size()),

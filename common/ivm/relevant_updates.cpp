@@ -66,6 +66,7 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
       slots_(std::move(slots)),
       error_to_distance_(std::move(error_to_distance)),
       supercube_step_(set.supercubes()),
+      brick_updates_(set.bricks().size()),
       brick_step_(set.bricks().size()),
       brick_object_error_(set.bricks().size()),
       error_(errors.values.begin(), errors.values.end()),
@@ -77,6 +78,7 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
       const UpdateIndex first = set.first(b, s);
       const std::uint64_t occupancy = set.occupancy()[s], relevant = this->slots(s, occupancy);
       if (relevant == 0) return;
+      brick_updates_[b] = std::uint16_t(brick_updates_[b] + std::popcount(relevant));
       // Often one of the first relevant updates has the highest step of all.
       std::uint8_t most = 0, most_of_all = 0;
       for (UpdateIndex i = first; i < first + std::popcount(occupancy); ++i) most_of_all = std::max(most_of_all, errors.steps[i]);
@@ -92,7 +94,7 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
 
 std::size_t RelevantUpdates::memory_bytes() const {
   return slots_.size() * sizeof(std::uint64_t) + error_to_distance_.size() + supercube_step_.size() + brick_step_.size() +
-         brick_object_error_.size() * sizeof(float) + error_.size() * sizeof(float);
+         brick_updates_.size() * sizeof(std::uint16_t) + brick_object_error_.size() * sizeof(float) + error_.size() * sizeof(float);
 }
 
 RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown) {

@@ -67,6 +67,8 @@ class RelevantUpdates {
     return slots_.empty() ? occupancy : slots_[supercube];
   }
 
+  // The number of a brick's relevant updates.
+  [[nodiscard]] unsigned brick_updates(BrickIndex brick) const { return brick_updates_[brick]; }
   // The highest error step of a brick's or a supercube's relevant updates; 0 if there are none.
   [[nodiscard]] unsigned brick_error_step(BrickIndex brick) const { return brick_step_[brick]; }
   [[nodiscard]] std::span<const std::uint8_t> supercube_error_steps() const { return supercube_step_; }
@@ -87,6 +89,7 @@ class RelevantUpdates {
   std::vector<std::uint64_t> slots_;                // by supercube; empty: all
   std::vector<ErrorToDistance> error_to_distance_;  // by supercube
   std::vector<std::uint8_t> supercube_step_;        // by supercube
+  std::vector<std::uint16_t> brick_updates_;        // by brick
   std::vector<std::uint8_t> brick_step_;            // by brick
   std::vector<float> brick_object_error_;           // by brick
   std::vector<float> error_;                        // by error step

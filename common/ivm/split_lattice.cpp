@@ -80,9 +80,13 @@ std::uint64_t SplitLattice::load_neighbour(SetFinder& finder, const SupercubePla
   if (!place.exists()) return 0;
   const SetFinder::Found found = finder.find(kHere + x + 3 * y + 9 * z, place);
   if (found.occupancy == 0) return 0;
-  const std::uint64_t used = (towards < 0 ? tables_.behind : tables_.ahead)[neighbour];
+  return load_slots(found, (towards < 0 ? tables_.behind : tables_.ahead)[neighbour], keys.data() + 4 * (point_of(x, y, z) - point_of(0, 0, 0)));
+}
+
+// Loads the keys of those of a supercube's split diamonds whose slots are used, and returns the slots of those. first: the
+// point of its own corner.
+std::uint64_t SplitLattice::load_slots(const SetFinder::Found& found, std::uint64_t used, ValueKey* first) const {
   const std::uint64_t slots = split_.slots(found.first, found.occupancy) & used;
-  ValueKey* const first = keys.data() + 4 * (point_of(x, y, z) - point_of(0, 0, 0));
   switch (volume_.keys().width()) {
     case 1:
       load_keys<1>(found, slots, first);
@@ -99,7 +103,6 @@ std::uint64_t SplitLattice::load_neighbour(SetFinder& finder, const SupercubePla
   return slots;
 }
 
-// first: the point of the neighbour's own corner.
 template <unsigned Width>
 void SplitLattice::load_keys(const SetFinder::Found& found, std::uint64_t slots, ValueKey* first) const {
   const std::uint8_t* const bytes = volume_.keys().bytes().data() + std::size_t(found.first) * Width;
@@ -125,12 +128,30 @@ const SplitLattice::Keys& SplitLattice::coarser(int scale, Vertex position, unsi
   return here.keys;
 }
 
-void SplitLattice::move_to(SupercubeKey key) {
+void SplitLattice::place_at(SupercubeKey key) {
   place_ = {scale_of_key(key), position_of_key(key)};
   is_interior_ = is_interior(volume_.domain(), place_.scale, place_.position);
   load_coarser(place_.scale, place_.position, keys_);
   finder_.move_to(place_.scale, place_.position);
-  for (std::size_t k = 0; k < ParentTable::kPlaces; ++k) parents_[k] = load_neighbour(finder_, place_, kParentNeighbour[k], -1, keys_);
+}
+
+// Loads the parents' places but the first, which is the supercube itself.
+void SplitLattice::load_behind() {
+  for (std::size_t k = 1; k < ParentTable::kPlaces; ++k) parents_[k] = load_neighbour(finder_, place_, kParentNeighbour[k], -1, keys_);
+}
+
+void SplitLattice::move_to(SupercubeKey key) {
+  place_at(key);
+  parents_[0] = load_neighbour(finder_, place_, kParentNeighbour[0], -1, keys_);
+  load_behind();
+}
+
+void SplitLattice::move_to(const SlotGroup& group) {
+  const SupercubeSet& set = volume_.set();
+  const SetFinder::Found here{group.key, set.occupancy()[group.supercube], group.brick, group.supercube, set.first(group.brick, group.supercube)};
+  place_at(group.key);
+  parents_[0] = load_slots(here, tables_.behind[0], keys_.data());
+  load_behind();
 }
 
 std::uint64_t SplitLattice::splittable(std::uint64_t slots) {

@@ -25,6 +25,8 @@ class SplitLattice {
 
   // Fastest along ascending keys.
   void move_to(SupercubeKey key);
+  // The same, without a lookup of the supercube. group: of one in the volume.
+  void move_to(const SlotGroup& group);
 
   // Which of these slots of the supercube hold diamonds that exist, whose split would not be a no-op, and whose parents
   // are split, whether they are split themselves or not.
@@ -75,7 +77,10 @@ class SplitLattice {
   };
   const Keys& coarser(int scale, Vertex position, unsigned half);
   void load_coarser(int scale, Vertex position, Keys& keys);
+  void place_at(SupercubeKey key);
+  void load_behind();
   std::uint64_t load_neighbour(SetFinder& finder, const SupercubePlace& from, unsigned neighbour, int towards, Keys& keys);
+  std::uint64_t load_slots(const SetFinder::Found& found, std::uint64_t used, ValueKey* first) const;
   template <unsigned Width>
   void load_keys(const SetFinder::Found& found, std::uint64_t slots, ValueKey* first) const;
   std::uint64_t splittable_inside(std::uint64_t slots) const;

@@ -54,6 +54,7 @@ ValueBounds::ValueBounds(const PagedValues& values, const ParallelFor& parallel)
   });
   supercube_least_ = supercube_greatest_ = ValueKeys(set.supercubes(), last);
   for (BrickIndex brick{0}; brick < set.bricks().size(); ++brick) {
+    may_stop(parallel);
     set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
       const UpdateIndex first = set.first(brick, s), end = first + std::uint32_t(std::popcount(set.occupancy()[s]));
       KeySpan span{least[first], greatest[first]};

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/codec/byte_planes.h"
+#include "common/codec/coding_rate.h"
 #include "common/ivm/channel_file.h"
 #include "common/ivm/ivm_container.h"
 #include "common/ivm/value_streams.h"
@@ -63,10 +64,12 @@ Result<void> read_histogram(std::span<const std::byte> bytes, FieldDescription& 
   const auto damaged = [] { return fail("the histogram is damaged"); };
   if (bytes.size() < sizeof(double)) return damaged();
   d.statistics.histogram = {d.format.least(), numbers_of<double>(bytes.first(sizeof(double)))[0], {}};
-  if (!(d.statistics.histogram.width > 0)) return damaged();
+  if (!(d.statistics.histogram.width > 0) || !std::isfinite(d.statistics.histogram.width)) return damaged();
+  std::uint64_t left = d.grid.sample_count();
   for (auto counts = octets(bytes.subspan(sizeof(double))); !counts.empty();) {
     const auto count = take_varint(counts);
-    if (!count || d.statistics.histogram.count.size() == kMostBins) return damaged();
+    if (!count || *count > left || d.statistics.histogram.count.size() == kMostBins) return damaged();
+    left -= *count;
     d.statistics.histogram.count.push_back(*count);
   }
   if (d.statistics.histogram.count.empty()) return damaged();
@@ -91,6 +94,14 @@ Result<void> read_volumes(std::span<const std::byte> bytes, FieldDescription& d)
   return {};
 }
 
+// For each sample its key, its bounds and its error level; and what makes the set, whose supercubes span four samples on
+// each axis.
+std::uint64_t memory_to_decode(const FieldDescription& d) {
+  std::uint64_t supercubes = 2;
+  for (const std::int32_t samples : d.grid.dims) supercubes *= std::uint64_t(samples) / 4 + 2;
+  return d.grid.sample_count() * (3 * ValueKeys(0, d.format.last).width() + 2) + supercubes * 72;
+}
+
 }  // namespace
 
 bool is_value_file(const std::filesystem::path& path) { return scope_of(path) == FileScope::every_range; }
@@ -105,8 +116,8 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
   return make_container(FileScope::every_range, streams);
 }
 
-Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel) {
-  const auto file = Container::open(bytes, FileScope::every_range);
+Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room) {
+  const auto file = Container::open(bytes, FileScope::every_range, room);
   if (!file) return tl::unexpected(file.error());
   ValueVolume::Parts parts;
   FieldDescription& d = parts.description;
@@ -116,14 +127,15 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
   if (auto ok = read_labels(*file, d.labels); !ok) return tl::unexpected(ok.error());
   // Sizes before contents.
   if (d.grid.sample_count() > kMostSamples) return fail("more samples than this program can read");
-  if (d.grid.sample_count() / kValuesPerByte > bytes.size()) return fail("the file claims more values than it can hold");
+  if (d.grid.sample_count() > most_coded_bits((*file)[StreamType::pages].size()) + kRootVertices)
+    return fail("the file claims more values than it can hold");
+  file->claim(memory_to_decode(d));
   const Domain domain(d.grid.dims);
   if (auto ok = read_weights(*file, domain.levels(), parts.weights); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_histogram((*file)[StreamType::histogram], d); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_volumes((*file)[StreamType::volumes], d); !ok) return tl::unexpected(ok.error());
-  parts.set = all_diamonds(domain);
-  parts.keys = ValueKeys(parts.set.size(), d.format.last);
-  parts.error_levels.resize(coarse_diamonds(parts.set));
+  parts.set = all_diamonds(domain, parallel);
+  parts.keys = ValueKeys(0, d.format.last);
   if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
   auto channels = read_channels(*file, d.grid, parts.set, parallel);
   if (!channels) return tl::unexpected(channels.error());
@@ -139,7 +151,7 @@ Result<std::uint64_t> save_values(const std::filesystem::path& path, const Value
 }
 
 Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel) {
-  const auto bytes = read_container(path, FileScope::every_range);
+  const auto bytes = read_container(path, FileScope::every_range, parallel);
   if (!bytes) return tl::unexpected(bytes.error());
   auto volume = decode_values(*bytes, path.stem().string(), parallel);
   if (!volume) return fail(path.string() + ": " + volume.error().message);

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/codec/coding_rate.h"
 #include "common/codec/value_table.h"
 #include "common/ivm/value_page.h"
 
@@ -48,7 +49,7 @@ FieldRecord record_of(const PagedValues& v, bool is_exact) {
 Result<void> read_table(const Container& file, ValueFormat& format) {
   const auto stored = file[StreamType::value_table];
   if (!has_table(format.step, format.type)) return stored.empty() ? Result<void>() : fail("a table of values does not belong to these values");
-  if (format.last / kValuesPerByte > file.file_bytes()) return fail("the file claims more values than it can hold");
+  if (format.last > most_coded_bits(file.file_bytes())) return fail("the file claims more values than it can hold");
   auto table = decode_value_table(octets(stored), std::size_t(format.last) + 1);
   if (!table) return tl::unexpected(table.error());
   format.table = std::make_shared<const std::vector<double>>(std::move(*table));
@@ -83,6 +84,19 @@ struct StoredPage {
   std::span<const std::byte> bytes;
   std::uint64_t checksum = 0;
 };
+
+constexpr std::size_t kPagesAtOnce = 16;  // whose values are allocated together, or as many as were decoded before
+
+// Room for the values of all pages up to this one.
+void grow(const DecodedValues& to, const ValuePage& last) {
+  const SupercubeSet& set = to.values.set;
+  const BrickIndex end = last.back().end;
+  const std::size_t values = end < set.bricks().size() ? std::size_t(set.bricks()[end].first) : set.size();
+  ValueKeys keys(values, to.values.format.last);
+  for (std::size_t i = 0; i < to.keys.size(); ++i) keys.set(i, to.keys[i]);
+  to.keys = std::move(keys);
+  if (to.error_levels != nullptr) to.error_levels->resize(std::min<std::size_t>(values, coarse_diamonds(set)));
+}
 
 // Takes so many pages off the front of an index and of the pages.
 Result<std::vector<StoredPage>> take_stored(std::span<const std::byte>& index, std::span<const std::byte>& pages, std::size_t count) {
@@ -159,7 +173,8 @@ Result<void> read_pages(const Container& file, const DecodedValues& to, const Pa
   return {};
 }
 
-// Pages of one scale in parallel: they depend on coarser ones only.
+// Pages of one scale in parallel: they depend on coarser ones only. What is allocated grows with what was decoded, so a
+// file that claims more than it holds is found out before it takes much.
 Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& from, const DecodedValues& to, const ParallelFor& parallel) {
   const SupercubeSet& set = to.values.set;
   const std::vector<ValuePage> pages = pages_of(set);
@@ -169,7 +184,8 @@ Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::
   constexpr std::size_t kNone = ~std::size_t(0);
   std::atomic<std::size_t> damaged = kNone;
   for (std::size_t first = 0, end = 0; first < pages.size() && damaged == kNone; first = end) {
-    while (end < pages.size() && scale(end) == scale(first)) ++end;
+    while (end < pages.size() && end - first < std::max(first, kPagesAtOnce) && scale(end) == scale(first)) ++end;
+    grow(to, pages[end - 1]);
     parallel(end - first, [&](std::size_t i) {
       const std::size_t page = first + i;
       const auto& [bytes, checksum] = (*stored)[page];

@@ -13,9 +13,6 @@
 
 namespace intervale {
 
-// No page has more values in a byte, and no error step takes less either: no bit is less probable than 1/1040.
-inline constexpr std::uint64_t kValuesPerByte = 8192;
-
 // Writes field, weights, page_index, pages, and value_table if the format has one. The same bytes whatever `parallel` is.
 void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel);
 
@@ -27,7 +24,7 @@ void append_labels(Streams& streams, const Labels& labels);
 [[nodiscard]] Result<void> read_labels(const Container& file, Labels& to);
 // levels: of the field's domain
 [[nodiscard]] Result<void> read_weights(const Container& file, int levels, ValueWeights& to);
-// Sets keys and error levels. All the rest is known.
+// Sets keys and error levels, which have no elements at first, and grow with what is decoded. All the rest is known.
 [[nodiscard]] Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel);
 
 // Appends the pages of some values, and their index: for each page its bytes and their XXH3-64, two numbers of 8 bytes.

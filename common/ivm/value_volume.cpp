@@ -48,7 +48,7 @@ ErrorLevel ValueVolume::level_of_error(double max_error, double error) {
   return ErrorLevel(std::clamp(kErrorLevels - 1 + exponent - int(ratio == 0.5), 1, kErrorLevels - 1));
 }
 
-SupercubeSet all_diamonds(const Domain& domain) {
+SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel) {
   std::vector<std::pair<SupercubeKey, std::uint64_t>> found;
   for (int scale = 0; scale < domain.levels(); ++scale) {
     // A diamond reaches h from its centre.
@@ -56,6 +56,7 @@ SupercubeSet all_diamonds(const Domain& domain) {
     const Vertex last{positions(domain.last().x), positions(domain.last().y), positions(domain.last().z)};
     for (Vertex p; p.z <= last.z; ++p.z) {
       for (p.y = 0; p.y <= last.y; ++p.y) {
+        may_stop(parallel);
         for (p.x = 0; p.x <= last.x; ++p.x) {
           if (const std::uint64_t slots = updated_slots(domain, scale, p)) found.emplace_back(supercube_key(scale, p), slots);
         }

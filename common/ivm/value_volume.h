@@ -22,6 +22,7 @@
 #include "common/patch/channel.h"
 #include "common/patch/labels.h"
 #include "common/patch/value_format.h"
+#include "common/util/parallel.h"
 #include "common/util/result.h"
 
 namespace intervale {
@@ -87,8 +88,9 @@ class ValueVolume {
   Domain domain_;
 };
 
-// All diamonds of a domain that have an update: those that exist, and whose split is not a no-op.
-[[nodiscard]] SupercubeSet all_diamonds(const Domain& domain);
+// All diamonds of a domain that have an update: those that exist, and whose split is not a no-op. `parallel` may
+// stop it.
+[[nodiscard]] SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel = serial);
 
 // How many diamonds of a set are of scale 1 or coarser; they have the first numbers.
 [[nodiscard]] std::uint32_t coarse_diamonds(const SupercubeSet& set);

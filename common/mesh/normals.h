@@ -6,9 +6,12 @@
 // again exactly.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
+#include <numbers>
 
 #include "common/util/vec3.h"
 
@@ -16,6 +19,15 @@ namespace intervale {
 
 // In steps of 2^-20; only its direction matters.
 using NormalSum = std::array<std::int32_t, 3>;
+
+// The nearest whole number, of two the even one. value: within 2^31 of 0. Its bits follow a sum that has no bits below
+// 1: one addition, where std::rint() and a conversion are several instructions.
+[[nodiscard]] inline std::int32_t nearest_int(double value) {
+  const double sum = value + 0x1.8p52;
+  std::int64_t bits = 0;
+  std::memcpy(&bits, &sum, sizeof bits);
+  return std::int32_t(bits);
+}
 
 // What a triangle, counterclockwise seen from outside, adds at each of its corners; 0 if it has no area. Directions are
 // those of the space of the corners: apply the grid's affine to samples first. arc_tangent: as std::atan2, of a y above
@@ -34,10 +46,19 @@ template <class ArcTangent>
   const std::array<double, 3> angle{a, b, kPi - a - b};
   const double steps = kSteps / twice_area;
   for (std::size_t k = 0; k < 3; ++k) {
-    // rint() is an instruction, where lrint() may be a call.
-    for (std::size_t i = 0; i < 3; ++i) added[k][i] = std::int32_t(std::rint(angle[k] * steps * normal[i]));
+    for (std::size_t i = 0; i < 3; ++i) added[k][i] = nearest_int(angle[k] * steps * normal[i]);
   }
   return added;
+}
+
+// To 1e-5 (Abramowitz and Stegun 4.4.47), several times faster than std::atan2. y: above 0. Without branches, which would
+// be as likely to go one way as the other.
+[[nodiscard]] inline double quick_arc_tangent(double y, double x) {
+  constexpr double kHalf = std::numbers::pi / 2, kQuarter = std::numbers::pi / 4;
+  const double along = std::abs(x), t = std::min(y, along) / std::max(y, along), s = t * t;
+  const double part = t * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))));
+  const double angle = kQuarter - std::copysign(kQuarter - part, along - y);  // part, or what it lacks to a right angle
+  return kHalf - std::copysign(kHalf - angle, x);                             // angle, or what it lacks to a straight one
 }
 
 }  // namespace intervale

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <tuple>
 
+#include "common/util/printable.h"
+
 namespace intervale {
 
 Result<void> check_grid(const Grid& grid) {
@@ -47,12 +49,13 @@ Result<void> check_held(const Description& d, const ShownRange& shown) {
   std::ostringstream has;
   has << "[" << d.range.alpha << ", " << d.range.beta << "]";
   if (!is_within && d.refine == Refine::uniform) {
-    return misuse("the data set '" + d.name + "' has the ranges within " + has.str() + ": build it without --range for every range");
+    return misuse("the data set '" + printable(d.name) + "' has the ranges within " + has.str() + ": build it without --range for every range");
   }
   if (shown.range != d.range) {
-    return misuse("the data set '" + d.name + "' was built for the range " + has.str() + " alone: build it without --range for every range");
+    return misuse("the data set '" + printable(d.name) + "' was built for the range " + has.str() +
+                  " alone: build it without --range for every range");
   }
-  return misuse("the data set '" + d.name + "' was refined at its surfaces only: build it without --range, or with --refine uniform");
+  return misuse("the data set '" + printable(d.name) + "' was refined at its surfaces only: build it without --range, or with --refine uniform");
 }
 
 Result<void> check_held(const Description& d, const ShownRanges& shown) {

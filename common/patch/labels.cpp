@@ -5,7 +5,7 @@
 
 namespace intervale {
 
-bool is_label(std::string_view text) { return text.size() <= kMaxLabel && is_utf8(text) && printable(text) == text; }
+bool is_label(std::string_view text) { return text.size() <= kMaxLabel && is_utf8(text) && !has_control_characters(text); }
 
 Result<void> check_labels(const Labels& labels) {
   if (is_label(labels.unit) && is_label(labels.field) && is_label(labels.field_unit)) return {};

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/patch/channel_bounds.h"
 #include "common/picture/canvas.h"
 #include "common/picture/colour_bar.h"
 #include "common/picture/triangles.h"
@@ -22,6 +23,9 @@ namespace {
 
 // Four samples a pixel, with depth, take 32 bytes: about a gigabyte. 8K screens have slightly fewer pixels.
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 25;
+
+// The longest box that can be drawn, and the inverse of the shortest: doubles hold products of four lengths.
+constexpr double kMostLength = 1e75;
 
 Result<void> write_png(const std::filesystem::path& path, const Pixels& pixels) {
   png_image image{};
@@ -37,6 +41,13 @@ Result<void> write_png(const std::filesystem::path& path, const Pixels& pixels) 
   if (!file) return tl::unexpected(file.error());
   if (auto written = file->write(std::span(bytes).first(size)); !written) return written;
   return file->commit();
+}
+
+Result<void> check_box(const PictureOptions& options, const Box& box) {
+  const double diagonal = length(subtract(box.max, box.min)), farthest = std::max(length(box.min), length(box.max));
+  if (diagonal >= 1 / kMostLength && farthest <= kMostLength) return {};
+  return fail(fmt::format("cannot draw '{}': the volume is {:g} long and up to {:g} from the origin; a picture shows {:g} to {:g}",
+                          options.file.string(), diagonal, farthest, 1 / kMostLength, kMostLength));
 }
 
 Result<void> check_render(const PictureOptions& options) {
@@ -83,24 +94,15 @@ MeshArray<double> numbers_of(const PointArray& channel) {
   return lengths;
 }
 
-// Of a scalar in the whole data set, of a vector's lengths in the mesh.
-ValueSpan span_of(const Channel& channel, const MeshArray<double>& numbers) {
-  const ValueFormat& format = channel.components.front().format;
-  if (channel.components.size() == 1) return {format.least(), format.greatest()};
-  double longest = 0;
-  for (const double length : numbers) longest = std::max(longest, length);  // of what is not a number: what was before
-  return {0, longest};
-}
-
 Colours colours_of_channel(const PictureOptions& options, const PictureSubject& subject, const Palette& palette) {
   const auto has_name = [&options](const auto& channel) { return channel.name == options.channel; };
   const auto& here = subject.mesh.channels;
   const auto& channels = subject.description.channels;
   const auto found = std::find_if(here.begin(), here.end(), has_name);
   const auto channel = std::find_if(channels.begin(), channels.end(), has_name);
-  Colours colours{palette, {}, numbers_of(*found), title_of(channel->name, channel->unit)};
-  colours.span = options.colour_span ? *options.colour_span : span_of(*channel, colours.of_points);
-  return colours;
+  const auto [least, greatest] = bounds_of(*channel);
+  return {palette, options.colour_span ? *options.colour_span : ValueSpan{least, greatest}, numbers_of(*found),
+          title_of(channel->name, channel->unit)};
 }
 
 std::optional<Colours> colours_of(const PictureOptions& options, const PictureSubject& subject) {
@@ -155,6 +157,7 @@ Result<void> check_picture(const PictureOptions& options, const std::optional<Ca
 Result<bool> write_picture(const PictureOptions& options, const PictureSubject& subject, const std::optional<Camera>& camera,
                            const ParallelFor& parallel) {
   const Box box = box_of(subject.description.grid);
+  if (auto drawable = check_box(options, box); !drawable) return tl::unexpected(drawable.error());
   const Camera seen_from = camera ? *camera : three_quarter_view(box, options.clip);
   const auto colours = colours_of(options, subject);
   Result<Pixels> pixels;

@@ -34,7 +34,7 @@ struct PictureOptions {
   std::string channel;                  // by channel: its name. Vectors have the colours of their lengths
   // By value or channel only:
   std::optional<std::string> palette;    // a name of kPaletteNames; or the first
-  std::optional<ValueSpan> colour_span;  // what lies beyond has the colours of the palette's ends; or span_of(), or the channel's least and greatest
+  std::optional<ValueSpan> colour_span;  // what lies beyond has the colours of the palette's ends; or span_of(), or bounds_of() the channel
 };
 
 // Misuse if the options are invalid for every mesh: call this before long work. camera: valid by check_lod; see

@@ -16,9 +16,9 @@ namespace {
 
 constexpr int kTile = 16;  // the pieces of its rays fit the cache
 constexpr std::size_t kTetsAtOnce = 4096;
-constexpr double kMargin = 1e-5;   // in pixels, for kAside and the rounding of projections: no ray of a tetrahedron is missed
-constexpr double kUnit = 0.02;     // a hundredth of the box's diagonal, in the scene
-constexpr double kNearest = 1e-5;  // where the rays of an eye that is inside begin, ahead of it, in the scene
+constexpr double kPixelMargin = 1e-5;  // in pixels, for kAside and the rounding of projections: no ray of a tetrahedron is missed
+constexpr double kUnit = 0.02;         // a hundredth of the box's diagonal, in the scene
+constexpr double kNearestRay = 1e-5;   // where the rays of an eye that is inside begin, ahead of it, in the scene
 // From the middle of a pixel to its ray. A view along an axis of the grid has rays along edges of the mesh, where
 // rounding decides which of the tetrahedra around have them, and not all decide alike. No such ray passes just beside.
 constexpr std::array<double, 2> kAside{3.1e-6, 4.7e-6};
@@ -32,7 +32,7 @@ class Frame {
     scale_ = height / (2 * std::tan(camera_.fov * std::numbers::pi / 360));
     middle_ = {width / 2.0, height / 2.0};
     const Vec3 centre = seen(lerp(rays.box.min, rays.box.max, 0.5));
-    nearest_ = std::max(kNearest, centre[2] - 1);
+    nearest_ = std::max(kNearestRay, centre[2] - 1);
     if (!rays.clip) return;
     const Vec3 normal = normalized(rays.clip->normal);
     clip_normal_ = {dot(normal, axes_.right), dot(normal, axes_.up), -dot(normal, axes_.back)};
@@ -66,7 +66,7 @@ class Frame {
  private:
   Camera camera_;
   Axes axes_;
-  double unit_ = 1, scale_ = 1, nearest_ = kNearest;
+  double unit_ = 1, scale_ = 1, nearest_ = kNearestRay;
   std::array<double, 2> middle_{};
   Vec3 clip_normal_{};  // without a clip plane, 0: all is kept
   double clip_distance_ = 0;
@@ -93,8 +93,8 @@ RayTile pixels_of(const Frame& frame, const std::array<Vec3, 4>& corners) {
     }
   }
   const auto within = [](double pixel, int count) { return int(std::clamp(pixel, 0.0, double(count))); };
-  return {within(std::ceil(least[0] - kMargin), frame.width()), within(std::ceil(least[1] - kMargin), frame.height()),
-          within(std::floor(most[0] + kMargin) + 1, frame.width()), within(std::floor(most[1] + kMargin) + 1, frame.height())};
+  return {within(std::ceil(least[0] - kPixelMargin), frame.width()), within(std::ceil(least[1] - kPixelMargin), frame.height()),
+          within(std::floor(most[0] + kPixelMargin) + 1, frame.width()), within(std::floor(most[1] + kPixelMargin) + 1, frame.height())};
 }
 
 // A piece of a ray: distances along it, and places of values (TransferFunction) at its ends.

@@ -1,8 +1,9 @@
 #include "common/program/describe.h"
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "common/patch/channel_bounds.h"
 
 namespace intervale {
 namespace {
@@ -20,14 +21,10 @@ nlohmann::ordered_json to_json(std::span<const Channel> channels) {
   auto list = nlohmann::ordered_json::array();
   for (const Channel& channel : channels) {
     auto steps = nlohmann::ordered_json::array();
-    double longest = 0;
-    for (const ChannelComponent& component : channel.components) {
-      steps.push_back(component.is_exact ? 0.0 : component.format.step);
-      longest = std::hypot(longest, std::max(std::abs(component.format.least()), std::abs(component.format.greatest())));
-    }
+    for (const ChannelComponent& component : channel.components) steps.push_back(component.is_exact ? 0.0 : component.format.step);
     const bool is_scalar = channel.components.size() == 1;
-    const ValueFormat& first = channel.components.front().format;
-    const nlohmann::ordered_json values{{"least", is_scalar ? first.least() : 0.0}, {"greatest", is_scalar ? first.greatest() : longest}};
+    const auto [least, greatest] = bounds_of(channel);
+    const nlohmann::ordered_json values{{"least", least}, {"greatest", greatest}};
     list.push_back({{"name", channel.name}, {"kind", is_scalar ? "scalar" : "vector"}, {"unit", channel.unit}, {"values", values}, {"steps", steps}});
   }
   return list;

@@ -63,7 +63,9 @@ CLI::App& Program::only_command(std::function<Result<void>()> body) {
 }
 
 int Program::run(int argc, const char* const* argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error to report, not a signal
+  // A closed pipe and the limit of a file's size are errors to report: the signals would leave half a file behind.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   set_environment_names(app_);
   for (auto& [command, body] : commands_) set_environment_names(*command);
   try {

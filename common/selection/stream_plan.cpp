@@ -7,7 +7,6 @@
 #include "common/diamond/ancestor_inserter.h"
 #include "common/ivm/batch_encoder.h"
 #include "common/ivm/channel_encoder.h"
-#include "common/ivm/refinement.h"
 
 namespace intervale {
 namespace {
@@ -62,6 +61,7 @@ StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume)
 }
 
 void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown) {
+  search_.reset();
   relevant_ = std::move(relevant);
   shown_ = std::move(shown);
   const SupercubeSet& set = volume_->set();
@@ -69,10 +69,13 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   wanted_count_ = pending_bricks_ = 0;
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     Pending& pending = pending_[b];
-    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
-      const std::uint64_t occupancy = set.occupancy()[s];
-      pending.unsent = std::uint16_t(pending.unsent + std::popcount(relevant_->slots(s, occupancy) & ~sent_.slots(set.first(b, s), occupancy)));
-    });
+    pending.unsent = std::uint16_t(relevant_->brick_updates(b));
+    if (pending.unsent != 0 && !sent_.is_untouched(set.bricks()[b].first, set.updates(b))) {
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
+        const std::uint64_t occupancy = set.occupancy()[s];
+        pending.unsent = std::uint16_t(pending.unsent - std::popcount(relevant_->slots(s, occupancy) & sent_.slots(set.first(b, s), occupancy)));
+      });
+    }
     pending.error_step = std::uint16_t(relevant_->brick_error_step(b));
     pending.object_error = Up16(relevant_->brick_object_error(b));
   }
@@ -101,14 +104,14 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   const SupercubeSet& set = volume_->set();
   const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
   if (!found || (slots & ~set.occupancy()[found->supercube]) != 0) return false;
-  const std::uint64_t relevant = relevant_->slots(found->supercube, set.occupancy()[found->supercube]);
-  for (const Slot slot : set_bits<Slot>(slots)) {
-    const UpdateIndex i = set.place_in(found->brick, found->supercube, key, slot).index;
-    if (sent_.contains(i)) continue;
-    sent_.insert(i);
-    ++sent_count_;
-    if ((relevant >> slot & 1) != 0) --pending_[found->brick].unsent;
-  }
+  const std::uint64_t occupancy = set.occupancy()[found->supercube];
+  const UpdateIndex first = set.first(found->brick, found->supercube);
+  const std::uint64_t added = slots & ~sent_.slots(first, occupancy);
+  if (added == 0) return true;
+  sent_.insert(first, occupancy, added);
+  sent_count_ += std::uint64_t(std::popcount(added));
+  std::uint16_t& unsent = pending_[found->brick].unsent;
+  unsent = std::uint16_t(unsent - std::popcount(added & relevant_->slots(found->supercube, occupancy)));
   return true;
 }
 
@@ -143,15 +146,13 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
 
 void StreamPlan::set_lod(const Lod& lod) {
   budget_.reset();
-  if (lod.max_updates) {
-    SplitSet wanted = select(*volume_, *relevant_, lod);
-    if (wanted.count() > *lod.max_updates) {
-      const auto order = in_order(*volume_, *relevant_, wanted, lod);
-      for (std::size_t i = *lod.max_updates; i < order.size(); ++i) wanted.erase(order[i]);
-    }
-    budget_ = std::move(wanted);
-  }
+  search_.reset();
+  if (lod.max_updates) search_ = std::make_shared<BudgetSearch>(volume_, relevant_, lod);
   ranking_.emplace(*volume_, *relevant_, lod);
+  rank_bricks();
+}
+
+void StreamPlan::rank_bricks() {
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     const Pending& w = pending_[b];
     if (w.unsent == 0) continue;
@@ -311,28 +312,23 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
 }
 
 // Adds the candidates that belong to the band, and bounds the others in `rest`. False if the batch is full first.
-bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest) {
+bool StreamPlan::add_band(const Ranking::Supercube& ranking, const Place& place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest) {
   const float in_band = ranking.least(band_), least = budget_ ? ranking.least(1) : 0;
   const UpdateIndex first = place.index;
   const std::uint64_t occupancy = volume_->set().occupancy()[place.supercube];
-  std::uint64_t slots = occupancy;  // those of the updates from `at` on
   SlotGroup in_it{place.brick, place.supercube, place.key, 0};
   float greatest = 0;
-  unsigned at = 0;
-  for (; candidates != 0; candidates &= candidates - 1) {
-    const auto k = unsigned(std::countr_zero(candidates));
-    for (; at <= k; ++at, slots &= slots - 1) place.slot = Slot(std::countr_zero(slots));
-    const unsigned error_step = volume_->error_step(first + k);
+  // Without branches on what is in the band: that is hard to foresee.
+  for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
+    const unsigned error_step = volume_->error_step(first + count_below(occupancy, slot));
     float importance = ranking.importance(error_step);
-    if (importance > 0 && !ranking.meets_roi(place.slot)) importance = 0;
+    if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;
     importance = std::max(importance, least);
-    if (importance > 0 && importance >= in_band) {
-      in_it.slots |= std::uint64_t(1) << place.slot;
-      continue;
-    }
-    rest.error_step = std::max(rest.error_step, error_step);
-    rest.wanted += importance > 0;
-    greatest = std::max(greatest, importance);
+    const bool is_in_it = importance > 0 && importance >= in_band;
+    in_it.slots |= std::uint64_t(is_in_it) << slot;
+    rest.error_step = std::max(rest.error_step, is_in_it ? 0 : error_step);
+    rest.wanted += unsigned(importance > 0) & unsigned(!is_in_it);
+    greatest = std::max(greatest, is_in_it ? 0 : importance);
   }
   rest.rank = ranking.rank(greatest);
   if (in_it.slots == 0 || add_all(in_it, builder)) return true;
@@ -346,6 +342,12 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, Place place, std::u
 
 std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   if (lacks_values()) return next_values(max_bytes);
+  if (search_) {
+    if (search_->go_on()) return {};
+    budget_ = std::move(*search_).result();
+    search_.reset();
+    rank_bricks();
+  }
   BatchBuilder builder(*volume_, sent_, wanted_channels_, max_bytes);
   while (!done()) {
     if (next_brick_ == 0) {
@@ -366,6 +368,13 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   Batch batch{encode_batch(*volume_, shown_, sent_, groups), builder.updates, {}};
   if (!wanted_channels_.empty()) batch.channels = send_values(groups, {});
   return batch;
+}
+
+std::size_t StreamPlan::memory_bytes() const {
+  std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
+  bytes += pending_.capacity() * sizeof(Pending) + steps_page_.capacity() * sizeof steps_page_[0] + steps_.capacity();
+  for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
+  return bytes;
 }
 
 }  // namespace intervale

@@ -18,6 +18,7 @@
 
 #include "common/diamond/split_set.h"
 #include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/budget_search.h"
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ranking.h"
 #include "common/view/lod.h"
@@ -57,7 +58,7 @@ class StreamPlan {
   void set_room(std::uint64_t updates) { room_ = updates; }
 
   // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice. relevant:
-  // of this volume. Before the set_lod() of the same view. O(supercubes).
+  // of this volume. Before the set_lod() of the same view. O(bricks), and O(supercubes) where something was sent.
   void set_relevant(const std::shared_ptr<const RelevantUpdates>& relevant) { set_relevant(relevant, relevant->shown()); }
   // The same for a client that shows other ranges: batches are coded for those.
   void set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown);
@@ -69,13 +70,18 @@ class StreamPlan {
   // data set's.
   bool resume(std::size_t channel, SupercubeKey key, std::uint64_t slots);
 
-  // Replaces the level of detail; check_lod(lod) must hold. O(bricks); with max_updates O(updates).
+  // Replaces the level of detail; check_lod(lod) must hold. O(bricks).
   void set_lod(const Lod& lod);
 
-  // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call: done()
-  // tells which. max_bytes, at least 256, bounds the payload with its channels before compression, which takes about half of it.
+  // The search for what is within max_updates, which is to be done before the next batch; nullptr: none. Another thread
+  // may go on with it; otherwise next() does.
+  [[nodiscard]] const std::shared_ptr<BudgetSearch>& search() const { return search_; }
+
+  // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call, about a
+  // millisecond: done() tells which. max_bytes, at least 256, bounds the payload
+  // with its channels before compression, which takes about half of it.
   std::optional<Batch> next(std::size_t max_bytes);
-  [[nodiscard]] bool done() const { return !lacks_values() && (pending_bricks_ == 0 || is_full()); }
+  [[nodiscard]] bool done() const { return !search_ && !lacks_values() && (pending_bricks_ == 0 || is_full()); }
   // More is wanted than the client may hold.
   [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }
 
@@ -87,6 +93,7 @@ class StreamPlan {
     double pixels = 0;  // on the camera's screen; 0 without one
   };
   [[nodiscard]] Remaining remaining() const;
+  [[nodiscard]] std::size_t memory_bytes() const;  // besides the data set and what is relevant
 
  private:
   // A channel, and the updates that the client has its values of.
@@ -121,6 +128,7 @@ class StreamPlan {
   void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
   [[nodiscard]] unsigned error_step(SupercubeIndex s) const;
   void set_error_step(SupercubeIndex s, unsigned step);
+  void rank_bricks();
   void begin_band();
   // Upper bounds over updates that were visited and not sent.
   struct Unsent {
@@ -129,7 +137,7 @@ class StreamPlan {
   };
   bool visit_brick(BrickIndex brick, BatchBuilder& builder);
   std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent, BatchBuilder& builder);
-  bool add_band(const Ranking::Supercube& ranking, Place place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest);
+  bool add_band(const Ranking::Supercube& ranking, const Place& place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest);
   bool add_with_ancestors(const Place& place, SetNeighbours& around, BatchBuilder& builder);
   bool add(const Place& place, BatchBuilder& builder);
   bool add_all(const SlotGroup& group, BatchBuilder& builder);
@@ -149,7 +157,8 @@ class StreamPlan {
   std::vector<std::size_t> wanted_channels_;  // ascending
   std::uint32_t next_lacking_ = 0;            // bricks before this one lack no value that is wanted
   std::optional<Ranking> ranking_;
-  std::optional<SplitSet> budget_;  // with max_updates: the updates within the budget
+  std::shared_ptr<BudgetSearch> search_;  // with max_updates, until its result is taken
+  std::optional<SplitSet> budget_;        // then: the updates within the budget
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);
   std::uint32_t pending_bricks_ = 0;  // whose rank is not 0
   Rank band_ = 0;                     // the lowest rank of the current band

@@ -8,6 +8,11 @@
 #include "common/selection/stream_plan.h"
 
 namespace intervale {
+namespace {
+
+constexpr std::uint32_t kMaxSearched = 1 << 16;  // supercubes in one call of next_values(), which ends its batch
+
+}  // namespace
 
 bool StreamPlan::resume(std::size_t channel, SupercubeKey key, std::uint64_t slots) {
   const SupercubeSet& set = volume_->set();
@@ -56,15 +61,17 @@ std::vector<std::uint8_t> StreamPlan::send_values(std::span<const SlotGroup> gro
   return names;
 }
 
-// A batch of values for what was sent without them, from coarse to fine.
+// A batch of values for what was sent without them, from coarse to fine. Nothing: the next call goes on.
 std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
   const SupercubeSet& set = volume_->set();
   const std::size_t update_bytes = most_channel_bytes(*volume_, wanted_channels_);
   std::vector<SlotGroup> groups;
   std::size_t bytes = kPlaneBytes;
   bool is_full = false;
-  for (; next_lacking_ < pending_.size() && !is_full; next_lacking_ += std::uint32_t(!is_full)) {
+  std::uint32_t visited = 0;
+  for (; next_lacking_ < pending_.size() && !is_full && visited < kMaxSearched; next_lacking_ += std::uint32_t(!is_full)) {
     const BrickIndex brick(next_lacking_);
+    visited += std::uint32_t(std::popcount(set.bricks()[brick].mask));
     const std::size_t before = groups.size();
     bytes += kBrickBytes;
     set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {

@@ -1,8 +1,12 @@
 #include "server/builder/all_cores.h"
 
+#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <new>
 #include <utility>
 
 namespace intervale {
@@ -18,9 +22,29 @@ ParallelFor on_all_cores_until(std::stop_token stop) {
   };
 }
 
+ParallelFor serial_until(std::stop_token stop) {
+  return [stop = std::move(stop)](std::size_t count, const std::function<void(std::size_t)>& piece) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (stop.stop_requested()) throw Stopped();
+      piece(i);
+    }
+  };
+}
+
+struct AllCores::Scheduler {
+  tbb::task_scheduler_handle handle{tbb::attach{}};
+};
+AllCores::AllCores() : scheduler_(std::make_unique<Scheduler>()) {}
+AllCores::~AllCores() { (void)tbb::finalize(scheduler_->handle, std::nothrow); }  // false: other threads still use oneTBB
+
 void on_spare_cores(const std::function<void()>& work) {
   tbb::task_arena arena(tbb::task_arena::automatic, 1, tbb::task_arena::priority::low);
   arena.execute(work);
+}
+
+void yield_to_other_threads() {
+  constexpr int kNice = 10;
+  (void)::setpriority(PRIO_PROCESS, id_t(::gettid()), kNice);  // on Linux of one thread; it only fails if it is lower already
 }
 
 }  // namespace intervale

@@ -233,10 +233,10 @@ VolumeTable make_volume_table(const Volume& volume) {
   constexpr std::size_t kPoints = 1 << 19, kMostPoints = kPoints << 4;
   const auto [least, greatest] = sample_range(volume);
   for (std::size_t points = kPoints;; points *= 4) {
-    const std::vector<VolumePoint> estimate = estimate_volumes(volume, least, greatest, points, kTolerance);
+    const std::vector<DistributionPoint> estimate = estimate_volumes(volume, least, greatest, points, kTolerance);
     std::vector<double> positions;
     positions.reserve(estimate.size());
-    for (const VolumePoint& p : estimate) positions.push_back(p.value);
+    for (const DistributionPoint& p : estimate) positions.push_back(p.value);
     VolumeTable table = table_at(volume, std::move(positions));
     // Where the estimate differs in what lies between two positions, it may also differ in how that is distributed.
     bool is_close = true;

@@ -8,12 +8,6 @@
 #include <cstddef>
 
 namespace intervale {
-namespace {
-
-constexpr std::size_t kGrain = 1 << 14;  // samples that a thread takes at once
-
-}  // namespace
-
 SampleRange sample_range(const Volume& volume) {
   using Indices = tbb::blocked_range<std::size_t>;
   return visit_samples(volume, []<class T>(std::span<const T> samples) {
@@ -24,7 +18,7 @@ SampleRange sample_range(const Volume& volume) {
     const auto joined = [](const std::array<T, 2>& a, const std::array<T, 2>& b) {
       return std::array<T, 2>{std::min(a[0], b[0]), std::max(a[1], b[1])};
     };
-    const auto range = tbb::parallel_reduce(Indices(0, samples.size(), kGrain), std::array<T, 2>{samples[0], samples[0]}, widened, joined);
+    const auto range = tbb::parallel_reduce(Indices(0, samples.size(), kSamplesAtOnce), std::array<T, 2>{samples[0], samples[0]}, widened, joined);
     return SampleRange{double(range[0]) + 0.0, double(range[1]) + 0.0};
   });
 }

@@ -1,9 +1,13 @@
 // The least and the greatest sample of a volume.
 #pragma once
 
+#include <cstddef>
+
 #include "server/volume/volume.h"
 
 namespace intervale {
+
+inline constexpr std::size_t kSamplesAtOnce = 1 << 14;  // that a thread takes
 
 struct SampleRange {
   double least = 0, greatest = 0;  // never -0

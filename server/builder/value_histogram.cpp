@@ -10,19 +10,19 @@
 #include <functional>
 #include <span>
 
+#include "server/builder/sample_range.h"
 #include "server/builder/value_steps.h"
 
 namespace intervale {
 namespace {
 
-constexpr std::size_t kGrain = 1 << 14;  // samples that a thread takes at once
 using Counts = std::array<std::uint64_t, kMostBins>;
 
 // bin_of: of a sample; less than kMostBins.
 template <class T, class BinOf>
 Counts count(std::span<const T> samples, const BinOf& bin_of) {
   tbb::enumerable_thread_specific<Counts> all(Counts{});
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, samples.size(), kGrain), [&](const auto& part) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, samples.size(), kSamplesAtOnce), [&](const auto& part) {
     Counts& counts = all.local();
     for (std::size_t i = part.begin(); i < part.end(); ++i) ++counts[bin_of(samples[i])];
   });

@@ -23,7 +23,6 @@ namespace intervale {
 namespace {
 
 constexpr std::size_t kMostExact = std::size_t(1) << 16;  // values of an exact format that is chosen unasked
-constexpr std::size_t kGrain = 1 << 14;                   // samples that a thread takes at once
 constexpr int kDefaultBits = 11;                          // 2^11 steps or more where nothing else is asked for
 constexpr double kMostSteps = 0x1p53;                     // from 0: whole numbers that a double distinguishes
 
@@ -68,7 +67,7 @@ template <class T>
 std::vector<double> few_distinct(std::span<const T> samples) {
   tbb::enumerable_thread_specific<DistinctSet<T>> sets;
   std::atomic<bool> too_many = false;
-  tbb::parallel_for(Indices(0, samples.size(), kGrain), [&](const Indices& part) {
+  tbb::parallel_for(Indices(0, samples.size(), kSamplesAtOnce), [&](const Indices& part) {
     DistinctSet<T>& set = sets.local();
     if (too_many.load(std::memory_order_relaxed)) return;
     for (std::size_t i = part.begin(); i < part.end() && !set.is_full(); ++i) set.insert(samples[i]);
@@ -179,7 +178,7 @@ Result<ValueFormat> choose_value_format(const Volume& volume, std::optional<doub
 std::vector<ValueKey> keys_of(const Volume& volume, const ValueFormat& format) {
   std::vector<ValueKey> keys(volume.grid.sample_count());
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
-    tbb::parallel_for(Indices(0, samples.size(), kGrain), [&](const Indices& part) {
+    tbb::parallel_for(Indices(0, samples.size(), kSamplesAtOnce), [&](const Indices& part) {
       for (std::size_t i = part.begin(); i < part.end(); ++i) keys[i] = key_of_sample(format, samples[i]);
     });
   });
@@ -190,7 +189,7 @@ void round_samples(Volume& volume, const ValueFormat& format) {
   visit_samples(volume, [&]<class T>(std::span<const T>) {
     if constexpr (!std::is_integral_v<T>) {
       T* const samples = reinterpret_cast<T*>(volume.bytes.data());
-      tbb::parallel_for(Indices(0, volume.bytes.size() / sizeof(T), kGrain), [&](const Indices& part) {
+      tbb::parallel_for(Indices(0, volume.bytes.size() / sizeof(T), kSamplesAtOnce), [&](const Indices& part) {
         for (std::size_t i = part.begin(); i < part.end(); ++i) samples[i] = T(format.value(format.key(double(samples[i]))));
       });
     }

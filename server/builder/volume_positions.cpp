@@ -64,9 +64,9 @@ std::vector<double> values_at_points(std::span<const T> samples, const std::arra
 }
 
 // The distribution of these values, which ascend and lie within [least, greatest] up to rounding.
-std::vector<VolumePoint> distribution_of(const std::vector<double>& values, double least, double greatest) {
+std::vector<DistributionPoint> distribution_of(const std::vector<double>& values, double least, double greatest) {
   const double unit = 1 / double(values.size());
-  std::vector<VolumePoint> points{{least, 0, 0}};
+  std::vector<DistributionPoint> points{{least, 0, 0}};
   for (std::size_t i = 0; i < values.size();) {
     const double value = std::clamp(values[i], least, greatest);
     const std::size_t begin = i;
@@ -81,20 +81,20 @@ std::vector<VolumePoint> distribution_of(const std::vector<double>& values, doub
 // The slopes of the lines from a point that pass others within a tolerance.
 class Cone {
  public:
-  Cone(const VolumePoint& apex, double tolerance) : apex_(apex), tolerance_(tolerance) {}
-  [[nodiscard]] bool contains(const VolumePoint& p) const {
+  Cone(const DistributionPoint& apex, double tolerance) : apex_(apex), tolerance_(tolerance) {}
+  [[nodiscard]] bool contains(const DistributionPoint& p) const {
     const double slope = (p.below - apex_.not_above) / along(p);
     return flattest_ <= slope && slope <= steepest_;
   }
-  void narrow(const VolumePoint& p) {
+  void narrow(const DistributionPoint& p) {
     flattest_ = std::max(flattest_, (p.not_above - tolerance_ - apex_.not_above) / along(p));
     steepest_ = std::min(steepest_, (p.below + tolerance_ - apex_.not_above) / along(p));
   }
 
  private:
   // Halved: the difference of two doubles can overflow.
-  [[nodiscard]] double along(const VolumePoint& p) const { return p.value / 2 - apex_.value / 2; }
-  VolumePoint apex_;
+  [[nodiscard]] double along(const DistributionPoint& p) const { return p.value / 2 - apex_.value / 2; }
+  DistributionPoint apex_;
   double tolerance_, flattest_ = -std::numeric_limits<double>::infinity(), steepest_ = std::numeric_limits<double>::infinity();
 };
 
@@ -102,10 +102,10 @@ class Cone {
 
 // Joseph O'Rourke, An on-line algorithm for fitting straight lines between data ranges, 1981. Here lines begin and end
 // on the distribution; each ends at the last point that it can reach before the first one that it cannot.
-std::vector<VolumePoint> estimate_volumes(const Volume& volume, double least, double greatest, std::size_t count, double tolerance) {
+std::vector<DistributionPoint> estimate_volumes(const Volume& volume, double least, double greatest, std::size_t count, double tolerance) {
   const std::vector<double> values = visit_samples(volume, [&](auto samples) { return values_at_points(samples, volume.grid.dims, count); });
-  const std::vector<VolumePoint> points = distribution_of(values, least, greatest);
-  std::vector<VolumePoint> chosen{points[0]};
+  const std::vector<DistributionPoint> points = distribution_of(values, least, greatest);
+  std::vector<DistributionPoint> chosen{points[0]};
   Cone cone(points[0], tolerance);
   for (std::size_t i = 1; i < points.size(); ++i) {
     if (!cone.contains(points[i])) {

@@ -9,7 +9,7 @@
 namespace intervale {
 
 // A point of the distribution of F over the box: the shares of {F < value} and {F <= value}, 0 to 1.
-struct VolumePoint {
+struct DistributionPoint {
   double value = 0, below = 0, not_above = 0;
 };
 
@@ -19,6 +19,7 @@ struct VolumePoint {
 //
 // The distribution is estimated from F at `count` points of the box or up to twice as many, in as many tetrahedra or in
 // all. least, greatest: of all samples. O(count log count); independent of the number of threads.
-[[nodiscard]] std::vector<VolumePoint> estimate_volumes(const Volume& volume, double least, double greatest, std::size_t count, double tolerance);
+[[nodiscard]] std::vector<DistributionPoint> estimate_volumes(const Volume& volume, double least, double greatest, std::size_t count,
+                                                              double tolerance);
 
 }  // namespace intervale

@@ -266,9 +266,8 @@ void add_build_command(Program& program) {
       program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
   command.add_option("INPUT", o->input, "Volume: .nrrd, .nhdr, or raw samples (with --dims and --type)")->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
-  add_range_option(
-      command, o->range,
-      "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range, and cannot be served yet");
+  add_range_option(command, o->range,
+                   "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range");
   command
       .add_option("--step", o->step,
                   "Distance of the values that floats are rounded to, so that each is off by S/2 at most; 0: exact. Default: exact if 65536 "

@@ -1,6 +1,8 @@
+#include "server/builder/all_cores.h"
 #include "server/cli/commands.h"
 
 int main(int argc, char** argv) {
+  const intervale::AllCores all_cores;
   intervale::Program program("intervale", "Build, inspect, extract and serve multiresolution interval volumes");
   intervale::add_sample_command(program);
   intervale::add_build_command(program);

@@ -101,15 +101,17 @@ CLI::Option* add_limit(CLI::App& command, const std::string& name, Limit& limit,
 }
 
 void add_limits(CLI::App& command, ServeOptions& serve) {
-  add_limit(command, "--max-connections", serve.max_connections, "Connections at a time; further ones are closed at once")->capture_default_str();
+  add_limit(command, "--max-connections", serve.max_connections, "Connections at a time; further ones take the place of silent ones, or are closed")
+      ->capture_default_str();
   add_limit(command, "--max-connections-per-address", serve.max_connections_per_address,
-            "Connections of one address (IPv6: of one /64) at a time. Do not use it behind a proxy: all its clients share one address. "
+            "Connections of one address (IPv6: of one /64) at a time. Behind a proxy it needs --trusted-proxy. "
             "Default: no limit")
       ->type_name("N");
   add_limit(command, "--max-sessions", serve.max_sessions, "Sessions at a time; further ones are answered 503. Default: no limit")->type_name("N");
   const auto bytes = CLI::AsSizeValue(true);
   add_limit(command, "--max-memory", serve.max_memory,
-            "Resident memory above which new sessions are answered 503, such as 2GiB or 500MB. Default: no limit")
+            "Memory of data sets, sessions, unsent messages and ranges above which new sessions are answered 503, such as 2GiB or 500MB. "
+            "Default: no limit")
       ->transform(bytes)
       ->type_name("BYTES");
   add_limit(command, "--max-queued-bytes", serve.max_queued_bytes,
@@ -162,6 +164,18 @@ void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
         return std::string(may_be_origin(origin) ? "" : "must be like https://example.org:8443, without a path, or *");
       })
       ->type_name("ORIGIN")
+      ->group(group);
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--trusted-proxy",
+          [&serve](const std::vector<std::string>& texts) {
+            auto proxies = TrustedProxies::parse(texts);
+            if (!proxies) throw CLI::ValidationError("--trusted-proxy", proxies.error().message);
+            serve.proxies = std::move(*proxies);
+          },
+          "Addresses and networks of proxies, such as 10.0.0.0/8, whose X-Forwarded-For tells the client's address: the server shares "
+          "its time among clients by address; separated by commas in the environment")
+      ->type_name("ADDRESS")
       ->group(group);
 }
 

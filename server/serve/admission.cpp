@@ -1,9 +1,6 @@
 #include "server/serve/admission.h"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 #include <vector>
 
@@ -12,8 +9,10 @@ namespace {
 
 constexpr std::chrono::seconds kMinWriteTime{1};  // before a write counts as slow
 
-AddressCounts::Key key_of(const boost::asio::ip::address& address) {
-  AddressCounts::Key key{};
+}  // namespace
+
+AddressKey key_of(const boost::asio::ip::address& address) {
+  AddressKey key{};
   if (address.is_v6() && !address.to_v6().is_v4_mapped()) {
     const auto bytes = address.to_v6().to_bytes();
     key[0] = 6;
@@ -26,8 +25,6 @@ AddressCounts::Key key_of(const boost::asio::ip::address& address) {
   }
   return key;
 }
-
-}  // namespace
 
 std::optional<AddressCounts::Lease> AddressCounts::try_acquire(const boost::asio::ip::address& address, std::size_t limit) {
   const Key key = key_of(address);
@@ -55,7 +52,7 @@ WriteBudget::Reservation WriteBudget::reserve(std::weak_ptr<Connection> connecti
     Write& oldest = writes_.front();
     bytes_ -= std::exchange(oldest.bytes, 0);
     if (auto slow = oldest.connection.lock()) {
-      slow->abort();
+      slow->abort("the limit of unsent bytes is reached, and this client is the slowest reader");
       keep_alive.push_back(std::move(slow));
     }
     aborted_.splice(aborted_.end(), writes_, writes_.begin());
@@ -72,15 +69,6 @@ void WriteBudget::release(Writes::iterator write) {
 std::size_t WriteBudget::bytes() const {
   const std::lock_guard lock(mutex_);
   return bytes_;
-}
-
-std::uint64_t resident_bytes() {
-  unsigned long pages = 0;
-  if (std::FILE* const file = std::fopen("/proc/self/statm", "re")) {
-    if (std::fscanf(file, "%*s %lu", &pages) != 1) pages = 0;
-    std::fclose(file);
-  }
-  return std::uint64_t(pages) * std::uint64_t(::sysconf(_SC_PAGESIZE));
 }
 
 }  // namespace intervale

@@ -36,10 +36,15 @@ class RateLimit {
   Clock::time_point next_{};
 };
 
-// Connections by address. An IPv6 address counts with its /64, since a host usually has a whole /64.
+// The IP version, and the first 64 bits of the address: a host usually has a whole /64 of IPv6. A mapped IPv4 address is an
+// IPv4 address.
+using AddressKey = std::array<std::uint8_t, 9>;
+[[nodiscard]] AddressKey key_of(const boost::asio::ip::address& address);
+
+// Connections by address.
 class AddressCounts {
  public:
-  using Key = std::array<std::uint8_t, 9>;  // the IP version, and the first 64 bits of the address
+  using Key = AddressKey;
   struct Release {
     Key key{};
     void operator()(AddressCounts* counts) const { counts->release(key); }
@@ -87,10 +92,5 @@ class WriteBudget {
   Writes writes_;          // oldest first
   Writes aborted_;         // of connections that were told to abort; their bytes are 0
 };
-
-// The resident memory of the process, from /proc; 0 if it cannot be read. Takes some microseconds.
-[[nodiscard]] std::uint64_t resident_bytes();
-// Whether that is more than a limit, if there is one.
-[[nodiscard]] inline bool exceeds_memory(const std::optional<std::uint64_t>& limit) { return limit && resident_bytes() > *limit; }
 
 }  // namespace intervale

@@ -13,7 +13,7 @@ namespace {
 
 // Names occur in URLs, JSON, metrics, logs and terminals.
 bool is_valid_name(const std::string& name) {
-  return !name.empty() && name.size() <= protocol::kMaxName && is_utf8(name) && printable(name) == name &&
+  return !name.empty() && name.size() <= protocol::kMaxName && is_utf8(name) && !has_control_characters(name) &&
          std::none_of(name.begin(), name.end(), [](char c) { return c == '/' || c == '?' || c == '#'; });
 }
 

@@ -8,7 +8,7 @@
 
 #include "common/ivm/load_volume.h"
 #include "protocol/codec.h"
-#include "server/serve/admission.h"
+#include "server/builder/all_cores.h"
 
 namespace intervale {
 namespace {
@@ -27,78 +27,105 @@ Result<std::vector<fs::path>> files_in(const fs::path& folder) {
   return files;
 }
 
-// A file that needs more memory than there is (std::bad_alloc) is an error, and does not end the server.
+// A file that needs more memory than the system has (std::bad_alloc) is an error, and does not end the server. NoRoom is
+// for the caller: there may be room later.
 template <class Function>
 auto catching(const fs::path& path, const Function& function) -> decltype(function()) {
   try {
     return function();
+  } catch (const Stopped&) {
+    throw;
+  } catch (const NoRoom&) {
+    throw;
   } catch (const std::exception& exception) {
     return fail(path.string() + ": cannot be read: " + exception.what());
   }
 }
 
+// A file of a folder.
+struct Read {
+  bool is_unread = false;  // the file could not be read; its contents may be in order
+  Result<IntervalVolume> contents;
+};
+
+// Throws NoRoom if that takes more memory than `room`.
+Read read(const fs::path& path, const std::string& name, std::uint64_t room, const ParallelFor& parallel) {
+  spdlog::debug("reads {}", path.string());
+  std::error_code ignored;
+  if (const auto size = fs::file_size(path, ignored); !ignored && size > room) throw NoRoom();
+  const auto bytes = catching(path, [&] { return read_volume_file(path, parallel); });
+  if (!bytes) return {true, tl::unexpected(bytes.error())};
+  auto volume = catching(path, [&] { return decode_volume(*bytes, name, parallel, room - std::min<std::uint64_t>(room, bytes->size())); });
+  if (!volume) return {false, std::move(volume)};
+  if (auto fits = protocol::check_sendable(volume->description()); !fits) return {false, tl::unexpected(fits.error())};
+  return {false, std::move(volume)};
+}
+
 }  // namespace
 
-Result<Catalogue> CatalogueWatcher::load(const std::function<bool()>& keep_going) {
+Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
+  const ParallelFor parallel = serial_until(std::move(stop));
   for (const fs::path& input : inputs_) {
-    if (!keep_going()) break;
     std::error_code ignored;
     if (fs::is_directory(input, ignored)) {
-      if (auto loaded = load_folder(input, keep_going); !loaded) return tl::unexpected(loaded.error());
+      if (auto loaded = load_folder(input, parallel); !loaded) return tl::unexpected(loaded.error());
       continue;
     }
-    auto volume = catching(input, [&] { return load_volume(input); });
+    spdlog::debug("reads {}", input.string());
+    auto volume = catching(input, [&] { return load_volume(input, parallel); });
     if (!volume) return tl::unexpected(volume.error());
-    files_.emplace_back(input, std::move(*volume));
+    files_.emplace_back(input, counted(memory_, Memory::Holder::datasets, std::move(*volume)));
   }
   return catalogue(true);
 }
 
-Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const std::function<bool()>& keep_going) {
+Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const ParallelFor& parallel) {
   const auto paths = files_in(folder);
   if (!paths) return tl::unexpected(paths.error());
   for (const fs::path& path : *paths) {
-    if (!keep_going()) break;
     File file;
     file.last_seen = stamp_of(path);  // the first load does not wait for a second look
-    poll_file(path, file);
+    poll_file(path, file, parallel);
     folder_files_[path] = std::move(file);
   }
   return {};
 }
 
 // Reads the file if it has changed and is stable. True if its contents are new.
-bool CatalogueWatcher::poll_file(const fs::path& path, File& file) {
+bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const ParallelFor& parallel) {
   // Before reading: a write during the read then counts as a change.
   const auto stamp = stamp_of(path);
   const bool is_stable = stamp == std::exchange(file.last_seen, stamp);
+  if (!is_stable) file.too_little = 0;
   if (!stamp || stamp == file.stamp || !is_stable) return false;
-  if (exceeds_memory(max_memory_)) {
-    if (!std::exchange(memory_warned_, true)) spdlog::warn("{} is not loaded: the process has reached --max-memory", path.string());
-    return false;
-  }
-  memory_warned_ = false;
   const auto skip = [&file](const std::string& why) {
     if (std::exchange(file.last_warning, why) != why) spdlog::warn("{}: {}", file.volume ? "the data read before stays in use" : "skipped", why);
     return false;
   };
   const std::string name = path.stem().string();
   if (auto fit = Catalogue::check_name(name); !fit) return skip(path.string() + ": " + fit.error().message);
-  const auto bytes = catching(path, [&] { return read_volume_file(path); });
-  // Not the file's fault, perhaps: out of descriptors, or no permission; tried again even if the file stays as it is.
-  if (!bytes) return skip(bytes.error().message);
-  file.stamp = stamp;
-  file.last_warning.clear();
-  auto volume = catching(path, [&] { return decode_volume(*bytes, name); });
-  if (!volume) return skip(path.string() + ": " + volume.error().message);
-  if (auto fits = protocol::check_sendable(volume->description()); !fits) return skip(path.string() + ": " + fits.error().message);
-  // It includes a hash of the contents.
-  if (file.volume && file.volume->description() == volume->description()) return false;
-  file.volume = std::make_shared<const IntervalVolume>(std::move(*volume));
-  return true;
+  const std::uint64_t room = memory_.room();
+  try {
+    if (room <= file.too_little) throw NoRoom();
+    auto volume = read(path, name, room, parallel);
+    file.too_little = 0;
+    // Not the file's fault, perhaps: out of descriptors, or no permission; tried again even if the file stays as it is.
+    if (volume.is_unread) return skip(volume.contents.error().message);
+    file.stamp = stamp;
+    file.last_warning.clear();
+    if (!volume.contents) return skip(path.string() + ": " + volume.contents.error().message);
+    // It includes a hash of the contents.
+    if (file.volume && file.volume->description() == volume.contents->description()) return false;
+    file.volume = counted(memory_, Memory::Holder::datasets, std::make_shared<const IntervalVolume>(std::move(*volume.contents)));
+    return true;
+  } catch (const NoRoom&) {
+    file.too_little = std::max(file.too_little, room);
+    return skip(path.string() + ": it takes more memory than --max-memory leaves; it is read once there is room");
+  }
 }
 
-std::optional<Catalogue> CatalogueWatcher::poll() {
+std::optional<Catalogue> CatalogueWatcher::poll(std::stop_token stop) {
+  const ParallelFor parallel = serial_until(std::move(stop));
   bool changed = false;
   std::map<fs::path, File> found;
   for (const fs::path& input : inputs_) {
@@ -119,7 +146,7 @@ std::optional<Catalogue> CatalogueWatcher::poll() {
       const auto known = folder_files_.find(path);
       File file = known == folder_files_.end() ? File() : known->second;
       const bool was_known = file.volume != nullptr;
-      if (poll_file(path, file)) {
+      if (poll_file(path, file, parallel)) {
         changed = true;
         spdlog::info("{} {}", path.string(), was_known ? "was reloaded" : "was loaded");
       }

@@ -3,17 +3,19 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <optional>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/util/parallel.h"
 #include "common/util/result.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/file_stamp.h"
+#include "server/serve/memory.h"
 
 namespace intervale {
 
@@ -21,22 +23,21 @@ namespace intervale {
 // sessions that use its data set.
 class CatalogueWatcher {
  public:
-  // inputs: files, and folders of *.ivm files (without their subfolders). While the process has more than max_memory
-  // bytes resident, poll() and load() read no more files.
-  explicit CatalogueWatcher(std::vector<std::filesystem::path> inputs, std::optional<std::uint64_t> max_memory = {})
-      : inputs_(std::move(inputs)), max_memory_(max_memory) {}
+  // inputs: files, and folders of *.ivm files (without their subfolders). memory: counts the data sets, and must outlive
+  // them; files of folders that would take more than its room are not read until there is more.
+  CatalogueWatcher(std::vector<std::filesystem::path> inputs, Memory& memory) : inputs_(std::move(inputs)), memory_(memory) {}
 
   // The catalogue at the start. A file in a folder that is damaged, or whose name is invalid, is logged and skipped.
   // A named file with such a fault is an error; so are two data sets of one name, and a folder that cannot be read.
-  // keep_going is called before each file; if it returns false, the result has the files read so far.
-  Result<Catalogue> load(const std::function<bool()>& keep_going = [] { return true; });
+  // Once stop is requested, load() and poll() give up what they read within milliseconds, and throw Stopped.
+  Result<Catalogue> load(std::stop_token stop = {});
 
   // Reads the folders again. Returns the new catalogue, or nullopt if nothing changed. A new or changed file is
   // loaded once it is the same in two consecutive polls, so that no file is read while it is written. If a file is
   // damaged or cannot be read, which is logged once, its last good contents stay; a file that cannot be read is tried
   // again in every poll. A file that was removed leaves the catalogue. Of two data sets of one name, the one whose
   // file comes first counts.
-  std::optional<Catalogue> poll();
+  std::optional<Catalogue> poll(std::stop_token stop = {});
 
  private:
   struct File {
@@ -44,16 +45,16 @@ class CatalogueWatcher {
     Catalogue::Volume volume;            // its last good contents; nullptr: none
     std::optional<FileStamp> last_seen;  // in the last poll
     std::string last_warning;            // logged since it was last read, not to be repeated
+    std::uint64_t too_little = 0;        // in so little room it was not read
   };
-  Result<void> load_folder(const std::filesystem::path& folder, const std::function<bool()>& keep_going);
-  bool poll_file(const std::filesystem::path& path, File& file);
+  Result<void> load_folder(const std::filesystem::path& folder, const ParallelFor& parallel);
+  bool poll_file(const std::filesystem::path& path, File& file, const ParallelFor& parallel);
   [[nodiscard]] Result<Catalogue> catalogue(bool is_start) const;
 
   std::vector<std::filesystem::path> inputs_;
-  std::optional<std::uint64_t> max_memory_;
+  Memory& memory_;
   std::vector<std::pair<std::filesystem::path, Catalogue::Volume>> files_;  // named as inputs
   std::map<std::filesystem::path, File> folder_files_;                      // in folders
-  bool memory_warned_ = false;                                              // the memory limit was logged
   std::set<std::filesystem::path> unreadable_folders_;                      // that were logged
 };
 

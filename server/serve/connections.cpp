@@ -8,8 +8,30 @@ Connections::Registration Connections::add(const std::shared_ptr<Connection>& co
   const std::unique_lock lock(mutex_);
   const std::uint64_t id = next_id_++;
   connections_.emplace(id, connection);
+  waiting_.emplace(next_place_, id);
   if (draining_) connection->begin_shutdown();  // does not block
-  return Registration(this, {id});
+  return Registration(this, {id, next_place_++});
+}
+
+void Connections::set_waiting(Registration& registration, bool waits) {
+  const std::lock_guard lock(mutex_);
+  auto& [id, place] = registration.get_deleter();
+  if (place) waiting_.erase(*place);
+  place.reset();
+  if (!waits) return;
+  place = next_place_++;
+  waiting_.emplace(*place, id);
+}
+
+bool Connections::make_room(std::size_t most) {
+  std::shared_ptr<Connection> longest;  // destroyed after the lock is released: its destructor calls remove()
+  const std::lock_guard lock(mutex_);
+  if (connections_.size() < most) return true;
+  if (connections_.size() >= most + kMostAborted || waiting_.empty()) return false;
+  longest = connections_.at(waiting_.begin()->second).lock();
+  waiting_.erase(waiting_.begin());
+  if (longest) longest->abort("it waited longest for its client when there was no room for another connection");  // does not block
+  return true;
 }
 
 void Connections::begin_shutdown() {
@@ -40,9 +62,10 @@ std::size_t Connections::size() const {
   return connections_.size();
 }
 
-void Connections::remove(std::uint64_t id) {
+void Connections::remove(const Remove& registration) {
   const std::lock_guard lock(mutex_);
-  connections_.erase(id);
+  connections_.erase(registration.id);
+  if (registration.place) waiting_.erase(*registration.place);
   if (connections_.empty()) empty_.notify_all();
 }
 

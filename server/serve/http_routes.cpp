@@ -140,7 +140,7 @@ HttpResponse retry_later(std::string line, const char* seconds) {
   return response;
 }
 
-const char* text_of(ServerStatus status) { return std::array{"loading", "ok", "draining"}[std::size_t(status)]; }
+const char* text_of(ServerStatus status) { return std::array{"loading", "ok", "full", "draining"}[std::size_t(status)]; }
 
 HttpResponse unauthorized() {
   HttpResponse response = text_response(401, "a token is required: Authorization: Bearer TOKEN");
@@ -161,8 +161,10 @@ HttpResponse respond(const HttpRequest& request, const HttpState& state) {
     if (!request.scope->is_everything()) return text_response(403, "metrics cover every data set: a token that grants all of them is required");
   }
   if (*path == "/metrics") {
-    return ok(kPrometheus, state.metrics.text(
-                               {.catalogue = state.catalogue, .queued_bytes = state.queued_bytes, .certificate_expires = state.certificate_expires}));
+    return ok(kPrometheus, state.metrics.text({.catalogue = state.catalogue,
+                                               .memory = state.memory,
+                                               .queued_bytes = state.queued_bytes,
+                                               .certificate_expires = state.certificate_expires}));
   }
   if (*path == "/healthz") return text_response(200, "ok");
   if (*path == "/readyz") return text_response(state.server_status == ServerStatus::ready ? 200 : 503, text_of(state.server_status));

@@ -12,6 +12,7 @@
 
 #include "server/serve/access.h"
 #include "server/serve/catalogue.h"
+#include "server/serve/memory.h"
 #include "server/serve/metrics.h"
 #include "server/serve/static_files.h"
 
@@ -47,13 +48,15 @@ struct HttpResponse {
 // all: the main port. metrics: serves /metrics, /healthz and /readyz only.
 enum class PortRole { all, metrics };
 
-// loading: the data sets are being read. draining: no new sessions, the server shuts down.
-enum class ServerStatus { loading, ready, draining };
-[[nodiscard]] const char* text_of(ServerStatus status);  // for /readyz: "loading", "ok", "draining"
+// loading: the data sets are being read. full: no new sessions, at the limit of sessions or of memory. draining: no new
+// sessions, the server shuts down.
+enum class ServerStatus { loading, ready, full, draining };
+[[nodiscard]] const char* text_of(ServerStatus status);  // for /readyz: "loading", "ok", "full", "draining"
 
 struct HttpState {
   const Catalogue& catalogue;
   const Metrics& metrics;
+  const Memory& memory;
   const StaticFiles& viewer;
   std::uint64_t queued_bytes = 0;
   PortRole role = PortRole::all;
@@ -68,7 +71,7 @@ struct HttpState {
 // - 400: the target cannot be decoded. 404: unknown path. 405: another method.
 // - 401: no valid token, for /api/datasets and /metrics. 403: /metrics, if the token does not grant every data set.
 //   The metrics port requires no token.
-// - 503: /readyz while the server is not ready; /api/datasets while the data sets are being read.
+// - 503: /readyz while the server is not ready, or refuses new sessions; /api/datasets while the data sets are being read.
 // Pages of allowed origins may read /api/datasets with a token (CORS: Fetch standard, 3.2).
 [[nodiscard]] HttpResponse respond(const HttpRequest& request, const HttpState& state);
 

@@ -38,14 +38,18 @@ Result<tcp::endpoint> parse_endpoint(const std::string& text) {
   return tcp::endpoint(address, port);
 }
 
-Listener::Listener(asio::io_context& io, const tcp::endpoint& endpoint, ServerContext& context, PortRole role)
-    : io_(io), acceptor_(asio::make_strand(io), endpoint), endpoint_(acceptor_.local_endpoint()), context_(context), role_(role) {}
+Listener::Listener(ConnectionThreads& threads, const tcp::endpoint& endpoint, ServerContext& context, PortRole role)
+    : threads_(threads),
+      acceptor_(asio::make_strand(threads.io()), endpoint),
+      endpoint_(acceptor_.local_endpoint()),
+      context_(context),
+      role_(role) {}
 
-Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std::string& address, ServerContext& context, PortRole role) {
+Result<std::unique_ptr<Listener>> Listener::open(ConnectionThreads& threads, const std::string& address, ServerContext& context, PortRole role) {
   const auto endpoint = parse_endpoint(address);
   if (!endpoint) return tl::unexpected(endpoint.error());
   try {
-    return std::unique_ptr<Listener>(new Listener(io, *endpoint, context, role));
+    return std::unique_ptr<Listener>(new Listener(threads, *endpoint, context, role));
   } catch (const boost::system::system_error& error) {
     return fail("cannot listen on " + address + ": " + error.code().message());
   }
@@ -53,17 +57,32 @@ Result<std::unique_ptr<Listener>> Listener::open(asio::io_context& io, const std
 
 void Listener::start() { asio::co_spawn(acceptor_.get_executor(), accept_all(), asio::detached); }
 
-std::optional<AddressCounts::Lease> Listener::lease_for(const tcp::socket& socket) {
-  if (role_ != PortRole::all || !context_.options.max_connections_per_address) return AddressCounts::Lease();
+// Through a trusted proxy, connections are counted, and paid for, by their client: from the upgrade on.
+void Listener::admit(tcp::socket socket, ConnectionPayerPtr payer) {
+  // The metrics port has no limit: monitoring matters most under load.
+  if (role_ == PortRole::metrics) return start_http_session(std::move(socket), context_, role_, {}, std::move(payer));
+  if (context_.connections.size() >= context_.options.max_connections) context_.metrics.count_refusal(Refusal::connections);
+  if (!context_.connections.make_room(context_.options.max_connections)) return;  // and the socket closes
   boost::system::error_code error;
-  const auto peer = socket.remote_endpoint(error);
-  if (error) return {};  // the client has closed it already
-  return context_.addresses.try_acquire(peer.address(), *context_.options.max_connections_per_address);
+  const asio::ip::address peer = socket.remote_endpoint(error).address();
+  if (error) return;  // the client has closed it already
+  AddressCounts::Lease lease;
+  if (!context_.options.proxies.contains(peer)) {
+    if (const auto& most = context_.options.max_connections_per_address) {
+      auto counted = context_.addresses.try_acquire(peer, *most);
+      if (!counted) return context_.metrics.count_refusal(Refusal::address);
+      lease = std::move(*counted);
+    }
+    payer->set(context_.accounts.of_address(peer));
+  }
+  start_http_session(std::move(socket), context_, role_, std::move(lease), std::move(payer));
 }
 
 asio::awaitable<void> Listener::accept_all() {
   for (;;) {
-    auto [error, accepted] = co_await acceptor_.async_accept(asio::make_strand(io_), kAwait);
+    auto payer = threads_.make_payer();
+    const auto strand = asio::make_strand(ConnectionExecutor(payer));
+    auto [error, accepted] = co_await acceptor_.async_accept(strand, kAwait);
     if (error) {
       // Most likely there is no file descriptor left: existing connections continue, and there may be one later.
       spdlog::warn("cannot accept a connection: {}", error.message());
@@ -71,18 +90,7 @@ asio::awaitable<void> Listener::accept_all() {
       co_await pause.async_wait(kAwait);
       continue;
     }
-    tcp::socket socket(std::move(accepted));
-    // The metrics port has no limit: monitoring matters most under load.
-    if (role_ == PortRole::all && context_.connections.size() >= context_.options.max_connections) {
-      context_.metrics.count_refusal(Refusal::connections);  // and the socket closes
-      continue;
-    }
-    auto address_lease = lease_for(socket);
-    if (!address_lease) {
-      context_.metrics.count_refusal(Refusal::address);
-      continue;
-    }
-    start_http_session(std::move(socket), context_, role_, std::move(*address_lease));
+    admit(tcp::socket(std::move(accepted)), std::move(payer));
   }
 }
 

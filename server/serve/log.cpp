@@ -29,8 +29,9 @@ class Message : public spdlog::custom_flag_formatter {
       fmt::format_to(end, "{}", printable(payload));
     } else {
       if (log_detail::session) fmt::format_to(end, "\"session\":{},", *log_detail::session);
-      // JSON must be UTF-8; a file name in a message may not be.
-      fmt::format_to(end, "\"message\":{}", nlohmann::json(payload).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+      // JSON must be UTF-8; a file name in a message may not be. Escapes of all that is not ASCII make it safe to look at.
+      constexpr bool kAscii = true;
+      fmt::format_to(end, "\"message\":{}", nlohmann::json(payload).dump(-1, ' ', kAscii, nlohmann::json::error_handler_t::replace));
     }
   }
   [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override { return std::make_unique<Message>(format_); }

@@ -25,8 +25,8 @@ struct LogOptions {
 void set_log_level(const std::string& name);
 
 // Text: "2026-01-31T12:00:00.000+00:00 info session 7 closed: …". JSON: one object on each line, with time, level,
-// session (in lines about a session) and message. A message is one line: control characters are escaped, or in text
-// replaced by '?'.
+// session (in lines about a session) and message. A message is one line. Text: printable(). JSON: ASCII, all else is
+// escaped.
 void start_log(const LogOptions& options);
 void configure_log(const LogOptions& options);  // sets format and level of the existing default logger
 

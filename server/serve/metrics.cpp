@@ -8,8 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "server/serve/admission.h"
-
 namespace intervale {
 namespace {
 
@@ -20,6 +18,9 @@ using prometheus::Registry;
 
 // The codes with a series of their own. A client may send any code, and must not create series without limit.
 constexpr std::array<unsigned, 14> kCodes{1000, 1001, 1002, 1003, 1005, 1011, 4400, 4401, 4403, 4404, 4408, 4409, 4413, 4426};
+
+// In the order of Memory::kHolders.
+constexpr std::array<const char*, Memory::kHolders.size()> kHolders{"datasets", "sessions", "queues", "ranges"};
 
 // In Refusal's order.
 constexpr std::array<const char*, 6> kReasons{"connections", "address", "sessions", "memory", "origin", "token"};
@@ -94,6 +95,13 @@ std::string Metrics::text(const Gauges& now) const {
   std::vector<MetricFamily> families = registry_.Collect();
   std::vector<prometheus::ClientMetric> memory;
   for (const auto& [name, volume] : now.catalogue.volumes()) memory.push_back(value(double(volume->memory_bytes()), {{"dataset", name}}));
+  std::vector<prometheus::ClientMetric> held;
+  held.reserve(Memory::kHolders.size());
+  for (const Memory::Holder holder : Memory::kHolders)
+    held.push_back(value(double(now.memory.bytes(holder)), {{"holder", kHolders[std::size_t(holder)]}}));
+  families.push_back(gauges("intervale_memory_bytes", "Memory that the server counts, by holder; --max-memory limits the sum.", std::move(held)));
+  families.push_back(gauges("intervale_uncounted_memory_bytes", "Resident memory that is not counted: the program, work under way, the allocator's.",
+                            {value(double(uncounted_bytes(now.memory)))}));
   families.push_back(gauges("intervale_queued_bytes", "Unsent bytes of streaming messages.", {value(double(now.queued_bytes))}));
   families.push_back(gauges("intervale_datasets", "Data sets served.", {value(double(now.catalogue.volumes().size()))}));
   families.push_back(gauges("intervale_dataset_memory_bytes", "Memory of a data set.", std::move(memory)));

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "server/serve/catalogue.h"
+#include "server/serve/memory.h"
 
 namespace intervale {
 
@@ -50,6 +51,7 @@ class Metrics {
   // Values that are not counted here.
   struct Gauges {
     const Catalogue& catalogue;
+    const Memory& memory;
     std::uint64_t queued_bytes = 0;  // unsent, see WriteBudget
     std::optional<std::chrono::system_clock::time_point> certificate_expires = {};
   };

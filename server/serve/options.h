@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "protocol/limits.h"
+#include "server/serve/accounts.h"
 
 namespace intervale {
 
@@ -25,11 +26,12 @@ struct ServeOptions {
   unsigned threads = 0;                                    // 0: one for each core
   std::optional<std::filesystem::path> tokens;             // file, see Tokens; nullopt: no token is required
   std::vector<std::string> allowed_origins;                // that may open sessions; empty: the request's host
+  TrustedProxies proxies;                                  // whose X-Forwarded-For is believed
   std::optional<TlsFiles> tls;                             // nullopt: plain HTTP and WebSocket
-  std::size_t max_connections = 4096;                      // further ones are closed at once
+  std::size_t max_connections = 4096;                      // further ones take the place of those that wait for their client
   std::optional<std::size_t> max_connections_per_address;  // at least 1; further ones are closed at once
   std::optional<std::size_t> max_sessions;                 // further ones are answered 503
-  std::optional<std::uint64_t> max_memory;                 // bytes resident; no new sessions above: 503
+  std::optional<std::uint64_t> max_memory;                 // bytes that Memory counts; no new sessions above: 503
   std::size_t max_queued_bytes = 512 << 20;                // unsent bytes of all sessions, see WriteBudget
   double messages_per_second = 2000;                       // of each session; further ones are delayed
   double views_per_second = 200;                           // views among those messages: the same

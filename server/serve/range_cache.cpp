@@ -8,8 +8,13 @@
 
 namespace intervale {
 
-RangeCache::RangeCache(Find find, std::size_t most_bytes)
-    : find_(std::move(find)), most_bytes_(most_bytes), measuring_([this](const std::stop_token& stop) { measure_all(stop); }) {}
+RangeCache::RangeCache(Memory& memory, FairScheduler& scheduler, Find find, std::size_t most_bytes)
+    : memory_(memory), scheduler_(scheduler), find_(std::move(find)), most_bytes_(most_bytes) {
+  const unsigned count = std::max(1u, std::thread::hardware_concurrency());
+  threads_.reserve(count + 1);
+  for (unsigned i = 0; i < count; ++i) threads_.emplace_back([this](const std::stop_token& stop) { serve(soon_, stop); });
+  threads_.emplace_back([this](const std::stop_token& stop) { serve(measuring_, stop); });
+}
 
 // What is known of a part, or is being found; better known distances before others.
 std::list<RangeCache::Entry>::iterator RangeCache::find_entry(const Volume& volume, const RangePart& part) {
@@ -34,7 +39,7 @@ RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volu
   const auto entry = entries_.insert(entries_.begin(), Entry{volume, part, promise.get_future().share()});
   lock.unlock();
   try {
-    Relevant relevant = find_(finder, part);
+    Relevant relevant = counted(memory_, Memory::Holder::ranges, find_(finder, part));
     promise.set_value(relevant);
     lock.lock();
     entry->bytes = relevant->memory_bytes();
@@ -61,135 +66,168 @@ void RangeCache::drop_old(const Volume& volume, const RangePart& found) {
   }
 }
 
-RangeCache::Relevant RangeCache::put_together(const Volume& volume, const ShownRanges& shown, Distances distances, const FindPart& find) {
-  {
-    const std::lock_guard lock(mutex_);
-    for (const Whole& whole : wholes_) {
-      Relevant relevant = whole.relevant.lock();
-      if (relevant && whole.distances >= distances && relevant->shown() == shown && whole.volume.lock() == volume) return relevant;
-    }
+// A range of several parts that a session has. nullptr: there is none. With the lock held.
+RangeCache::Relevant RangeCache::find_whole(const Volume& volume, const ShownRanges& shown, Distances distances) const {
+  for (const Whole& whole : wholes_) {
+    Relevant relevant = whole.relevant.lock();
+    if (relevant && whole.distances >= distances && relevant->shown() == shown && whole.volume.lock() == volume) return relevant;
   }
-  Relevant relevant = find_relevant_updates(volume, shown, distances, find);
-  const std::lock_guard lock(mutex_);
-  std::erase_if(wholes_, [](const Whole& whole) { return whole.relevant.expired(); });
-  wholes_.push_back({volume, distances, relevant});
-  return relevant;
+  return nullptr;
 }
 
-RangeCache::Relevant RangeCache::get(const Volume& volume, const ShownRanges& shown, Distances distances) {
-  PartFinder finder(*volume);
-  return put_together(volume, shown, distances, [&](const RangePart& part) { return get_part(finder, volume, part); });
+RangeCache::Answer::Part* RangeCache::Answer::first_lacking() {
+  const auto lacking = std::find_if(parts_.begin(), parts_.end(), [](const Part& one) { return !one.relevant; });
+  return lacking == parts_.end() ? nullptr : &*lacking;
 }
 
-std::shared_ptr<const RangeCache::Measurement> RangeCache::measure(const Volume& volume, const ShownRanges& shown, std::function<void()> on_ready) {
-  auto request = std::make_shared<Measurement>();
+std::shared_ptr<const RangeCache::Answer> RangeCache::ask(const Volume& volume, const ShownRanges& shown, Distances distances, Payer payer,
+                                                          std::function<void()> on_ready) {
+  auto request = std::make_shared<Answer>();
   request->volume_ = volume;
   request->shown_ = shown;
+  request->distances_ = distances;
+  request->payer_ = std::move(payer);
   request->on_ready_ = std::move(on_ready);
-  bool is_known = true;
   std::unique_lock lock(mutex_);
   for (const ShownRange& one : shown) {
     if (one == volume->description().whole()) continue;
-    for (const RangePart& part : parts_of(volume->description().format, one, Distances::measured)) {
+    for (const RangePart& part : parts_of(volume->description().format, one, distances)) {
       const auto known = find_entry(volume, part);
       const bool is_computed = known != entries_.end() && known->bytes != 0;
       if (is_computed) entries_.splice(entries_.begin(), entries_, known);
       request->parts_.push_back({part, is_computed ? known->relevant.get() : nullptr});
-      is_known = is_known && is_computed;
+      request->is_soon_ = request->is_soon_ && (is_computed || distances != Distances::measured);
     }
   }
-  if (is_known) {
+  if (Relevant whole = find_whole(volume, shown, distances)) {
+    request->promise_.set_value(std::move(whole));
+    return request;
+  }
+  const bool is_one = request->parts_.size() == 1 && request->parts_[0].relevant && request->parts_[0].relevant->shown() == shown;
+  if (request->parts_.empty() || is_one) {  // nothing to put together
     lock.unlock();
     answer(*request);
     return request;
   }
-  std::erase_if(requests_, [](const auto& other) { return other.expired(); });
-  requests_.push_back(request);
-  has_requests_.notify_one();
+  Queue& queue = request->is_soon_ ? soon_ : measuring_;
+  std::erase_if(queue.requests, [](const auto& other) { return other.expired(); });
+  queue.requests.push_back(request);
+  queue.has_requests.notify_one();
   return request;
 }
 
 // Puts together the parts of a request, all of which are known.
-void RangeCache::answer(Measurement& request) {
+void RangeCache::answer(Answer& request) {
   const auto part_of = [&](const RangePart& part) {
     return std::find_if(request.parts_.begin(), request.parts_.end(), [&](const auto& one) { return one.part == part; })->relevant;
   };
   try {
-    request.promise_.set_value(put_together(request.volume_, request.shown_, Distances::measured, part_of));
+    Relevant relevant;
+    {
+      const std::lock_guard lock(mutex_);
+      relevant = find_whole(request.volume_, request.shown_, request.distances_);
+    }
+    if (!relevant) {
+      relevant = find_relevant_updates(request.volume_, request.shown_, request.distances_, part_of);
+      const auto is_same = [&](const Answer::Part& one) { return one.relevant == relevant; };
+      const bool is_new = std::none_of(request.parts_.begin(), request.parts_.end(), is_same) && relevant.get() != &request.volume_->relevant();
+      if (is_new) relevant = counted(memory_, Memory::Holder::ranges, std::move(relevant));
+      const std::lock_guard lock(mutex_);
+      std::erase_if(wholes_, [](const Whole& whole) { return whole.relevant.expired(); });
+      wholes_.push_back({request.volume_, request.distances_, relevant});
+    }
+    request.promise_.set_value(std::move(relevant));
   } catch (...) {
     request.promise_.set_exception(std::current_exception());
   }
 }
 
 void RangeCache::stop() {
-  measuring_.request_stop();
-  if (measuring_.joinable()) measuring_.join();
+  for (std::jthread& thread : threads_) thread.request_stop();
+  threads_.clear();
 }
 
-// nullptr: there is none. With the lock held.
-RangeCache::Request RangeCache::newest_request() {
-  for (; !requests_.empty(); requests_.pop_back()) {
-    if (Request request = requests_.back().lock()) return request;
+// Of the account that spent least the newest. nullptr: there is none. With the lock held.
+RangeCache::Request RangeCache::next_request(Queue& queue) const {
+  Request next;
+  FairScheduler::Time least{};
+  for (const auto& waiting : queue.requests) {
+    Request request = waiting.lock();
+    if (!request || request->is_busy_) continue;
+    const FairScheduler::Time spent = scheduler_.spent(*request->payer_);
+    if (next && spent > least) continue;
+    least = spent;
+    next = std::move(request);
   }
-  return nullptr;
+  return next;
 }
 
 // Hands a part to all requests that have it; takes out those that are complete. With the lock held.
-std::vector<RangeCache::Request> RangeCache::requests_with(const Volume& volume, const RangePart& part, const Relevant& relevant) {
+std::vector<RangeCache::Request> RangeCache::take_complete(const Volume& volume, const RangePart& part, const Relevant& relevant) {
   std::vector<Request> complete;
-  std::erase_if(requests_, [&](const std::weak_ptr<Measurement>& waiting) {
-    Request request = waiting.lock();
-    if (!request) return true;
-    if (request->volume_ != volume) return false;
-    for (auto& one : request->parts_) {
-      if (one.part == part) one.relevant = relevant;
-    }
-    if (std::any_of(request->parts_.begin(), request->parts_.end(), [](const auto& one) { return !one.relevant; })) return false;
-    complete.push_back(std::move(request));
-    return true;
-  });
+  for (Queue* const queue : {&soon_, &measuring_}) {
+    std::erase_if(queue->requests, [&](const std::weak_ptr<Answer>& waiting) {
+      Request request = waiting.lock();
+      if (!request) return true;
+      if (request->volume_ != volume) return false;
+      for (auto& one : request->parts_) {
+        if (relevant && one.part == part) one.relevant = relevant;
+      }
+      if (request->is_busy_ || request->first_lacking() != nullptr) return false;
+      complete.push_back(std::move(request));
+      return true;
+    });
+  }
   return complete;
 }
 
-// Finds the next part that a request lacks.
-void RangeCache::measure_next(PartFinder& finder, const Request& request) {
-  const RangePart part = std::find_if(request->parts_.begin(), request->parts_.end(), [](const auto& one) { return !one.relevant; })->part;
+// Finds the next part that a request lacks, or puts its parts together.
+void RangeCache::work_for(Request request, PartFinder& finder) {
+  const auto since = FairScheduler::Clock::now();
   std::vector<Request> done;
+  std::unique_lock lock(mutex_);
+  const auto* const lacking = request->first_lacking();
+  const std::optional<RangePart> part = lacking == nullptr ? std::nullopt : std::optional(lacking->part);
   try {
+    lock.unlock();
     Relevant relevant;
-    on_spare_cores([&] { relevant = get_part(finder, request->volume_, part); });
-    {
-      const std::lock_guard lock(mutex_);
-      done = requests_with(request->volume_, part, relevant);
-    }
+    if (part) on_spare_cores([&] { relevant = get_part(finder, request->volume_, *part); });
+    lock.lock();
+    request->is_busy_ = false;
+    done = take_complete(request->volume_, part.value_or(RangePart()), relevant);
+    lock.unlock();
     for (const Request& one : done) answer(*one);
   } catch (...) {
     request->promise_.set_exception(std::current_exception());
-    const std::lock_guard lock(mutex_);
-    std::erase_if(requests_, [&](const auto& other) { return other.lock() == request; });
+    if (!lock.owns_lock()) lock.lock();
+    for (Queue* const queue : {&soon_, &measuring_}) std::erase_if(queue->requests, [&](const auto& other) { return other.lock() == request; });
+    lock.unlock();
     done.push_back(request);
   }
+  scheduler_.charge(*request->payer_, FairScheduler::Clock::now() - since);
   for (const Request& one : done) one->on_ready_();
 }
 
-void RangeCache::measure_all(const std::stop_token& stop) {
+void RangeCache::serve(Queue& queue, const std::stop_token& stop) {
+  yield_to_other_threads();
   const ParallelFor parallel = on_all_cores_until(stop);
   Volume volume;
-  std::optional<PartFinder> finder;  // of `volume`; both while there is something to measure
+  std::optional<PartFinder> finder;  // of `volume`; both while there is something to find
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    const Request request = newest_request();
+    Request request = next_request(queue);
     if (!request || request->volume_ != volume) {
       finder.reset();
       volume.reset();
     }
     if (!request) {
-      has_requests_.wait(lock, stop, [this] { return !requests_.empty(); });
+      queue.has_requests.wait(lock, stop, [&] { return next_request(queue) != nullptr; });
       continue;
     }
+    request->is_busy_ = true;
     lock.unlock();
     if (!volume) finder.emplace(*(volume = request->volume_), parallel);
-    measure_next(*finder, request);
+    work_for(std::move(request), *finder);
     lock.lock();
   }
 }

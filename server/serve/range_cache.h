@@ -1,8 +1,10 @@
 // What ranges need of the data sets that are served (RelevantUpdates), shared by all sessions.
 //
 // A range consists of parts, one for each of its surfaces (find_relevant_updates.h). Each part is found once, for all
-// ranges that have it, and kept. Distances are estimated at once; a thread of its own measures them, for the newest
-// request first. Ranges of several parts are put together for each session, and shared while one has them.
+// ranges that have it, and kept. Ranges of several parts are put together for each session, and shared while one has them.
+// All this takes from milliseconds to a second and cannot be cut into slices, so threads of its own do it, behind the
+// sessions' work: some that estimate distances and put parts together, and one that measures distances. Each serves the
+// account that spent least, and the newest request of that account, first.
 #pragma once
 
 #include <condition_variable>
@@ -18,6 +20,8 @@
 
 #include "common/ivm/interval_volume.h"
 #include "server/builder/find_relevant_updates.h"
+#include "server/serve/fair_scheduler.h"
+#include "server/serve/memory.h"
 
 namespace intervale {
 
@@ -28,39 +32,49 @@ class RangeCache {
   using Relevant = std::shared_ptr<const RelevantUpdates>;
   using Find = std::function<Relevant(PartFinder& finder, const RangePart& part)>;
 
+  using Payer = std::shared_ptr<FairScheduler::Account>;
+
+  // memory: counts what is kept or in use, and must outlive that. scheduler: of the accounts that pay; it must outlive this.
   // most_bytes: of the parts that are kept for later; those in use stay anyway.
-  explicit RangeCache(Find find = &PartFinder::find, std::size_t most_bytes = std::size_t(256) << 20);
+  RangeCache(Memory& memory, FairScheduler& scheduler, Find find = &PartFinder::find, std::size_t most_bytes = std::size_t(256) << 20);
+  RangeCache(const RangeCache&) = delete;
+  RangeCache& operator=(const RangeCache&) = delete;
+  ~RangeCache() { stop(); }
 
-  // Computes what nobody has, or waits for whoever does; find_relevant_updates.h says how long that takes. shown: as
-  // distinct() gives them, one at least. Some distances may be better known than asked for.
-  [[nodiscard]] Relevant get(const Volume& volume, const ShownRanges& shown, Distances distances);
-
-  // Distances that are being measured.
-  class Measurement {
+  // What one range needs, once it is found.
+  class Answer {
    public:
     [[nodiscard]] bool is_ready() const { return result_.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }
-    // If ready. Throws what prevented it, for example that memory is exhausted.
+    // No distances have to be measured for it.
+    [[nodiscard]] bool is_soon() const { return is_soon_; }
+    // Waits for it. Throws what prevented it, for example that memory is exhausted.
     [[nodiscard]] Relevant result() const { return result_.get(); }
 
    private:
     friend class RangeCache;
-    Volume volume_;
-    ShownRanges shown_;
     struct Part {
       RangePart part;
-      Relevant relevant;  // nullptr: not measured yet
+      Relevant relevant;  // nullptr: not found yet
     };
+    [[nodiscard]] Part* first_lacking();
+    Volume volume_;
+    ShownRanges shown_;
+    Distances distances_ = Distances::none;
+    Payer payer_;
     std::vector<Part> parts_;
+    bool is_soon_ = true;
+    bool is_busy_ = false;  // a thread works for it
     std::promise<Relevant> promise_;
     std::shared_future<Relevant> result_ = promise_.get_future().share();
     std::function<void()> on_ready_;
   };
-  // get() with measured distances, on another thread unless they are known: ready then. Nothing is measured for
-  // requests that are released before their turn. on_ready: called once a request that was not ready is, on that
-  // thread, without any lock held.
-  [[nodiscard]] std::shared_ptr<const Measurement> measure(const Volume& volume, const ShownRanges& shown, std::function<void()> on_ready);
+  // shown: as distinct() gives them, one at least. Some distances may be better known than asked for. Nothing is found for
+  // answers that are released before their turn. on_ready: called once an answer that was not ready is, on another thread,
+  // without any lock held.
+  [[nodiscard]] std::shared_ptr<const Answer> ask(const Volume& volume, const ShownRanges& shown, Distances distances, Payer payer,
+                                                  std::function<void()> on_ready);
 
-  // Measures nothing more; what is being measured is given up within milliseconds. Also done on destruction.
+  // Finds nothing more; what is being found is given up within milliseconds. Also done on destruction.
   void stop();
 
  private:
@@ -76,26 +90,31 @@ class RangeCache {
     Distances distances = Distances::none;
     std::weak_ptr<const RelevantUpdates> relevant;
   };
-  using Request = std::shared_ptr<Measurement>;
+  using Request = std::shared_ptr<Answer>;
+  struct Queue {
+    std::vector<std::weak_ptr<Answer>> requests;  // the newest is the last
+    std::condition_variable_any has_requests;
+  };
 
   [[nodiscard]] std::list<Entry>::iterator find_entry(const Volume& volume, const RangePart& part);
+  [[nodiscard]] Relevant find_whole(const Volume& volume, const ShownRanges& shown, Distances distances) const;
   [[nodiscard]] Relevant get_part(PartFinder& finder, const Volume& volume, const RangePart& part);
-  [[nodiscard]] Relevant put_together(const Volume& volume, const ShownRanges& shown, Distances distances, const FindPart& find);
   void drop_old(const Volume& volume, const RangePart& found);
-  void measure_all(const std::stop_token& stop);
-  [[nodiscard]] Request newest_request();
-  [[nodiscard]] std::vector<Request> requests_with(const Volume& volume, const RangePart& part, const Relevant& relevant);
-  void measure_next(PartFinder& finder, const Request& request);
-  void answer(Measurement& request);
+  void serve(Queue& queue, const std::stop_token& stop);
+  [[nodiscard]] Request next_request(Queue& queue) const;
+  [[nodiscard]] std::vector<Request> take_complete(const Volume& volume, const RangePart& part, const Relevant& relevant);
+  void work_for(Request request, PartFinder& finder);
+  void answer(Answer& request);
 
+  Memory& memory_;
+  FairScheduler& scheduler_;
   Find find_;
   std::size_t most_bytes_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::list<Entry> entries_;  // the one used last is the first
   std::vector<Whole> wholes_;
-  std::condition_variable_any has_requests_;
-  std::vector<std::weak_ptr<Measurement>> requests_;  // the newest is the last
-  std::jthread measuring_;                            // the last member: it uses the others
+  Queue soon_, measuring_;
+  std::vector<std::jthread> threads_;
 };
 
 }  // namespace intervale

@@ -5,23 +5,30 @@
 
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
+#include <exception>
 #include <functional>
+#include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <utility>
 
+#include "server/builder/all_cores.h"
 #include "server/serve/catalogue_watcher.h"
 #include "server/serve/server.h"
 
 namespace intervale {
 namespace {
 
-constexpr std::chrono::seconds kPollTime{2};  // between looks at files that may have changed
+constexpr std::chrono::seconds kPollTime{2};  // between looks at folders, and at tokens and certificates
 
 // Both a build and an installation have the viewer there.
 std::optional<std::filesystem::path> default_viewer() {
@@ -67,6 +74,54 @@ class LevelSwitch {
   std::string level_;
 };
 
+// Loads the data sets, and follows the changes of their folders, on a thread of its own: that may take long, and signals
+// are heard meanwhile.
+class Loading {
+ public:
+  // where: the end of the line that tells what is served. failed: called on that thread if nothing can be served.
+  Loading(const std::vector<std::filesystem::path>& inputs, Server& server, std::string where, std::function<void(const Error&)> failed)
+      : watcher_(inputs, server.memory()), server_(server), where_(std::move(where)), failed_(std::move(failed)), thread_([this](const auto& stop) {
+          run(stop);
+        }) {}
+  void poll_now() {
+    const std::lock_guard lock(mutex_);
+    wanted_ = true;
+    wake_.notify_one();
+  }
+  void request_stop() { thread_.request_stop(); }
+
+ private:
+  void run(const std::stop_token& stop) {
+    try {
+      auto catalogue = watcher_.load(stop);
+      if (!catalogue) return failed_(catalogue.error());
+      const std::size_t count = catalogue->volumes().size();
+      server_.offer(std::move(*catalogue));
+      spdlog::info("serving {} data set{}{}", count, count == 1 ? "" : "s", where_);
+      for (wait(stop); !stop.stop_requested(); wait(stop)) {
+        if (auto changed = watcher_.poll(stop)) server_.offer(std::move(*changed));
+      }
+    } catch (const Stopped&) {
+    } catch (const std::exception& exception) {
+      failed_({exception.what()});
+    }
+  }
+  void wait(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, stop, kPollTime, [this] { return wanted_; });
+    wanted_ = false;
+  }
+
+  CatalogueWatcher watcher_;
+  Server& server_;
+  std::string where_;
+  std::function<void(const Error&)> failed_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  bool wanted_ = false;
+  std::jthread thread_;  // the last member: it uses the others
+};
+
 // Calls act for every signal, while the io_context runs.
 void on_each_signal(boost::asio::signal_set& signals, const std::function<void()>& act) {
   signals.async_wait([&signals, act](const boost::system::error_code& error, int) {
@@ -91,20 +146,13 @@ Result<void> serve(const ServeOptions& requested, const LogOptions& log, const s
   start_log(log);
   std::signal(SIGPIPE, SIG_IGN);  // writing to a closed connection is an error code, not a signal
 
-  // Handled from the beginning, so that a signal during the start is not lost.
+  // Caught from the beginning, so that a signal during the start is not lost.
   boost::asio::io_context signals;
-  boost::asio::signal_set ending(signals, SIGINT, SIGTERM);
+  boost::asio::signal_set ending(signals, SIGINT, SIGTERM), hang_up(signals, SIGHUP);
   int signal = 0;
   ending.async_wait([&](const boost::system::error_code& error, int number) {
     if (!error) signal = number;
     signals.stop();
-  });
-  boost::asio::signal_set hang_up(signals, SIGHUP);
-  boost::asio::steady_timer timer(signals);
-  LevelSwitch level(log);
-  on_each_signal(hang_up, [&] {
-    level.next();
-    timer.cancel();  // polls at once
   });
 
   raise_file_limit(requested.max_connections);
@@ -112,22 +160,25 @@ Result<void> serve(const ServeOptions& requested, const LogOptions& log, const s
   if (!options.viewer) options.viewer = default_viewer();
   auto server = Server::start(options);
   if (!server) return tl::unexpected(server.error());
-  CatalogueWatcher watcher(inputs, options.max_memory);
-  auto catalogue = watcher.load([&] {
-    signals.poll();
-    return signal == 0;
+  Result<void> loaded;
+  Loading loading(inputs, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(), [&](const Error& error) {
+    boost::asio::post(signals, [&, error] {
+      loaded = tl::unexpected(error);
+      signals.stop();
+    });
   });
-  if (!catalogue) return tl::unexpected(catalogue.error());
-  const std::size_t count = catalogue->volumes().size();
-  (*server)->offer(std::move(*catalogue));
-  spdlog::info("serving {} data set{}{}{}", count, count == 1 ? "" : "s", options.viewer ? "; the viewer is at " : " at ", (*server)->url());
-
-  repeat(timer, [&] {
-    (*server)->reload();
-    if (auto changed = watcher.poll()) (*server)->offer(std::move(*changed));
+  boost::asio::steady_timer timer(signals);
+  LevelSwitch level(log);
+  on_each_signal(hang_up, [&] {
+    level.next();
+    timer.cancel();  // reloads at once
+    loading.poll_now();
   });
+  repeat(timer, [&] { (*server)->reload(); });
   signals.run();
   ending.clear();  // from now on a second signal ends the process at once
+  loading.request_stop();
+  if (!loaded) return loaded;
   spdlog::info("{}: draining", signal == SIGINT ? "SIGINT" : "SIGTERM");
   (*server)->stop();
   spdlog::info("stopped");

@@ -11,7 +11,8 @@
 namespace intervale {
 
 // Serves the given .ivm files and the .ivm files in the given folders, as CatalogueWatcher loads them, and follows
-// changes in the folders. Blocks until SIGTERM or SIGINT, then drains and returns. Logs to stderr. SIGHUP sets the
+// changes in the folders. Blocks until SIGTERM or SIGINT, which are heard at once also while files are read; then drains
+// and returns. A second one ends the process. Logs to stderr. SIGHUP sets the
 // log level that the configuration file has now; if it has none, SIGHUP switches between debug and the level of the
 // start. Failures: an address that is malformed or cannot be bound, a file that cannot be served. If the options name
 // no viewer, the server uses ../share/intervale/viewer, relative to the program's folder, if that exists.

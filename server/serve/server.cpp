@@ -3,8 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/io_context.hpp>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -13,13 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "server/serve/connection_executor.h"
 #include "server/serve/context.h"
 #include "server/serve/file_stamp.h"
 #include "server/serve/listener.h"
 
 namespace intervale {
-
-namespace asio = boost::asio;
 
 namespace {
 
@@ -54,15 +51,15 @@ struct ReloadedFiles {
 
 }  // namespace
 
-// Members are destroyed from last to first: stop() has joined the threads; the io_context destroys the sessions,
-// which use the context.
+// Members are destroyed from last to first: stop() has joined the threads, whose contexts destroy the sessions, which
+// use the server's context.
 struct Server::Running {
   explicit Running(const ServeOptions& options);
   ServerContext context;
-  asio::io_context io;
+  ConnectionThreads threads{context.scheduler};
   std::unique_ptr<Listener> listener, metrics_listener;
-  std::vector<std::thread> threads;
   std::vector<ReloadedFiles> files;
+  std::jthread trimming = start_trimming(context.memory);
   bool stopped = false;
 };
 
@@ -94,19 +91,17 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& requested) {
   for (ReloadedFiles& files : running->files) {
     if (auto loaded = files.load(); !loaded) return tl::unexpected(loaded.error());
   }
-  auto listener = Listener::open(running->io, options.listen, running->context, PortRole::all);
+  auto listener = Listener::open(running->threads, options.listen, running->context, PortRole::all);
   if (!listener) return tl::unexpected(listener.error());
   running->listener = std::move(*listener);
   if (options.metrics_listen) {
-    auto metrics_listener = Listener::open(running->io, *options.metrics_listen, running->context, PortRole::metrics);
+    auto metrics_listener = Listener::open(running->threads, *options.metrics_listen, running->context, PortRole::metrics);
     if (!metrics_listener) return tl::unexpected(metrics_listener.error());
     running->metrics_listener = std::move(*metrics_listener);
     running->metrics_listener->start();
   }
   running->listener->start();
-  for (unsigned i = 0; i < options.threads; ++i) {
-    running->threads.emplace_back([&io = running->io, work = asio::make_work_guard(running->io)] { io.run(); });
-  }
+  running->threads.start(options.threads);
   return std::unique_ptr<Server>(new Server(std::move(running)));
 }
 
@@ -115,6 +110,8 @@ void Server::offer(Catalogue catalogue) { running_->context.catalogue.store(std:
 void Server::reload() {
   for (ReloadedFiles& files : running_->files) files.reload();
 }
+
+Memory& Server::memory() { return running_->context.memory; }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
 
@@ -134,10 +131,10 @@ void Server::stop() {
   if (!running_->context.connections.wait_until_empty(running_->context.options.drain_time)) {
     spdlog::warn("closing {} connections that did not close within the drain time", running_->context.connections.size());
   }
-  running_->io.stop();
-  for (std::thread& thread : running_->threads) thread.join();
+  running_->threads.stop();
   running_->context.scheduler.clear();
   running_->context.ranges.stop();
+  running_->context.background.stop();
 }
 
 }  // namespace intervale

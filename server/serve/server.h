@@ -7,6 +7,7 @@
 
 #include "common/util/result.h"
 #include "server/serve/catalogue.h"
+#include "server/serve/memory.h"
 #include "server/serve/options.h"
 
 namespace intervale {
@@ -26,6 +27,7 @@ class Server {
   // ones stay in use. One thread at a time.
   void reload();
 
+  [[nodiscard]] Memory& memory();  // what the server holds; as long as the server
   [[nodiscard]] std::uint16_t port() const;
   [[nodiscard]] std::uint16_t metrics_port() const;  // port() if /metrics has no port of its own
   [[nodiscard]] std::string url() const;             // "http://127.0.0.1:8080/"

@@ -1,6 +1,7 @@
 #include "server/serve/session_state.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace intervale {
 
@@ -42,6 +43,7 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   dataset_ = open.dataset;
   plan_.emplace(volume_);
   planned_ = {volume_->description().whole()};
+  may_have_ = volume_->size() * (1 + std::uint64_t(volume_->description().channels.size()));
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
 }
@@ -52,6 +54,10 @@ std::optional<Fault> SessionState::on(const protocol::Have& have) {
   if (have.channel && *have.channel >= volume_->description().channels.size())
     return Fault{CloseCode::malformed, "Have names a channel that the data set does not contain"};
   for (const SlotGroup& g : have.splits) {
+    // Each update is named once, and each value of a channel: naming them again would be work for nothing.
+    const auto named = std::uint64_t(std::popcount(g.slots));
+    if (named > may_have_) return Fault{CloseCode::too_large, "Have names more updates than the data set contains"};
+    may_have_ -= named;
     if (have.channel ? !plan_->resume(*have.channel, g.key, g.slots) : !plan_->resume(g.key, g.slots))
       return Fault{CloseCode::malformed, "Have names updates that the data set does not contain"};
   }
@@ -75,6 +81,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   epoch_ = view.epoch;
   lod_ = view.lod;
   if (shown_ != shown || !lod_.camera) measurement_.reset();
+  if (shown_ != shown) estimate_.reset();
   shown_ = std::move(shown);
   is_early_ = view.early;
   is_new_ = true;
@@ -111,19 +118,27 @@ bool SessionState::begin_view() {
   if (!is_new_ && has_needed) return true;
   if (!has_needed && lod_.camera && measure()) {
     is_new_ = true;
-  } else if (measurement_ && (!is_early_ || lod_.max_updates)) {
-    return false;
-  } else if (!is_planned) {
-    set_relevant(ranges_.get(volume_, shown_, Distances::estimated), shown_ == ShownRanges{volume_->description().whole()});
+  } else {
+    const bool needs_measured = measurement_ && (!is_early_ || lod_.max_updates || measurement_->is_soon());
+    if (needs_measured || (!is_planned && !estimate())) return false;
   }
   if (std::exchange(is_new_, false)) plan_->set_lod(measurement_ ? coarser(lod_) : lod_);
   return true;
 }
 
-// Whether distances of the view's ranges are measured: the plan has them then.
+// Whether distances of the view's ranges are estimated: the plan has them then.
+bool SessionState::estimate() {
+  if (!estimate_) estimate_ = ranges_.ask(volume_, shown_, Distances::estimated, payer_, wake_);
+  if (!estimate_->is_ready()) return false;
+  set_relevant(std::exchange(estimate_, nullptr)->result(), shown_ == ShownRanges{volume_->description().whole()});
+  return true;
+}
+
+// The same for measured distances.
 bool SessionState::measure() {
-  if (!measurement_) measurement_ = ranges_.measure(volume_, shown_, wake_);
+  if (!measurement_) measurement_ = ranges_.ask(volume_, shown_, Distances::measured, payer_, wake_);
   if (!measurement_->is_ready()) return false;
+  estimate_.reset();
   set_relevant(std::exchange(measurement_, nullptr)->result(), true);
   return true;
 }
@@ -145,14 +160,35 @@ void SessionState::begin_ahead() {
   plan_->set_room(std::min(room_ - room_ / 4, lod_.max_updates.value_or(UINT64_MAX)));
 }
 
+// Whether it is not known yet what is within the view's budget.
+bool SessionState::is_searching() {
+  if (search_ != plan_->search()) {
+    search_ = plan_->search();
+    const auto go_on = [weak = std::weak_ptr(search_)](Memory::Share& held) {
+      const auto search = weak.lock();
+      if (!search) return false;
+      const bool has_more = search->go_on();
+      if (has_more) held.resize(search->memory_bytes());  // the session takes what is done
+      return has_more;
+    };
+    if (search_) background_.run(payer_, go_on, wake_);
+  }
+  return search_ && !search_->is_done();
+}
+
 std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
   if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
   if (!has_work()) return {};
   const bool is_ahead = view_ == ViewState::ahead;
+  waits_ = false;
   if (is_ahead) {
     begin_ahead();
   } else if (!begin_view()) {
+    waits_ = true;
+    return {};
+  }
+  if (is_searching()) {
     waits_ = true;
     return {};
   }

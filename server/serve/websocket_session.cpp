@@ -17,6 +17,7 @@
 #include "server/serve/admission.h"
 #include "server/serve/log.h"
 #include "server/serve/session_state.h"
+#include "server/serve/view_timing.h"
 
 namespace intervale {
 namespace {
@@ -31,8 +32,18 @@ using Clock = std::chrono::steady_clock;
 using Request = http::request<http::empty_body>;
 
 constexpr std::chrono::seconds kMaxPingBacklog{1};  // how far pings may exceed the message rate
+// Work on messages that a session may do before it waits for a worker of the scheduler: credit and views take microseconds.
+constexpr std::chrono::microseconds kMaxUnscheduled{200};
+// What a fault of the client costs its account, so that breaking the rules again and again does not pay.
+constexpr std::chrono::milliseconds kFaultCost{100};
+// Work for a view that goes before that of other sessions: until its first message, but not for longer.
+constexpr std::chrono::milliseconds kUrgentWork{10};
 // Payloads while other sessions wait for a worker: the first of a view, and the others.
 constexpr std::size_t kContendedFirstPayload = 4 << 10, kContendedPayload = 16 << 10;
+
+bool breaks_rules(CloseCode code) {
+  return code == CloseCode::text_frame || code == CloseCode::malformed || code == CloseCode::out_of_order || code == CloseCode::too_large;
+}
 
 class WebSocketSession : public Connection, public std::enable_shared_from_this<WebSocketSession> {
  public:
@@ -43,10 +54,12 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         read_delay_(ws_.get_executor()),
         context_(context),
         peer_(std::move(peer)),
-        state_(context.catalogue, context.ranges, peer_.scope),
+        state_(context.catalogue, context.ranges, context.background, peer_.scope, peer_.account),
+        flow_(peer_.account),
         messages_(context.options.messages_per_second),
         views_(context.options.views_per_second),
-        id_(context.next_session_id++) {}
+        id_(context.next_session_id++),
+        memory_(context.memory, Memory::Holder::sessions, 0) {}
   WebSocketSession(const WebSocketSession&) = delete;
   WebSocketSession& operator=(const WebSocketSession&) = delete;
 
@@ -77,9 +90,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     asio::post(ws_.get_executor(), [self = shared_from_this()] { self->close({CloseCode::going_away, "the server shuts down"}); });
   }
 
-  void abort() override {
-    asio::post(ws_.get_executor(), [self = shared_from_this()] {
-      if (self->close_note_.empty()) self->close_note_ = "the limit of unsent bytes is reached, and this client is the slowest reader";
+  void abort(const char* why) override {
+    asio::post(ws_.get_executor(), [self = shared_from_this(), why] {
+      if (self->close_note_.empty()) self->close_note_ = why;
       self->abort_connection();
     });
   }
@@ -103,6 +116,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   // Ends the session in order: the writer sends the fault and closes. The first fault counts.
   void close(Fault fault) {
+    if (breaks_rules(fault.code)) context_.scheduler.charge(*peer_.account, kFaultCost);
     if (!fault_ && !closed_) fault_ = std::move(fault);
     writer_wakeup_.cancel();
     read_delay_.cancel();
@@ -153,11 +167,13 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
 
   asio::awaitable<void> read_messages() {
     beast::flat_buffer buffer;
+    Memory::Share buffered(context_.memory, Memory::Holder::sessions, 0);
     while (!fault_) {
       buffer.clear();
       do {
         const std::size_t room = protocol::kMaxClientMessage + 1 - buffer.size();
         const auto [error, size] = co_await ws_.async_read_some(buffer, room, kAwait);
+        buffered.resize(buffer.capacity());
         if (error) {
           on_read_error(error);
           co_return;
@@ -168,19 +184,48 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       if (fault_) co_return;
       co_await throttle(messages_);
       const std::span bytes(static_cast<const std::uint8_t*>(buffer.data().data()), buffer.size());
-      const auto message = protocol::decode_client_message(bytes);
+      if (unscheduled_ >= kMaxUnscheduled) co_await acquire_to_read(FairScheduler::Priority::interactive);
+      const auto message = decode(bytes);
       if (!message) co_return close({CloseCode::malformed, message.error().message});
-      const auto* const view = std::get_if<protocol::View>(&*message);
-      if (view != nullptr) co_await throttle(views_);
-      if (view != nullptr && !view->forget.empty()) {  // forgetting takes as long as selecting a batch
-        co_await context_.scheduler.async_acquire(flow_, FairScheduler::Priority::interactive, asio::use_awaitable);
-        const ScheduledWork work{context_.scheduler, flow_, FairScheduler::Priority::interactive};
-        receive(*message);
-      } else {
-        receive(*message);
+      if (std::holds_alternative<protocol::View>(*message)) co_await throttle(views_);
+      if (takes_long(*message)) {
+        const bool resumes = std::holds_alternative<protocol::Have>(*message) && !timing_.has_view();
+        co_await acquire_to_read(resumes ? FairScheduler::Priority::bulk : FairScheduler::Priority::interactive);
       }
+      const ReadingWork work{*this};
+      receive(*message);
     }
   }
+
+  Result<protocol::ClientMessage> decode(std::span<const std::uint8_t> bytes) {
+    const ReadingWork work{*this};
+    return protocol::decode_client_message(bytes);
+  }
+
+  // Opening, resuming and forgetting take up to a millisecond.
+  static bool takes_long(const protocol::ClientMessage& message) {
+    const auto* const view = std::get_if<protocol::View>(&message);
+    return view != nullptr ? !view->forget.empty()
+                           : std::holds_alternative<protocol::Open>(message) || std::holds_alternative<protocol::Have>(message);
+  }
+
+  // bulk: only for messages before the first view, since a flow has one such request at a time.
+  asio::awaitable<void> acquire_to_read(FairScheduler::Priority priority) {
+    const auto lane = co_await context_.scheduler.async_acquire(flow_, priority, asio::use_awaitable);
+    reader_worker_ = {lane, priority};
+  }
+
+  // Work of the reader; releases the worker, if it has one.
+  struct ReadingWork {
+    WebSocketSession& session;
+    Clock::time_point since = Clock::now();
+    ~ReadingWork() {
+      session.unscheduled_ += Clock::now() - since;
+      const auto worker = std::exchange(session.reader_worker_, std::nullopt);
+      if (worker)
+        session.context_.scheduler.release(session.flow_, worker->first, worker->second, std::exchange(session.unscheduled_, Clock::duration(0)));
+    }
+  };
 
   // Delays the reader of a client that exceeds the rate: TCP then slows the client down.
   asio::awaitable<void> throttle(RateLimit& limit) {
@@ -194,9 +239,10 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   struct ScheduledWork {
     FairScheduler& scheduler;
     FairScheduler::Flow& flow;
+    FairScheduler::Lane lane;
     FairScheduler::Priority priority;
     Clock::time_point since = Clock::now();
-    ~ScheduledWork() { scheduler.release(flow, priority, Clock::now() - since); }
+    ~ScheduledWork() { scheduler.release(flow, lane, priority, Clock::now() - since); }
   };
 
   void receive(const protocol::ClientMessage& message) {
@@ -204,12 +250,14 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (!state_.needs_credit()) stalled_since_ = Clock::now();  // this message may change that
     log_message(message);
     // Checked again at Open, which is when a session takes memory: many upgrades may have passed the check before.
-    if (std::holds_alternative<protocol::Open>(message) && exceeds_memory(context_.options.max_memory)) {
+    if (std::holds_alternative<protocol::Open>(message) && context_.memory.is_full()) {
       context_.metrics.count_refusal(Refusal::memory);
       return close({CloseCode::going_away, "the server has no capacity for another session"});
     }
     if (auto fault = state_.receive(message)) return close(std::move(*fault));
-    if (const auto* view = std::get_if<protocol::View>(&message)) on_view(view->epoch);
+    if (std::holds_alternative<protocol::Open>(message)) context_.connections.set_waiting(registration_, false);
+    memory_.resize(state_.memory_bytes());
+    if (const auto* view = std::get_if<protocol::View>(&message)) timing_.on_view(view->epoch);
     if (state_.view_is_unanswered()) context_.scheduler.promote(flow_);
     writer_wakeup_.cancel();
   }
@@ -220,20 +268,6 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     } else if (const auto* view = std::get_if<protocol::View>(&message)) {
       log_session(id_, spdlog::level::debug, "view {}", view->epoch);
     }
-  }
-
-  void on_view(std::uint64_t epoch) {
-    newest_view_ = {epoch, Clock::now()};
-    if (!oldest_view_) oldest_view_ = newest_view_;
-  }
-
-  // A message for the view of that epoch was sent.
-  void on_sent(std::uint64_t epoch) {
-    if (!oldest_view_ || epoch < oldest_view_->epoch) return;
-    const auto time = Clock::now() - oldest_view_->since;
-    std::exchange(first_view_answered_, true) ? context_.metrics.observe_view_change(time) : context_.metrics.observe_first_mesh(time);
-    oldest_view_.reset();
-    if (newest_view_.epoch > epoch) oldest_view_ = newest_view_;
   }
 
   // The client closed the WebSocket, or the connection broke.
@@ -252,8 +286,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       if (fault_) co_return co_await close_with_fault();
       std::optional<protocol::ServerMessage> message;
       if (state_.has_work()) {
-        co_await context_.scheduler.async_acquire(flow_, priority(), asio::use_awaitable);
-        message = compute();
+        const auto lane = co_await context_.scheduler.async_acquire(flow_, priority(), asio::use_awaitable);
+        message = compute(lane);
       } else {
         message = state_.next();
       }
@@ -262,9 +296,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         stalled_since_ = Clock::now();
         if (const auto* batch = std::get_if<protocol::Batch>(&*message)) {
           context_.metrics.updates_sent_total.Increment(batch->updates);
-          on_sent(batch->epoch);
+          timing_.on_sent(batch->epoch, context_.metrics);
         } else if (const auto* done = std::get_if<protocol::Done>(&*message)) {
-          on_sent(done->epoch);
+          timing_.on_sent(done->epoch, context_.metrics);
         }
         continue;
       }
@@ -273,16 +307,20 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   }
 
   [[nodiscard]] FairScheduler::Priority priority() const {
-    return state_.view_is_unanswered() ? FairScheduler::Priority::interactive : FairScheduler::Priority::bulk;
+    const bool is_urgent = state_.view_is_unanswered() && timing_.work() < kUrgentWork;
+    return is_urgent ? FairScheduler::Priority::interactive : FairScheduler::Priority::bulk;
   }
 
   // Selects the next message, and releases the worker.
-  std::optional<protocol::ServerMessage> compute() {
-    const ScheduledWork work{context_.scheduler, flow_, priority()};
+  std::optional<protocol::ServerMessage> compute(FairScheduler::Lane lane) {
+    const ScheduledWork work{context_.scheduler, flow_, lane, priority()};
     if (closed_ || fault_) return {};
     const bool has_waiters = context_.scheduler.has_waiters();
     auto message = state_.next(!has_waiters ? protocol::kMaxBatchPayload : state_.view_is_unanswered() ? kContendedFirstPayload : kContendedPayload);
-    context_.metrics.observe_selection(Clock::now() - work.since);
+    memory_.resize(state_.memory_bytes());
+    const auto time = Clock::now() - work.since;
+    timing_.add_work(time);
+    context_.metrics.observe_selection(time);
     return message;
   }
 
@@ -303,6 +341,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     write_deadline_.async_wait([weak = weak_from_this()](beast::error_code error) {
       if (const auto self = weak.lock(); self && !error) self->abort_connection();
     });
+    const Memory::Share queued(context_.memory, Memory::Holder::queues, 2 * bytes.size());  // encoded, and as `message`
     const auto reservation = context_.write_budget.reserve(weak_from_this(), bytes.size());
     const auto [error, size] = co_await ws_.async_write(asio::buffer(bytes), kAwait);
     write_deadline_.cancel();
@@ -335,20 +374,16 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   Peer peer_;
   SessionState state_;
   FairScheduler::Flow flow_;
+  Clock::duration unscheduled_{0};                                                        // work of the reader since it had a worker
+  std::optional<std::pair<FairScheduler::Lane, FairScheduler::Priority>> reader_worker_;  // if it has one
   RateLimit messages_, views_;
   std::uint64_t id_;
+  Memory::Share memory_;        // of the state
   std::optional<Fault> fault_;  // why the session ends, once it does
   bool closed_ = false;         // the connection is gone: nothing can be sent
   Clock::time_point open_deadline_{};
   Clock::time_point stalled_since_{};  // when the client last had enough credit, or was sent a message
-  // The oldest and the newest view that nothing was sent for yet.
-  struct PendingView {
-    std::uint64_t epoch = 0;
-    Clock::time_point since;
-  };
-  std::optional<PendingView> oldest_view_;
-  PendingView newest_view_;
-  bool first_view_answered_ = false;
+  ViewTiming timing_;
   std::uint64_t bytes_sent_ = 0;
   unsigned close_code_ = 0;
   std::string close_note_;

@@ -16,6 +16,8 @@ struct Peer {
   // What its token grants; nullptr: no valid token, and the session is closed with 4401.
   std::shared_ptr<const Scope> scope;
   AddressCounts::Lease address_lease;
+  Memory::Share memory;                        // of the connection
+  std::shared_ptr<Accounts::Account> account;  // that pays for the session's work
 };
 
 // Accepts an upgrade request that offers the subprotocol, and runs the session. Does not block; the session keeps

@@ -10,9 +10,9 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kChunk = 1 << 16;
-constexpr Bytef kMagic = 0x1f;      // first byte of every member
-constexpr int kGzipOnly = 15 + 16;  // zlib's windowBits: 32 KiB window, gzip wrapping
+constexpr std::size_t kGzipChunk = 1 << 16;
+constexpr Bytef kMemberMagic = 0x1f;  // first byte of every member
+constexpr int kGzipOnly = 15 + 16;    // zlib's windowBits: 32 KiB window, gzip wrapping
 
 class Inflater {
  public:
@@ -57,7 +57,7 @@ class Inflater {
     }
     // Some tools pad gzip files, with zeros as a rule: whatever follows a whole member and is not another one is not
     // data.
-    if (!within_member_ && !ended_ && stream_.next_in[0] != kMagic) ended_ = true;
+    if (!within_member_ && !ended_ && stream_.next_in[0] != kMemberMagic) ended_ = true;
     return {};
   }
   [[nodiscard]] std::string where() const { return in_quotes(file_.path()) + ": "; }
@@ -67,11 +67,11 @@ class Inflater {
   z_stream stream_{};
   bool ready_ = false, ended_ = false;
   bool within_member_ = true;  // a file that holds nothing is cut short, too
-  std::array<std::byte, kChunk> input_;
+  std::array<std::byte, kGzipChunk> input_;
 };
 
 Result<std::uint64_t> discard(Inflater& inflater, std::uint64_t bytes) {
-  std::array<std::byte, kChunk> chunk;
+  std::array<std::byte, kGzipChunk> chunk;
   std::uint64_t done = 0;
   while (done < bytes) {
     auto got = inflater.next(std::span(chunk).first(std::min<std::uint64_t>(chunk.size(), bytes - done)));
@@ -90,7 +90,7 @@ Result<std::uint64_t> gzip_decode(const InputFile& file, std::uint64_t offset, s
   auto got = inflater.next(out);
   // zlib compares the checksum when it meets the end, which it has not looked for yet if the samples end with the data.
   if (got && *got == out.size())
-    if (auto rest = discard(inflater, kChunk); !rest) return rest;
+    if (auto rest = discard(inflater, kGzipChunk); !rest) return rest;
   return got;
 }
 

@@ -37,7 +37,6 @@ for (let run = 0; run < Number(runs); ++run) {
   {
     const { page } = await open(browser, `${server.url}#data=${everyName}&range=128,188&roi=${everything}`, { width: 320, height: 240 });
     for (const range of [[128, 188], [140, 188]]) await set(page, { range }); // from here on the client has both
-    const { updatesInMesh } = await progressOf(page);
     const ms = await page.evaluate(async (range) => {
       const start = performance.now();
       const surface = window.intervale.next('surface');
@@ -45,6 +44,8 @@ for (let run = 0; run < Number(runs); ++run) {
       await surface;
       return performance.now() - start;
     }, [130, 188]);
+    await settled(page);
+    const { updatesInMesh } = await progressOf(page);
     figures.range.push((ms * 1e5) / updatesInMesh);
   }
   await browser.close();

@@ -15,9 +15,9 @@ namespace {
 
 using protocol::CloseCode;
 using protocol::Open;
-using testing::HasSubstr;
-using testing::Not;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 struct Guarded {
   TempDir folder;
@@ -79,9 +79,9 @@ TEST(Access, ListsWhatATokenOpens) {
   const auto list = [&](const std::string& token) {
     return talk(guarded.port(), "GET /api/datasets HTTP/1.1\r\nHost: x\r\nConnection: close\r\nAuthorization: Bearer " + token + "\r\n\r\n");
   };
-  EXPECT_THAT(list("wrong"), testing::AllOf(StartsWith("HTTP/1.1 401"), HasSubstr("WWW-Authenticate: Bearer"), Not(HasSubstr("buckyball"))));
+  EXPECT_THAT(list("wrong"), ::testing::AllOf(StartsWith("HTTP/1.1 401"), HasSubstr("WWW-Authenticate: Bearer"), Not(HasSubstr("buckyball"))));
   EXPECT_THAT(list("bucky-only"), HasSubstr("buckyball"));
-  EXPECT_THAT(list("other-only"), testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("\"datasets\":[]")));
+  EXPECT_THAT(list("other-only"), ::testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("\"datasets\":[]")));
   EXPECT_THAT(get(guarded.port(), "/"), Not(HasSubstr("buckyball")));
   EXPECT_THAT(get(guarded.port(), "/metrics"), StartsWith("HTTP/1.1 401"));
   for (const char* target : {"/healthz", "/readyz"}) EXPECT_THAT(get(guarded.port(), target), StartsWith("HTTP/1.1 200"));

@@ -112,7 +112,43 @@ std::vector<Attack> attacks() {
   };
 }
 
-class Attacks : public testing::TestWithParam<Attack> {};
+Attack view_attack(const char* name, CloseCode code, const std::function<void(View&)>& change) {
+  View view = kEverything;
+  change(view);
+  return {name, code, [view](RawClient& c) {
+            c.send(kOpen);
+            c.send(view);
+          }};
+}
+
+// Some of those of extreme_views_test.cpp, which has no connections.
+std::vector<Attack> attacks_by_view() {
+  return {
+      view_attack("CameraAtWhatItLooksAt", CloseCode::malformed,
+                  [](View& view) {
+                    view.lod.camera = Camera{.eye = {1, 2, 3}, .look_at = {1, 2, 3}};
+                  }),
+      view_attack("ViewportEmpty", CloseCode::malformed,
+                  [](View& view) {
+                    view.lod.camera = Camera{.eye = {1, 2, 3}, .viewport = {0, 0}};
+                  }),
+      view_attack("RegionUpsideDown", CloseCode::malformed,
+                  [](View& view) {
+                    view.lod.roi = Box{{1, 1, 1}, {0, 0, 0}};
+                  }),
+      view_attack("FiveRanges", CloseCode::malformed,
+                  [](View& view) {
+                    view.shown.ranges.assign(5, {128, 188});
+                  }),
+      view_attack("RangeThatIsNotThere", CloseCode::no_such_range,
+                  [](View& view) {
+                    view.shown.ranges = {{0, 1}};
+                  }),
+      view_attack("ChannelThatIsNotThere", CloseCode::no_such_range, [](View& view) { view.channels = {"\x1b[2J\n"}; }),
+  };
+}
+
+class Attacks : public ::testing::TestWithParam<Attack> {};
 
 TEST_P(Attacks, CloseThatSessionWithTheCodeAndTouchNoOther) {
   const auto server = start();
@@ -132,7 +168,31 @@ TEST_P(Attacks, CloseThatSessionWithTheCodeAndTouchNoOther) {
   EXPECT_EQ(other.finish(), everything);
 }
 
-INSTANTIATE_TEST_SUITE_P(Server, Attacks, testing::ValuesIn(attacks()), [](const auto& attack) { return attack.param.name; });
+constexpr auto kNameOf = [](const auto& attack) { return attack.param.name; };
+INSTANTIATE_TEST_SUITE_P(Server, Attacks, ::testing::ValuesIn(attacks()), kNameOf);
+INSTANTIATE_TEST_SUITE_P(ServerByView, Attacks, ::testing::ValuesIn(attacks_by_view()), kNameOf);
+
+TEST(Attacks, ViewsThatAreOnlyExtremeAreAnswered) {
+  const auto server = start();
+  RawClient client(server->port());
+  client.send(kOpen);
+  (void)client.expect<protocol::Opened>();
+  std::vector<View> views(7);
+  views[0].lod.camera = Camera{.eye = {1e300, 0, 0}, .pixel_error = 1e30};
+  views[1].lod.camera = Camera{.eye = {0, 0, 1e-300}, .fov = 1e-300, .viewport = {1, 65535}};
+  views[2].lod.roi = Box{{1e300, 1e300, 1e300}, {1e308, 1e308, 1e308}};
+  views[3].lod.max_updates = 0;
+  views[4].room = 0;
+  views[5].coarse_error_percent = 0;  // of a data set of one range
+  views[6].lod.max_updates = views[6].room = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t updates = 0;
+  for (View& view : views) {
+    view.epoch = views.data() + views.size() == &view + 1 ? std::numeric_limits<std::uint64_t>::max() : std::uint64_t(&view - views.data());
+    client.send(view);
+    updates += client.stream_to_end();
+  }
+  EXPECT_EQ(updates, everything(server->port()));
+}
 
 }  // namespace
 }  // namespace intervale

@@ -18,13 +18,6 @@ namespace intervale {
 namespace {
 
 using ::testing::HasSubstr;
-using Arguments = std::vector<std::string>;
-
-Arguments operator+(Arguments a, const Arguments& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
 constexpr int kSide = 20;
 
 // `components` floats at each sample of a cube: 0, 1, ... times its x. header: more lines.
@@ -50,7 +43,7 @@ std::string text_of(const std::string& path) {
   return text.str();
 }
 
-class Channels : public testing::Test {
+class Channels : public ::testing::Test {
  public:
   Channels() {
     EXPECT_EQ(run({program("intervale"), "sample", "gyroid", "--size", std::to_string(kSide), "-o", field}).status, 0);
@@ -116,10 +109,15 @@ TEST_F(Channels, WithoutThemTheStreamIsAsItWas) {
 TEST_F(Channels, APictureHasTheirColours) {
   const ServerProgram server(folder.path().string());
   const Arguments look{"--range", "-0.5", "0.25", "--image", folder / "a.png", "--color-by"};
-  for (const char* const name : {"heat", "wind"}) {
+  const auto info = json_of(run({program("intervale"), "info", every, "--json"}));
+  for (const auto& channel : info.at("channels")) {
+    const auto name = channel.at("name").get<std::string>();
     EXPECT_EQ(run(Arguments{program("intervale"), "extract", every} + look + Arguments{name}).status, 0);
     const std::string extracted = text_of(folder / "a.png");
     EXPECT_EQ(run(Arguments{client(), "fetch", server.url("every")} + look + Arguments{name}).status, 0);
+    EXPECT_EQ(text_of(folder / "a.png"), extracted);
+    const Arguments span{"--color-span", channel.at("values").at("least").dump(), channel.at("values").at("greatest").dump()};
+    EXPECT_EQ(run(Arguments{program("intervale"), "extract", every} + look + Arguments{name} + span).status, 0);
     EXPECT_EQ(text_of(folder / "a.png"), extracted);
   }
 }

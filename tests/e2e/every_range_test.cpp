@@ -17,9 +17,9 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-class EveryRange : public testing::Test {
+class EveryRange : public ::testing::Test {
  public:
   EveryRange() {
     EXPECT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "20", "-o", volume}).status, 0);

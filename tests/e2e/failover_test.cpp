@@ -69,7 +69,7 @@ class Balancer {
   Process process_;
 };
 
-class Failover : public testing::TestWithParam<int> {};
+class Failover : public ::testing::TestWithParam<int> {};
 
 #ifdef __SANITIZE_ADDRESS__
 constexpr int kClients = 20;  // the harness is several times as slow
@@ -114,7 +114,7 @@ TEST_P(Failover, EveryClientGoesOnAtTheOtherReplica) {
             << repeated << ", sent " << sent << ", to say what clients had " << figures.at("resume_bytes") << "\n";
 }
 
-INSTANTIATE_TEST_SUITE_P(Failover, Failover, testing::Values(SIGKILL, SIGTERM),
+INSTANTIATE_TEST_SUITE_P(Failover, Failover, ::testing::Values(SIGKILL, SIGTERM),
                          [](const auto& signal) { return std::string(signal.param == SIGKILL ? "Killed" : "Drained"); });
 
 }  // namespace

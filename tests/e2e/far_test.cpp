@@ -11,8 +11,6 @@
 namespace intervale {
 namespace {
 
-constexpr const char* kPython = "/usr/bin/python3";
-
 // What the shell prints that runs `script` with the programs' folder and a data set as $1 and $2, in a network where
 // port 8080 of 10.78.0.2 is that of a server, far away.
 Finished far_away(const std::string& script) {

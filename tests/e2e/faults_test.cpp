@@ -2,7 +2,6 @@
 // promised.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,7 +18,7 @@
 #include <vector>
 
 #include "protocol/codec.h"
-#include "server/serve/admission.h"
+#include "server/serve/memory.h"
 #include "tests/support/programs.h"
 #include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
@@ -35,8 +34,8 @@ using protocol::Done;
 using protocol::Have;
 using protocol::Open;
 using protocol::Opened;
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 const std::string kHalfARequest = "GET /v1/stream HTTP/1.1\r\nHost: x\r\nUpgr";
 
@@ -199,7 +198,7 @@ std::vector<Moment> moments() {
   };
 }
 
-class Resets : public testing::TestWithParam<Moment> {};
+class Resets : public ::testing::TestWithParam<Moment> {};
 
 TEST_P(Resets, EndThatSessionAndTouchNoOther) {
   const auto server = start();
@@ -213,7 +212,7 @@ TEST_P(Resets, EndThatSessionAndTouchNoOther) {
   EXPECT_TRUE(idle.again());
 }
 
-INSTANTIATE_TEST_SUITE_P(Faults, Resets, testing::ValuesIn(moments()), [](const auto& moment) { return moment.param.name; });
+INSTANTIATE_TEST_SUITE_P(Faults, Resets, ::testing::ValuesIn(moments()), [](const auto& moment) { return moment.param.name; });
 
 struct Kind {
   const char* name;
@@ -223,7 +222,7 @@ struct Kind {
 
 void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
 
-class Frames : public testing::TestWithParam<Kind> {
+class Frames : public ::testing::TestWithParam<Kind> {
  protected:
   // How the session ends that says this instead of the message.
   static unsigned end_after(std::uint16_t port, std::span<const std::uint8_t> bytes) {
@@ -251,8 +250,8 @@ TEST_P(Frames, CutShortAreMalformedAndOversizeAreTooLarge) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Faults, Frames,
-                         testing::Values(Kind{"Open", {}, kOpen}, Kind{"Have", {kOpen}, Have{{{{}, {}, supercube_key(0, {0, 0, 0}), 1}}}},
-                                         Kind{"View", {kOpen}, kEverything}, Kind{"Credit", {kOpen}, Credit{1}}),
+                         ::testing::Values(Kind{"Open", {}, kOpen}, Kind{"Have", {kOpen}, Have{{{{}, {}, supercube_key(0, {0, 0, 0}), 1}}}},
+                                           Kind{"View", {kOpen}, kEverything}, Kind{"Credit", {kOpen}, Credit{1}}),
                          [](const auto& kind) { return kind.param.name; });
 
 TEST(Faults, TenThousandConnectionsLeaveNothingBehind) {
@@ -300,16 +299,12 @@ TEST(Faults, WhoHasNoTokenTakesNoOnesPlace) {
 
 TEST(Faults, ManyWhoComeAtOnceDoNotTakeTheMemoryThatIsLeft) {
   ServeOptions options;
-  options.max_memory = resident_bytes() + (32 << 20);
+  options.max_memory = 32 << 20;
   const auto server = start(options);
   RawClient client(server->port());
-  constexpr std::size_t kTaken = 64 << 20;
-  void* const taken = ::mmap(nullptr, kTaken, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-  ASSERT_NE(taken, MAP_FAILED);
-  ASSERT_GT(resident_bytes(), *options.max_memory);
+  const Memory::Share taken(server->memory(), Memory::Holder::sessions, *options.max_memory);
   client.send(kOpen);
   EXPECT_EQ(client.end().code, 1001u) << "come back later, or to another replica";
-  ::munmap(taken, kTaken);
 }
 
 }  // namespace

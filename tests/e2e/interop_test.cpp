@@ -10,7 +10,6 @@
 namespace intervale {
 namespace {
 
-constexpr const char* kPython = "/usr/bin/python3";  // Debian's, which has Debian's packages
 constexpr const char* kWs = "/usr/share/nodejs/ws/index.js";
 
 bool is_there(const char* file) { return ::access(file, R_OK) == 0; }

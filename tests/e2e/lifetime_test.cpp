@@ -17,8 +17,8 @@ namespace {
 
 using protocol::CloseCode;
 using protocol::Opened;
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 TEST(Server, AnAddressThatCannotBeHadIsAnError) {
   const auto server = start();
@@ -53,10 +53,11 @@ TEST(Server, IsNotReadyBeforeThereIsSomethingToOffer) {
   options.listen = "127.0.0.1:0";
   const auto server = Server::start(options).value();
   EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
-  EXPECT_THAT(get(server->port(), "/readyz"), testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading")));
-  EXPECT_THAT(get(server->port(), "/api/datasets"), testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading"))) << "not that there is nothing";
+  EXPECT_THAT(get(server->port(), "/readyz"), ::testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading")));
+  EXPECT_THAT(get(server->port(), "/api/datasets"), ::testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("loading")))
+      << "not that there is nothing";
   EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
-  server->offer(CatalogueWatcher({buckyball()}).load().value());
+  server->offer(CatalogueWatcher({buckyball()}, server->memory()).load().value());
   EXPECT_THAT(get(server->port(), "/readyz"), StartsWith("HTTP/1.1 200"));
   RawClient client(server->port());
   client.send(kOpen);
@@ -83,7 +84,7 @@ TEST(Server, SaysThatItDrainsWhileItDoes) {
   do {
     ready = get(server->port(), "/readyz");
   } while (ready.starts_with("HTTP/1.1 200"));  // until it has begun
-  EXPECT_THAT(ready, testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("draining")));
+  EXPECT_THAT(ready, ::testing::AllOf(StartsWith("HTTP/1.1 503"), HasSubstr("draining")));
   EXPECT_EQ(upgrade_status(server->port(), {}), 503u);
   EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
   const auto end = deaf->client.end();

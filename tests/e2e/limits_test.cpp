@@ -2,10 +2,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <chrono>
 #include <cstdint>
+#include <exception>
+#include <memory>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "client/net/connection.h"
 #include "tests/support/raw_client.h"
@@ -21,9 +27,9 @@ using protocol::Done;
 using protocol::Open;
 using protocol::Opened;
 using protocol::View;
-using testing::EndsWith;
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 TEST(Server, ASessionThatDoesNotOpenIsClosed) {
   ServeOptions options;
@@ -54,6 +60,22 @@ TEST(Server, TurnsConnectionsAwayAtItsLimit) {
   EXPECT_GT(second.finish(), 0u);
 }
 
+TEST(Server, SilentConnectionsMakeRoomForOthers) {
+  ServeOptions options;
+  options.max_connections = 3;
+  const auto server = start(options);
+  Waiting session(server->port());
+  boost::asio::io_context io;
+  boost::asio::ip::tcp::socket first(io), second(io);
+  for (auto* const silent : {&first, &second}) silent->connect({boost::asio::ip::address_v4::loopback(), server->port()});
+  EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
+  char byte = 0;
+  boost::system::error_code error;
+  EXPECT_EQ(first.read_some(boost::asio::buffer(&byte, 1), error), 0u) << "it is cut";
+  EXPECT_TRUE(second.is_open());
+  EXPECT_GT(session.finish(), 0u);
+}
+
 TEST(Server, TurnsSessionsAwayAtItsLimits) {
   ServeOptions options;
   options.max_sessions = 1;
@@ -72,6 +94,7 @@ TEST(Server, TurnsSessionsAwayAtItsLimits) {
     ASSERT_FALSE(opened);
     EXPECT_THAT(opened.error().message, EndsWith("accepts no new sessions now: the server has no capacity for another session"));
     EXPECT_THAT(get(server->port(), "/healthz"), StartsWith("HTTP/1.1 200"));
+    EXPECT_THAT(get(server->port(), "/readyz"), StartsWith("HTTP/1.1 503"));
   }
   options = {};
   options.max_connections_per_address = 2;
@@ -80,6 +103,22 @@ TEST(Server, TurnsSessionsAwayAtItsLimits) {
   Waiting second(server->port());
   EXPECT_EQ(talk(server->port(), ""), "");
   EXPECT_GT(first.finish(), 0u);
+}
+
+TEST(Server, CountsClientsBehindATrustedProxyByTheAddressThatItNames) {
+  const auto upgrade = [](const Server& server, const char* forwarded_for) {
+    return std::make_unique<RawClient>(server.port(), RawClient::Hello{.forwarded_for = forwarded_for});
+  };
+  ServeOptions options;
+  options.max_connections_per_address = 1;
+  options.proxies = TrustedProxies::parse(std::vector<std::string>{"127.0.0.0/8"}).value();
+  const auto server = start(options);
+  const auto first = upgrade(*server, "192.0.2.1"), second = upgrade(*server, "192.0.2.1, 192.0.2.2, 127.0.0.1");
+  EXPECT_THROW(upgrade(*server, "192.0.2.3, 192.0.2.1"), std::exception);
+  const auto third = upgrade(*server, "192.0.2.3");
+  first->send(kOpen);
+  first->send(kEverything);
+  EXPECT_GT(first->stream_to_end(), 0u);
 }
 
 TEST(Server, ReadsASessionThatSaysTooMuchMoreSlowly) {

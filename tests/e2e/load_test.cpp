@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/complaints.h"
 #include "tests/support/peers.h"
 #include "tests/support/programs.h"
 #include "tests/support/temp_dir.h"
@@ -16,8 +17,8 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 std::vector<std::string> command(const std::string& url, const std::vector<std::string>& more) {
   std::vector<std::string> arguments{program("intervale-load"), url};
@@ -36,13 +37,7 @@ nlohmann::json load(const std::string& url, std::vector<std::string> more) {
   return json;
 }
 
-void expect_complaint(const Finished& finished, int status, const std::string& about) {
-  EXPECT_EQ(finished.status, status) << finished.err;
-  EXPECT_THAT(finished.err, StartsWith("intervale-load: "));
-  EXPECT_THAT(finished.err, HasSubstr(about));
-  EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
-  EXPECT_EQ(finished.out, "");
-}
+void expect_refusal(const Finished& finished, int status, const std::string& about) { expect_complaint(finished, status, about, "intervale-load: "); }
 
 TEST(Load, FullBringsEveryClientTheWholeStream) {
   ServerProgram server;
@@ -66,7 +61,7 @@ TEST(Load, FullBringsEveryClientTheWholeStream) {
   }
 }
 
-class LoadScenarios : public testing::TestWithParam<const char*> {};
+class LoadScenarios : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(LoadScenarios, EveryViewIsAnswered) {
   ServerProgram server;
@@ -80,7 +75,7 @@ TEST_P(LoadScenarios, EveryViewIsAnswered) {
   EXPECT_GT(figures.at("first_mesh_ms").at("p50"), 0.0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Load, LoadScenarios, testing::Values("orbit", "zoom", "jump"));
+INSTANTIATE_TEST_SUITE_P(Load, LoadScenarios, ::testing::Values("orbit", "zoom", "jump"));
 
 // A gyroid of every range, 20 samples a side.
 struct EveryRangeFolder {
@@ -122,12 +117,12 @@ TEST(Load, ADraggedRangeIsAnsweredWithItsMesh) {
 TEST(Load, ARangeIsDraggedInADataSetOfEveryRangeOnly) {
   const std::vector<std::string> options{"--clients", "1", "--duration", "1", "--scenario", "range"};
   ServerProgram one;
-  expect_complaint(run(command(one.url("buckyball"), options)), 2, "needs a data set of every range");
+  expect_refusal(run(command(one.url("buckyball"), options)), 2, "needs a data set of every range");
   const EveryRangeFolder every;
   ServerProgram server(every.file);
   std::vector<std::string> two = options;
   two.insert(two.end(), {"--range", "0", "1", "--range", "0.5", "1"});
-  expect_complaint(run(command(server.url("every"), two)), 2, "one range each");
+  expect_refusal(run(command(server.url("every"), two)), 2, "one range each");
 }
 
 // A client whose mesh is ever larger fails; what it shows is compared with what extract gives for that.
@@ -218,15 +213,15 @@ TEST(Load, AServerThatIsFullSaysSo) {
   const ServerProgram narrow(buckyball().string(), {"--max-sessions", "1"});
   const auto finished = run(command(narrow.url("buckyball"), {"--clients", "4", "--duration", "1"}));
   EXPECT_EQ(finished.status, 1);
-  EXPECT_THAT(finished.err, testing::EndsWith("accepts no new sessions now: the server has no capacity for another session\n"));
+  EXPECT_THAT(finished.err, ::testing::EndsWith("accepts no new sessions now: the server has no capacity for another session\n"));
 }
 
 TEST(Load, ServersThatCannotBeLoadedAreOneLine) {
-  expect_complaint(run(command("ws://127.0.0.1:1/x", {"--clients", "1", "--duration", "1"})), 1, "cannot connect to 127.0.0.1:1");
+  expect_refusal(run(command("ws://127.0.0.1:1/x", {"--clients", "1", "--duration", "1"})), 1, "cannot connect to 127.0.0.1:1");
   ServerProgram server;
-  expect_complaint(run(command(server.url("fullerene"), {"--clients", "1", "--duration", "1"})), 1, "no data set 'fullerene'");
+  expect_refusal(run(command(server.url("fullerene"), {"--clients", "1", "--duration", "1"})), 1, "no data set 'fullerene'");
   const Stranger stranger("220 mail ready\r\n");
-  expect_complaint(run(command(stranger.url("x"), {"--clients", "1", "--duration", "1"})), 1, "is not an intervale server");
+  expect_refusal(run(command(stranger.url("x"), {"--clients", "1", "--duration", "1"})), 1, "is not an intervale server");
 }
 
 TEST(Load, WrongUsageIsStatus2) {
@@ -236,18 +231,18 @@ TEST(Load, WrongUsageIsStatus2) {
     more.insert(more.end(), good.begin(), good.end());
     return more;
   };
-  expect_complaint(run({program("intervale-load")}), 2, "URL");
-  expect_complaint(run(command(url, {"--duration", "1"})), 2, "--clients");
-  expect_complaint(run(command(url, {"--clients", "1"})), 2, "--duration");
-  expect_complaint(run(command(url, {"--clients", "0", "--duration", "1"})), 2, "--clients");
-  expect_complaint(run(command(url, {"--clients", "-1", "--duration", "1"})), 2, "--clients");
-  expect_complaint(run(command(url, {"--clients", "1", "--duration", "nan"})), 2, "--duration");
-  expect_complaint(run(command(url, with({"--scenario", "dance"}))), 2, "orbit");
-  expect_complaint(run(command(url, with({"--rate", "1"}))), 2, "--rate");
-  expect_complaint(run(command(url, with({"--views-per-second", "0"}))), 2, "--views-per-second");
-  expect_complaint(run(command(url, with({"--reconnect", "5"}))), 2, "--verify");
-  expect_complaint(run(command("ws://127.0.0.1:1", good)), 2, "NAME");
-  expect_complaint(run(command("http://127.0.0.1:1/x", good)), 2, "ws://");
+  expect_refusal(run({program("intervale-load")}), 2, "URL");
+  expect_refusal(run(command(url, {"--duration", "1"})), 2, "--clients");
+  expect_refusal(run(command(url, {"--clients", "1"})), 2, "--duration");
+  expect_refusal(run(command(url, {"--clients", "0", "--duration", "1"})), 2, "--clients");
+  expect_refusal(run(command(url, {"--clients", "-1", "--duration", "1"})), 2, "--clients");
+  expect_refusal(run(command(url, {"--clients", "1", "--duration", "nan"})), 2, "--duration");
+  expect_refusal(run(command(url, with({"--scenario", "dance"}))), 2, "orbit");
+  expect_refusal(run(command(url, with({"--rate", "1"}))), 2, "--rate");
+  expect_refusal(run(command(url, with({"--views-per-second", "0"}))), 2, "--views-per-second");
+  expect_refusal(run(command(url, with({"--reconnect", "5"}))), 2, "--verify");
+  expect_refusal(run(command("ws://127.0.0.1:1", good)), 2, "NAME");
+  expect_refusal(run(command("http://127.0.0.1:1/x", good)), 2, "ws://");
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <chrono>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <set>
 #include <sstream>
@@ -24,8 +25,8 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 void limit_descriptors(const Process& process, rlim_t most) {
   rlimit limit{};
@@ -72,7 +73,7 @@ TEST(Faults, WithoutDescriptorsFilesAreReadLater) {
   EXPECT_TRUE(all_of({"reloaded the tokens", "b.ivm was loaded"}));
   EXPECT_EQ(run({program("intervale-client"), "list", server.url(), "--token", "old"}).status, 1);
   const auto listed = run({program("intervale-client"), "list", server.url(), "--token", "replaced"});
-  EXPECT_THAT(listed.out, testing::AllOf(HasSubstr("a"), HasSubstr("b")));
+  EXPECT_THAT(listed.out, ::testing::AllOf(HasSubstr("a"), HasSubstr("b")));
 }
 
 TEST(Faults, ADiskThatFillsUpWhileBuildingIsOneLineAndKeepsWhatWasThere) {
@@ -91,9 +92,24 @@ TEST(Faults, ADiskThatFillsUpWhileBuildingIsOneLineAndKeepsWhatWasThere) {
   std::filesystem::create_directory(disk);
   const auto small = run({"/usr/bin/env", "unshare", "--map-root-user", "--mount", "sh", "-c", script, "sh", disk, program("intervale"), volume});
   if (small.status != 1) GTEST_SKIP() << "no small disk can be had here: " << small.err;
-  EXPECT_THAT(small.err, testing::AllOf(StartsWith("intervale: cannot write '"), HasSubstr("No space left on device")));
+  EXPECT_THAT(small.err, ::testing::AllOf(StartsWith("intervale: cannot write '"), HasSubstr("No space left on device")));
   EXPECT_EQ(std::count(small.err.begin(), small.err.end(), '\n'), 1) << small.err;
   EXPECT_EQ(small.out, "x.ivm\nbefore\n");
+}
+
+TEST(Faults, ALimitOfFileSizesIsOneLineAndKeepsWhatWasThere) {
+  const TempDir folder;
+  const std::string volume = folder / "volume.nrrd";
+  ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "65", "-o", volume}).status, 0);
+  const auto target = folder / "to";
+  std::filesystem::create_directory(target);
+  const std::string file = folder.file("to/x.ivm", "before");
+  const auto limited =
+      run({"/bin/sh", "-c", "ulimit -f 16; exec \"$@\"", "sh", program("intervale"), "build", volume, "-o", file, "--range", "128", "188"});
+  EXPECT_EQ(limited.status, 1);
+  EXPECT_EQ(limited.err, "intervale: cannot write '" + file + "': File too large\n");
+  EXPECT_EQ(contents_of(file), "before");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(target), std::filesystem::directory_iterator{}), 1);
 }
 
 // The running server's own clock, that of the wall, by a day; its log tells.
@@ -136,7 +152,8 @@ TEST(Faults, AFileOlderThanTheOneItReplacesIsTakenUp) {
   const auto build = [&](const char* low) { return run({program("intervale"), "build", volume, "-o", path, "--range", low, "188"}).status; };
   ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "17", "-o", volume}).status, 0);
   ASSERT_EQ(build("128"), 0);
-  CatalogueWatcher watcher({folder.path()});
+  Memory memory;
+  CatalogueWatcher watcher({folder.path()}, memory);
   const auto before = watcher.load().value().find("served");
   const auto time = std::filesystem::last_write_time(path);
   ASSERT_EQ(build("100"), 0);

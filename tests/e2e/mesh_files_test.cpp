@@ -13,8 +13,6 @@
 namespace intervale {
 namespace {
 
-constexpr const char* kPython = "/usr/bin/python3";  // Debian's, which has Debian's packages
-
 // Extracts a .vtu and a .vtp, and has VTK and meshio read them.
 void expect_readable(const std::filesystem::path& ivm, const std::vector<std::string>& lod) {
   const TempDir folder;

@@ -13,9 +13,9 @@ namespace {
 
 using protocol::CloseCode;
 using protocol::View;
-using testing::HasSubstr;
-using testing::Not;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 TEST(Metrics, TellWhatASessionGot) {
   const auto server = start();

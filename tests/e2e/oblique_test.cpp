@@ -14,7 +14,7 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 // A ramp of 9 x 8 x 7 samples.
 std::string samples() {
@@ -50,9 +50,9 @@ TEST(Oblique, AnAffineOfTheCommandLineGoesThroughEveryProgram) {
   EXPECT_EQ(info.at("unit"), "mm");
   EXPECT_EQ(info.at("field"), "density");
   EXPECT_EQ(info.at("field_unit"), "HU");
-  EXPECT_THAT(
-      run({program("intervale"), "info", oblique}).out,
-      testing::AllOf(HasSubstr("axes (-1, 0, 0), (0.5, 2, 0), (0, 0.25, 3), origin (100, -7, 0.001), in mm\n"), HasSubstr("field density, in HU\n")));
+  EXPECT_THAT(run({program("intervale"), "info", oblique}).out,
+              ::testing::AllOf(HasSubstr("axes (-1, 0, 0), (0.5, 2, 0), (0, 0.25, 3), origin (100, -7, 0.001), in mm\n"),
+                               HasSubstr("field density, in HU\n")));
   EXPECT_THAT(run({program("intervale"), "info", plain}).out, HasSubstr("spacing (1, 1, 1), origin (0, 0, 0)\n"));
 
   const auto before = json_of(run({program("intervale"), "extract", plain, "--json"}));

@@ -18,8 +18,8 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 using Colour = std::array<int, 3>;
 
@@ -312,6 +312,33 @@ TEST(Pictures, WhatCannotBeDrawnIsOneLine) {
   const Finished without = extract(ball(), "--clip 0 0 0 0 0 1", {});
   EXPECT_EQ(without.status, 2);
   EXPECT_THAT(without.err, HasSubstr("--image"));
+}
+
+// Products of lengths exceed what doubles hold.
+TEST(Pictures, OfVolumesOfExtremeSizeAreRefused) {
+  const TempDir folder;
+  const std::string raw = folder.file("cube.raw", std::string("\x00\x00\x00\x00\x00\x00\x00\xff", 8));
+  const auto draw = [&](const std::string& spacing, const std::string& render) {
+    const std::string file = folder / "cube.ivm";
+    const Finished built = run({program("intervale"), "build", raw, "--dims", "2", "2", "2", "--type", "u8", "--spacing", spacing, spacing, spacing,
+                                "--range", "100", "255", "-o", file});
+    EXPECT_EQ(built.status, 0) << built.err;
+    return extract(file, "--render " + render, {"--image", folder / "x.png"});
+  };
+  for (const char* const render : {"surface", "volume"}) {
+    for (const char* const spacing : {"1e-300", "1e300"}) {
+      const Finished done = draw(spacing, render);
+      EXPECT_EQ(done.status, 1) << done.err;
+      EXPECT_THAT(done.err, StartsWith("intervale: cannot draw '"));
+      EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
+      EXPECT_FALSE(std::filesystem::exists(folder / "x.png"));
+    }
+    for (const char* const spacing : {"1e-70", "1e70"}) {
+      EXPECT_EQ(draw(spacing, render).status, 0);
+      EXPECT_LT(share(read_png(folder / "x.png"), Hue::background), 0.99);
+      std::filesystem::remove(folder / "x.png");
+    }
+  }
 }
 
 TEST(Pictures, AMachineWithoutEglIsOneLine) {

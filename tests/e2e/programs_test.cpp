@@ -18,8 +18,8 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::vector<std::string> words_of(const std::string& text) {
   std::istringstream in(text);
@@ -197,11 +197,11 @@ TEST(Programs, AServerThatTakesNobodySaysWhy) {
     EXPECT_EQ(finished.status, 1);
     return finished.err;
   };
-  EXPECT_THAT(complaint_about("loading\nmore"), testing::EndsWith("accepts no new sessions now: loading\n"));
-  EXPECT_THAT(complaint_about("\x1b[2J"), testing::EndsWith("accepts no new sessions now: ?[2J\n"));
-  EXPECT_THAT(complaint_about(std::string(500, 'x')), testing::EndsWith("accepts no new sessions now: " + std::string(80, 'x') + "\n"));
-  EXPECT_THAT(complaint_about("<html>busy</html>"), testing::EndsWith("accepts no new sessions now\n"));
-  EXPECT_THAT(complaint_about(""), testing::EndsWith("accepts no new sessions now\n"));
+  EXPECT_THAT(complaint_about("loading\nmore"), ::testing::EndsWith("accepts no new sessions now: loading\n"));
+  EXPECT_THAT(complaint_about("\x1b[2J"), ::testing::EndsWith("accepts no new sessions now: ?[2J\n"));
+  EXPECT_THAT(complaint_about(std::string(500, 'x')), ::testing::EndsWith("accepts no new sessions now: " + std::string(80, 'x') + "\n"));
+  EXPECT_THAT(complaint_about("<html>busy</html>"), ::testing::EndsWith("accepts no new sessions now\n"));
+  EXPECT_THAT(complaint_about(""), ::testing::EndsWith("accepts no new sessions now\n"));
 }
 
 TEST(Programs, APortInUseIsOneLine) {
@@ -237,7 +237,7 @@ TEST(Programs, NamesDoNotReachTheTerminalAsTheyAre) {
   for (const char* command : {"info", "verify"}) {
     const auto told = run({program("intervale"), command, path});
     EXPECT_EQ(told.status, 0);
-    EXPECT_THAT(told.out, testing::AllOf(HasSubstr("red ?[31m"), Not(HasSubstr("\x1b")))) << command;
+    EXPECT_THAT(told.out, ::testing::AllOf(HasSubstr("red ?[31m"), Not(HasSubstr("\x1b")))) << command;
     EXPECT_EQ(run({program("intervale"), command, path, "--json"}).status, 0);
   }
   const auto missing = run({program("intervale"), "info", folder / "\x1b[31m.ivm"});

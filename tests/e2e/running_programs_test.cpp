@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "common/util/printable.h"
+#include "protocol/codec.h"
 #include "tests/support/complaints.h"
 #include "tests/support/peers.h"
 #include "tests/support/programs.h"
@@ -19,9 +21,10 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
-using testing::StartsWith;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 TEST(Programs, AServerKilledInTheMiddleLeavesNoFile) {
   ServerProgram server;
@@ -68,6 +71,58 @@ TEST(Programs, AServerThatIsKilledAndStartedAgainIsFoundAgain) {
   for (const char* key : {"updates", "vertices", "tets", "volume"}) EXPECT_EQ(got.at(key), whole.at(key)) << key;
 }
 
+// Escapes, a line of its own, and text from right to left.
+TEST(Programs, NoReasonOfAServerReachesTheTerminal) {
+  using protocol::CloseCode;
+  for (const CloseCode code : {CloseCode::going_away, CloseCode::text_frame, CloseCode::internal, CloseCode::malformed, CloseCode::unauthorized,
+                               CloseCode::forbidden, CloseCode::no_such_dataset, CloseCode::timed_out, CloseCode::out_of_order, CloseCode::too_large,
+                               CloseCode::no_such_range, CloseCode::other_version}) {
+    SCOPED_TRACE(unsigned(code));
+    const Refuser server(code, "\x1b]0;mine\x07\r\n\x1b[2Jdone\u202e\u009b31m");
+    const Finished fetched = run({client(), "fetch", server.url("x"), "--reconnect", "0"});
+    const Finished loaded = run({program("intervale-load"), server.url("x"), "--clients", "1", "--duration", "1"});
+    for (const Finished& finished : {fetched, loaded}) {
+      EXPECT_THAT(finished.status, AnyOf(1, 2)) << finished.err;
+      EXPECT_THAT(finished.err, ::testing::EndsWith("\n"));
+      EXPECT_EQ(printable(finished.err), finished.err.substr(0, finished.err.size() - 1) + "?") << "control characters, or a second line";
+      EXPECT_EQ(finished.out, "");
+    }
+  }
+}
+
+// Messages by themselves: unit/evil_servers_test.cpp.
+TEST(Programs, WhatIsNoStreamIsToldInOneLine) {
+  using Kind = Speaker::Frame::Kind;
+  const auto encoded = [](const protocol::ServerMessage& message) {
+    const auto bytes = protocol::encode(message);
+    return std::string(bytes.begin(), bytes.end());
+  };
+  const struct {
+    const char* name;
+    Speaker::Frame frame;
+    unsigned close_code;
+    const char* about;
+  } cases[] = {
+      {"text", {Kind::text, "hello"}, 1000, "sent a text message"},
+      {"noise", {Kind::binary, std::string(1000, '\xa5')}, 1000, "violated the protocol: malformed message"},
+      {"nothing", {Kind::binary, ""}, 1000, "violated the protocol: malformed message"},
+      {"a Done at once", {Kind::binary, encoded(protocol::Done{1, 0, false})}, 1000, "violated the protocol: no Opened at first"},
+      {"a large message", {Kind::binary, std::string(1 << 20, 'x')}, 1000, "larger than the protocol allows"},
+      {"a message of 2^62 bytes", {Kind::raw, std::string("\x82\x7f\x40\0\0\0\0\0\0\0", 10)}, 1000, "larger than the protocol allows"},
+      {"a frame with flags", {Kind::raw, std::string("\xf2\0", 2)}, 0, "lost the server"},
+      {"a masked frame", {Kind::raw, std::string("\x82\x80\0\0\0\0", 6)}, 0, "lost the server"},
+      {"half a frame", {Kind::raw, std::string("\x82\x7e\x10", 3)}, 0, "lost the server"},
+      {"many pings", {Kind::ping, "x", 20000}, 4400, "closed the session with code 4400"},
+      {"a close without a fault", {Kind::ping, ""}, 1002, "closed the session with code 1002"},
+      {"no close", {Kind::ping, ""}, 0, "lost the server"},
+  };
+  for (const auto& c : cases) {
+    SCOPED_TRACE(c.name);
+    const Speaker server({c.frame}, c.close_code);
+    expect_complaint(run({client(), "fetch", server.url("x"), "--reconnect", "0"}), 1, c.about);
+  }
+}
+
 TEST(Programs, TokensLetInAndAreNeverTold) {
   const TempDir folder;
   const std::string secret = "hush-0123456789", wrong = "wrong-0123456789";
@@ -95,7 +150,7 @@ TEST(Programs, TokensLetInAndAreNeverTold) {
   server.process().signal(SIGTERM);
   const Finished served = server.process().wait();
   EXPECT_EQ(served.status, 0);
-  EXPECT_THAT(served.err, testing::AllOf(HasSubstr("session 1 "), Not(HasSubstr("hush")), Not(HasSubstr("wrong-"))));
+  EXPECT_THAT(served.err, ::testing::AllOf(HasSubstr("session 1 "), Not(HasSubstr("hush")), Not(HasSubstr("wrong-"))));
 }
 
 TEST(Programs, AServedFolderIsLookedAtAgain) {

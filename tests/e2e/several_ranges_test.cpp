@@ -15,16 +15,9 @@
 namespace intervale {
 namespace {
 
-using Arguments = std::vector<std::string>;
-
 const Arguments kRanges{"--range", "-0.5", "0.25", "--range", "0.1", "1", "--range", "0.9", "0.9"};
 
-Arguments operator+(Arguments a, const Arguments& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
-class SeveralRanges : public testing::Test {
+class SeveralRanges : public ::testing::Test {
  public:
   SeveralRanges() {
     EXPECT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "20", "-o", folder / "gyroid.nrrd"}).status, 0);
@@ -65,7 +58,7 @@ TEST_F(SeveralRanges, AClientReceivesTheMeshesThatExtractMakes) {
     const auto expected = extract(level + kRanges), got = fetch_json(level + kRanges + Arguments{"--digest"}, server.url("every"));
     for (const char* key : {"updates", "vertices", "tets", "digest", "ranges"}) EXPECT_EQ(got.at(key), expected.at(key)) << key;
   }
-  EXPECT_THAT(run(Arguments{client(), "fetch", server.url("every")} + kRanges).out, testing::HasSubstr("\n[0.1, 1]: "));
+  EXPECT_THAT(run(Arguments{client(), "fetch", server.url("every")} + kRanges).out, ::testing::HasSubstr("\n[0.1, 1]: "));
   const Arguments load{program("intervale-load"), server.url("every"), "--clients", "3", "--duration", "0.5", "--verify", "--max-tets", "5000"};
   EXPECT_EQ(run(load + kRanges).status, 0);
 }
@@ -78,9 +71,9 @@ TEST_F(SeveralRanges, AFileSaysWhichRangeATetrahedronIsOf) {
     text << std::ifstream(path).rdbuf();
     return text.str();
   };
-  EXPECT_THAT(text_of(mesh), testing::HasSubstr("<CellData Scalars=\"range\">\n<DataArray type=\"UInt8\" Name=\"range\""));
+  EXPECT_THAT(text_of(mesh), ::testing::HasSubstr("<CellData Scalars=\"range\">\n<DataArray type=\"UInt8\" Name=\"range\""));
   ASSERT_EQ(run({program("intervale"), "extract", every, "-o", mesh, "--range", "0", "1"}).status, 0);
-  EXPECT_THAT(text_of(mesh), testing::Not(testing::HasSubstr("CellData")));
+  EXPECT_THAT(text_of(mesh), ::testing::Not(::testing::HasSubstr("CellData")));
 }
 
 TEST_F(SeveralRanges, WrongUsageIsSaid) {

@@ -21,7 +21,7 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 struct Secured {
   TempDir folder;
@@ -33,7 +33,7 @@ struct Secured {
     options.threads = 2;
     options.tls = TlsFiles{files.certificate, files.key};
     server = Server::start(options).value();
-    server->offer(CatalogueWatcher({buckyball()}).load().value());
+    server->offer(CatalogueWatcher({buckyball()}, server->memory()).load().value());
   }
   [[nodiscard]] ServerUrl url(const std::string& host = "127.0.0.1") const {
     ServerUrl url = parse_url("wss://" + host + ":" + std::to_string(server->port()) + "/buckyball").value();
@@ -51,11 +51,11 @@ Result<Fetched> fetch_coarse(const ServerUrl& url) {
 
 TEST(Tls, CarriesTheSameStream) {
   const Secured secured;
-  EXPECT_THAT(secured.server->url(), testing::StartsWith("https://"));
+  EXPECT_THAT(secured.server->url(), ::testing::StartsWith("https://"));
   ServeOptions plain;
   plain.listen = "127.0.0.1:0";
   const auto server = Server::start(plain).value();
-  server->offer(CatalogueWatcher({buckyball()}).load().value());
+  server->offer(CatalogueWatcher({buckyball()}, server->memory()).load().value());
   const auto over_tcp = fetch(parse_url("ws://127.0.0.1:" + std::to_string(server->port()) + "/buckyball").value(), {}, {});
   for (const char* host : {"127.0.0.1", "localhost"}) {
     const auto over_tls = fetch(secured.url(host), {}, {});
@@ -80,7 +80,7 @@ TEST(Tls, IsForServersThatAreTrustedOnly) {
   const Secured secured;
   ServerUrl unknown = secured.url();
   unknown.access.authorities.reset();
-  EXPECT_THAT(complaint_of(unknown), testing::AllOf(HasSubstr("cannot trust the server"), HasSubstr("self-signed"), HasSubstr("--ca")));
+  EXPECT_THAT(complaint_of(unknown), ::testing::AllOf(HasSubstr("cannot trust the server"), HasSubstr("self-signed"), HasSubstr("--ca")));
   ServerUrl wrong = secured.url();
   wrong.access.authorities = make_certificate(secured.folder.path(), "wrong").certificate;
   EXPECT_THAT(complaint_of(wrong), HasSubstr("cannot trust the server"));
@@ -97,12 +97,12 @@ TEST(Tls, AndWithoutItAreToldApart) {
   ServerUrl plain = secured.url();
   plain.secure = false;
   for (const std::string& complaint : {fetch_coarse(plain).error().message, http_get(plain, "/api/datasets").error().message}) {
-    EXPECT_THAT(complaint, testing::AllOf(HasSubstr("is not an intervale server"), HasSubstr("does it require wss://?")));
+    EXPECT_THAT(complaint, ::testing::AllOf(HasSubstr("is not an intervale server"), HasSubstr("does it require wss://?")));
   }
   const Stranger alert(std::string("\x15\x03\x01\x00\x02\x02\x46", 7));  // as OpenSSL's server answers what is no TLS
   EXPECT_THAT(fetch_coarse(parse_url(alert.url("x")).value()).error().message, HasSubstr("does it require wss://?"));
   const Stranger page("HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok");
-  EXPECT_THAT(fetch_coarse(parse_url(page.url("x")).value()).error().message, testing::Not(HasSubstr("wss://")));
+  EXPECT_THAT(fetch_coarse(parse_url(page.url("x")).value()).error().message, ::testing::Not(HasSubstr("wss://")));
   const Stranger stranger("220 mail ready\r\n");
   ServerUrl secure = parse_url(stranger.url("x")).value();
   secure.secure = true;

@@ -122,6 +122,8 @@ void add_messages(const Corpus& corpus) {
 void add_requests(const Corpus& corpus) {
   const std::string plain{0, 0}, everything{0, 12}, some{0, 8};
   corpus.add("http", "front", plain, "/\nlocalhost:8080\n\n\n");
+  corpus.add("http", "url", plain, "http://example.org:8080/lone.gz?x\na\n\n\n");
+  corpus.add("http", "url-bare", everything, "HTTPS://[::1]\na\n\n\n");
   corpus.add("http", "packed", plain, "/assets/index-BVx3_a9Z.js?v=1\n[::1]:8080\nbr;q=1, gzip;q=0.8, *;q=0\n\n");
   corpus.add("http", "tag", plain, "/%69ndex.html\na\nx-gzip\n\"0\", W/\"1\"");
   corpus.add("http", "any-tag", plain, "/lone.gz\na; script-src *\n*\n*");

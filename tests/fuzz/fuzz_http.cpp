@@ -13,6 +13,7 @@
 
 #include "server/builder/field_hierarchy.h"
 #include "server/serve/http_routes.h"
+#include "server/serve/request_target.h"
 #include "tests/fuzz/lines.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/temp_dir.h"
@@ -174,20 +175,23 @@ bool equal(const HttpResponse& a, const HttpResponse& b) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const StaticFiles viewer = load_viewer(), no_viewer;
   static const Metrics metrics;
+  static const Memory memory;
   static const Catalogue::Volume open = volume_named(std::string(kOpen));
   static const Scope nothing({"nothing"}), scans({"scans-*"});
   if (size < 2) return 0;
   const std::array<const Scope*, 4> scopes{nullptr, &nothing, &scans, Scope::everything().get()};
-  const auto lines = testing::lines_of(data + 2, size - 2, 5);
+  auto lines = testing::lines_of(data + 2, size - 2, 5);
   Catalogue catalogue;
   testing::require(catalogue.add(open).has_value(), "a plain name will do");
   if (!lines[4].empty()) (void)catalogue.add(volume_named(lines[4]));
-  const HttpState state{.catalogue = catalogue,
-                        .metrics = metrics,
-                        .viewer = data[0] & 1 ? no_viewer : viewer,
-                        .role = data[0] & 2 ? PortRole::metrics : PortRole::all,
-                        .has_metrics_port = (data[0] & 4) != 0,
-                        .server_status = std::array{ServerStatus::ready, ServerStatus::loading, ServerStatus::draining}[data[0] / 8u % 3]};
+  const HttpState state{
+      .catalogue = catalogue,
+      .metrics = metrics,
+      .memory = memory,
+      .viewer = data[0] & 1 ? no_viewer : viewer,
+      .role = data[0] & 2 ? PortRole::metrics : PortRole::all,
+      .has_metrics_port = (data[0] & 4) != 0,
+      .server_status = std::array{ServerStatus::ready, ServerStatus::loading, ServerStatus::full, ServerStatus::draining}[data[0] / 8u % 4]};
   HttpRequest request{.method = kMethods[data[1] % kMethods.size()],
                       .target = lines[0],
                       .host = lines[1],
@@ -195,6 +199,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                       .if_none_match = lines[3],
                       .allowed_origin = data[0] & 64 ? "https://elsewhere.example" : "",
                       .scope = scopes[data[1] / 4u % scopes.size()]};
+  if (const auto asked = request_target(lines[0], std::array<std::string_view, 1>{lines[1]}, 11)) {
+    testing::require(asked->host.find_first_of(" /?#@\"") == std::string::npos, "a host is no more than that");
+    testing::require(asked->target == lines[0] || asked->target.starts_with('/'), "a URL has a path");
+    request.target = lines[0] = asked->target;
+    request.host = lines[1] = asked->host;
+  }
   const HttpResponse first = respond(request, state);
   check(request, state, first);
   const auto path = plain_path(lines[0]);

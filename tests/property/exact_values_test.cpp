@@ -20,6 +20,7 @@
 #include "server/builder/value_builder.h"
 #include "server/builder/value_steps.h"
 #include "tests/support/naive_volume.h"
+#include "tests/support/seeds.h"
 #include "tests/support/session_server.h"
 #include "tests/support/value_fields.h"
 
@@ -165,7 +166,7 @@ TEST_P(ExactValues, DamagedFilesAreRefused) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, ExactValues, ::testing::Range(0u, 16u));
+INSTANTIATE_TEST_SUITE_P(Random, ExactValues, testing::seeds(0, 16));
 
 }  // namespace
 }  // namespace intervale

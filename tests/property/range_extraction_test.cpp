@@ -13,6 +13,7 @@
 #include "server/builder/value_builder.h"
 #include "tests/support/coverage.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/seeds.h"
 #include "tests/support/value_fields.h"
 
 namespace intervale {
@@ -150,7 +151,7 @@ TEST_P(RangeExtraction, KeepsItsBudgets) {
   EXPECT_EQ(testing::broken_law(updates->front.mesh(), field.volume.grid, range.alpha == range.beta), "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, RangeExtraction, ::testing::Range(0u, 30u));
+INSTANTIATE_TEST_SUITE_P(Random, RangeExtraction, testing::seeds(0, 30));
 
 }  // namespace
 }  // namespace intervale

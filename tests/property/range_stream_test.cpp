@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
 #include <random>
@@ -23,7 +22,9 @@
 #include "tests/support/cameras.h"
 #include "tests/support/channels.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/seeds.h"
 #include "tests/support/session_server.h"
+#include "tests/support/special_values.h"
 #include "tests/support/value_fields.h"
 
 namespace intervale {
@@ -354,10 +355,9 @@ TEST_P(RangeStream, RefusesARangeThatTheDataSetHasNot) {
   session.look({});
   testing::SessionServer server(volume, session);
   server.run();
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   ViewRequest beyond;
-  if (std::isfinite(d.range.alpha)) beyond.shown.ranges = {{std::nextafter(d.range.alpha, -kInfinity), d.range.beta}};
-  if (std::isfinite(d.range.beta)) beyond.shown.ranges = {{d.range.alpha, std::nextafter(d.range.beta, kInfinity)}};
+  if (std::isfinite(d.range.alpha)) beyond.shown.ranges = {{std::nextafter(d.range.alpha, -kInf), d.range.beta}};
+  if (std::isfinite(d.range.beta)) beyond.shown.ranges = {{d.range.alpha, std::nextafter(d.range.beta, kInf)}};
   if (beyond.shown.ranges.empty()) return;  // it has every range
   const auto refused = session.look(beyond);
   ASSERT_FALSE(refused);
@@ -365,7 +365,7 @@ TEST_P(RangeStream, RefusesARangeThatTheDataSetHasNot) {
   EXPECT_EQ(session.mesh()->front().range(), d.range);
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, RangeStream, ::testing::Range(0u, 24u));
+INSTANTIATE_TEST_SUITE_P(Random, RangeStream, testing::seeds(0, 24));
 
 }  // namespace
 }  // namespace intervale

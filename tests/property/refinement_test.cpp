@@ -12,14 +12,14 @@
 #include "tests/support/coverage.h"
 #include "tests/support/mesh_laws.h"
 #include "tests/support/naive_volume.h"
+#include "tests/support/seeds.h"
+#include "tests/support/special_values.h"
 #include "tests/support/split_sets.h"
 
 namespace intervale {
 namespace {
 
 using testing::broken_law;
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 struct Trial {
   Volume volume;
@@ -161,7 +161,7 @@ TEST_P(Property, BoxesThatDoNotNestKeepTheGuaranteeAtSamples) {
   EXPECT_EQ(testing::broken_guarantee(trial.volume, mesh, trial.options.range, epsilon), "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, Property, ::testing::Range(1u, 61u));
+INSTANTIATE_TEST_SUITE_P(Random, Property, testing::seeds(1, 60));
 
 }  // namespace
 }  // namespace intervale

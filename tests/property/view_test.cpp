@@ -16,6 +16,8 @@
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/cameras.h"
+#include "tests/support/seeds.h"
+#include "tests/support/special_values.h"
 #include "tests/support/surfaces.h"
 
 namespace intervale {
@@ -26,17 +28,15 @@ using testing::SurfaceDistance;
 using testing::Triangles;
 using testing::Vector;
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
-
-struct Trial {
+struct ViewTrial {
   Volume volume;
   Range range;
   int points;  // of each surface that are looked at
   std::string text;
 };
 
-Trial trial_of_seed(unsigned seed) {
-  Trial trial;
+ViewTrial trial_of_seed(unsigned seed) {
+  ViewTrial trial;
   switch (seed % 5) {
     case 0:
       trial = {testing::gyroid({33, 33, 33}), {-0.3, 0.2}, 1500, "gyroid"};
@@ -91,7 +91,7 @@ std::vector<double> pixels_off(const Triangles& from, const Triangles& to, int p
 class Pictures : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Pictures, AreOffByNoMoreThanWasAskedFor) {
-  const Trial trial = trial_of_seed(GetParam());
+  const ViewTrial trial = trial_of_seed(GetParam());
   SCOPED_TRACE(trial.text);
   const auto sigma = FieldHierarchy(trial.volume, {.range = trial.range}).compact();
   ASSERT_TRUE(sigma) << sigma.error().message;
@@ -129,7 +129,7 @@ TEST_P(Pictures, AreOffByNoMoreThanWasAskedFor) {
   EXPECT_LT(updates, sigma->size()) << "nothing was left out";
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, Pictures, ::testing::Range(0u, 10u));
+INSTANTIATE_TEST_SUITE_P(Random, Pictures, testing::seeds(0, 10));
 
 }  // namespace
 }  // namespace intervale

@@ -1,4 +1,4 @@
-// Random cameras, and what a pinhole camera shows, by its own arithmetic.
+// Random cameras and levels of detail, and what a pinhole camera shows, by its own arithmetic.
 #pragma once
 
 #include <array>
@@ -45,6 +45,24 @@ inline Camera random_camera(const Grid& g, std::mt19937& random) {
   camera.fov = random() % 8 == 0 ? uniform(random, 100, 170) : uniform(random, 2, 100);
   camera.viewport = {int(100 + random() % 2000), int(100 + random() % 2000)};
   return camera;
+}
+
+// Perhaps an error, a region, and a camera, each by itself.
+inline Lod random_lod(const Grid& g, std::mt19937& random) {
+  Lod lod;
+  if (random() % 2 == 0) lod.error_percent = double(random() % 40);
+  if (random() % 3 == 0) {
+    lod.roi.emplace();
+    for (int i = 0; i < 3; ++i) {
+      lod.roi->min[i] = g.affine.origin()[i] + g.affine.spacing()[i] * uniform(random, -1, g.dims[i]);
+      lod.roi->max[i] = lod.roi->min[i] + g.affine.spacing()[i] * uniform(random, 0, 8);
+    }
+  }
+  if (random() % 3 != 0) {
+    lod.camera = random_camera(g, random);
+    lod.camera->pixel_error = std::pow(2.0, uniform(random, -1, 8));
+  }
+  return lod;
 }
 
 class NaiveCamera {

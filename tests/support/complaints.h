@@ -32,8 +32,8 @@ inline nlohmann::json fetch_json(std::vector<std::string> more, const std::strin
 // Status 1 or 2, one line on stderr, nothing on stdout.
 inline void expect_complaint(const Finished& finished, int status, const std::string& about, const std::string& who = "intervale-client: ") {
   EXPECT_EQ(finished.status, status) << finished.err;
-  EXPECT_THAT(finished.err, testing::StartsWith(who));
-  EXPECT_THAT(finished.err, testing::HasSubstr(about));
+  EXPECT_THAT(finished.err, ::testing::StartsWith(who));
+  EXPECT_THAT(finished.err, ::testing::HasSubstr(about));
   EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
   EXPECT_EQ(finished.out, "");
 }

@@ -4,19 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "common/mesh/mesh.h"
 #include "common/patch/description.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/special_values.h"
 
 namespace intervale::testing {
 
 // By sample: whether a tetrahedron holds it, with a tolerance for those that lie on its faces.
 inline std::vector<bool> covered_samples(const Grid& g, const Mesh& mesh) {
-  constexpr double kInf = std::numeric_limits<double>::infinity();
   std::vector<bool> covered(g.sample_count());
   for (const auto& t : mesh.tets) {
     std::array<std::array<double, 3>, 4> p{};

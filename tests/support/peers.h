@@ -5,6 +5,9 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
+
+#include "protocol/messages.h"
 
 namespace intervale {
 
@@ -27,6 +30,36 @@ class Stranger {
  public:
   explicit Stranger(std::string answer);
   ~Stranger();
+  [[nodiscard]] std::string url(const std::string& name) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// A WebSocket server that answers the first message of each session with Fault, and closes with its code.
+class Refuser {
+ public:
+  Refuser(protocol::CloseCode code, std::string text);
+  ~Refuser();
+  [[nodiscard]] std::string url(const std::string& name) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// A WebSocket server that answers the first message of each session with frames that no server sends.
+class Speaker {
+ public:
+  struct Frame {
+    enum class Kind { binary, text, ping, raw } kind = Kind::binary;  // raw: bytes on the connection, no frame
+    std::string bytes;
+    unsigned times = 1;
+  };
+  // close_code: after that; 0: the connection ends without one.
+  Speaker(std::vector<Frame> frames, unsigned close_code);
+  ~Speaker();
   [[nodiscard]] std::string url(const std::string& name) const;
 
  private:

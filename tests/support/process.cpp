@@ -18,6 +18,7 @@ struct Pipe {
   std::array<int, 2> ends{};
   Pipe() {
     if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+    (void)::fcntl(ends[1], F_SETPIPE_SZ, 1 << 20);  // a program does not wait for a test that does not read yet
   }
 };
 

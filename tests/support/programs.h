@@ -10,6 +10,15 @@
 
 namespace intervale {
 
+// Debian's, which has Debian's packages.
+inline constexpr const char* kPython = "/usr/bin/python3";
+
+using Arguments = std::vector<std::string>;
+inline Arguments operator+(Arguments a, const Arguments& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
 // A program's path: in $INTERVALE_BIN, else where this build puts its programs.
 [[nodiscard]] std::string program(const std::string& name);
 

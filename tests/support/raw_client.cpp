@@ -1,5 +1,6 @@
 #include "tests/support/raw_client.h"
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read.hpp>
@@ -22,6 +23,7 @@ void set_headers(websocket::stream<tcp::socket>& ws, const RawClient::Hello& hel
   ws.set_option(websocket::stream_base::decorator([hello](websocket::request_type& request) {
     request.set(beast::http::field::sec_websocket_protocol, hello.subprotocols);
     if (!hello.authorization.empty()) request.set(beast::http::field::authorization, hello.authorization);
+    if (!hello.forwarded_for.empty()) request.set("X-Forwarded-For", hello.forwarded_for);
     if (!hello.origin.empty()) request.set(beast::http::field::origin, hello.origin);
   }));
 }
@@ -112,15 +114,27 @@ std::uint64_t RawClient::stream_to_end() {
   throw std::runtime_error("the stream broke off");
 }
 
-std::string talk(std::uint16_t port, const std::string& bytes) {
+namespace {
+
+std::string exchange(std::uint16_t port, const std::string& bytes, std::size_t piece, bool is_all) {
   asio::io_context io;
   tcp::socket socket(io);
   socket.connect({asio::ip::address_v4::loopback(), port});
   boost::system::error_code ignored;
-  asio::write(socket, asio::buffer(bytes), ignored);
+  socket.set_option(tcp::no_delay(true));
+  for (std::size_t sent = 0; sent < bytes.size() && !ignored; sent += piece) {
+    piece = std::min(piece, bytes.size() - sent);
+    asio::write(socket, asio::buffer(&bytes[sent], piece), ignored);
+  }
+  if (is_all) socket.shutdown(tcp::socket::shutdown_send, ignored);
   std::string answer;
   asio::read(socket, asio::dynamic_buffer(answer), ignored);
   return answer;
 }
+
+}  // namespace
+
+std::string talk(std::uint16_t port, const std::string& bytes, std::size_t piece) { return exchange(port, bytes, piece, false); }
+std::string say_all(std::uint16_t port, const std::string& bytes) { return exchange(port, bytes, std::string::npos, true); }
 
 }  // namespace intervale

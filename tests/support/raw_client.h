@@ -15,8 +15,8 @@ class RawClient {
  public:
   struct Hello {
     std::string subprotocols = protocol::kSubprotocol;
-    std::string authorization = {}, origin = {};  // headers; empty: none
-    bool narrow = false;                          // as little as can be is on its way to it
+    std::string authorization = {}, origin = {}, forwarded_for = {};  // headers; empty: none
+    bool narrow = false;                                              // as little as can be is on its way to it
   };
   // With the handshake done. Throws if it is refused.
   explicit RawClient(std::uint16_t port) : RawClient(port, Hello{}) {}
@@ -53,7 +53,10 @@ class RawClient {
 // The status that the server answers an upgrade with; 101: it is accepted.
 unsigned upgrade_status(std::uint16_t port, const RawClient::Hello& hello);
 
-// Sends bytes over plain TCP and gives what comes back until the server closes.
-[[nodiscard]] std::string talk(std::uint16_t port, const std::string& bytes);
+// Sends bytes over plain TCP, so many at once, and gives what comes back until the server closes.
+[[nodiscard]] std::string talk(std::uint16_t port, const std::string& bytes, std::size_t piece = std::string::npos);
+
+// Sends bytes over plain TCP and that they are all, and gives what comes back until the server closes.
+[[nodiscard]] std::string say_all(std::uint16_t port, const std::string& bytes);
 
 }  // namespace intervale

@@ -17,7 +17,7 @@ std::unique_ptr<Server> start(const ServeOptions& wanted, const std::filesystem:
   options.threads = 2;
   auto server = Server::start(options);
   if (!server) throw std::runtime_error(server.error().message);
-  (*server)->offer(CatalogueWatcher({input}).load().value());
+  (*server)->offer(CatalogueWatcher({input}, (*server)->memory()).load().value());
   return std::move(*server);
 }
 

@@ -4,8 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <memory>
-#include <semaphore>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -24,24 +25,28 @@ class SessionServer {
  public:
   // find: as of RangeCache.
   SessionServer(const std::shared_ptr<const IntervalVolume>& volume, Client& client, RangeCache::Find find = &PartFinder::find)
-      : ranges_(std::move(find)), client_(client) {
+      : ranges_(memory_, scheduler_, std::move(find)), client_(client) {
     Catalogue catalogue;
     EXPECT_TRUE(catalogue.add(volume));
     catalogue_.store(std::make_shared<const Catalogue>(std::move(catalogue)));
-    state_.set_wake([this] { woken_.release(); });
+    state_.set_wake([this] {
+      const std::lock_guard lock(mutex_);
+      ++wakes_;
+      woken_.notify_one();
+    });
     client_.connected(now_);
   }
 
-  // Until neither side has anything to send, or so many messages were sent to the client. may_wait: for the server's
-  // measuring of distances; otherwise that is an end, too.
+  // Until neither side has anything to send, or so many messages were sent to the client. may_wait: for as long as the
+  // server's measuring of distances takes; otherwise half a second of that is an end, too.
   void run(int messages = 1 << 20, bool may_wait = true) {
     while (messages > 0) {
       ASSERT_NO_FATAL_FAILURE(take_messages());
       auto message = state_.next(2048);
       if (!message && state_.has_work()) continue;
-      if (!message && state_.waits() && may_wait) {
-        woken_.acquire();
-        continue;
+      if (!message && state_.waits()) {
+        if (is_woken(may_wait ? std::chrono::seconds(60) : std::chrono::milliseconds(500))) continue;
+        EXPECT_FALSE(may_wait) << "the server has forgotten the session";
       }
       if (!message) return;
       now_ += std::chrono::milliseconds(1);
@@ -66,10 +71,21 @@ class SessionServer {
     }
   }
 
+  // Since the last time, or within that time.
+  bool is_woken(std::chrono::milliseconds time) {
+    std::unique_lock lock(mutex_);
+    return woken_.wait_for(lock, time, [this] { return wakes_ != 0; }) && wakes_-- != 0;
+  }
+
   AtomicSharedPtr<Catalogue> catalogue_;
-  std::counting_semaphore<> woken_{0};
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  unsigned wakes_ = 0;
+  Memory memory_;
+  FairScheduler scheduler_{1};
   RangeCache ranges_;
-  SessionState state_{catalogue_, ranges_, Scope::everything()};
+  Background background_{scheduler_, memory_, 1};
+  SessionState state_{catalogue_, ranges_, background_, Scope::everything(), std::make_shared<FairScheduler::Account>()};
   Client& client_;
   std::vector<protocol::ClientMessage> received_;
   bool resumed_ = false;

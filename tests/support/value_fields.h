@@ -16,6 +16,7 @@
 #include "common/front/front.h"
 #include "common/patch/value_format.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/special_values.h"
 
 namespace intervale::testing {
 
@@ -86,7 +87,6 @@ inline ValueField random_value_field(const std::array<std::int32_t, 3>& dims, un
 
 // Of any kind: finite, on samples or between them, equal bounds, infinite ones, and one that misses the field.
 inline Range random_range(const ValueField& field, std::mt19937& random) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double least = field.format.least(), greatest = field.format.greatest();
   const auto bound = [&] {
     const std::array<std::int32_t, 3>& dims = field.volume.grid.dims;
@@ -98,13 +98,13 @@ inline Range random_range(const ValueField& field, std::mt19937& random) {
   if (range.alpha > range.beta) std::swap(range.alpha, range.beta);
   switch (random() % 9) {
     case 0:
-      range.alpha = -kInfinity;
+      range.alpha = -kInf;
       break;
     case 1:
-      range.beta = kInfinity;
+      range.beta = kInf;
       break;
     case 2:
-      range = {-kInfinity, kInfinity};
+      range = {-kInf, kInf};
       break;
     case 3:
       range.beta = range.alpha;

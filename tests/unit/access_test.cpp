@@ -12,8 +12,8 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(Tokens, GrantWhatTheirLineSays) {
   const auto tokens = Tokens::parse("# who may come in\n\nall-0123456789\n some.one~/+=\tengine  scans-* h?ad # mine\r\n").value();
@@ -105,8 +105,9 @@ TEST(Origins, AreThoseOfTheHostUnlessToldOtherwise) {
 TEST(Routes, ShowWhatOnesTokenOpens) {
   const Catalogue catalogue;
   const Metrics metrics;
+  const Memory memory;
   const StaticFiles viewer;
-  const HttpState state{.catalogue = catalogue, .metrics = metrics, .viewer = viewer};
+  const HttpState state{.catalogue = catalogue, .metrics = metrics, .memory = memory, .viewer = viewer};
   const Scope some({"engine"});
   const auto status = [&](const char* target, const Scope* scope) {
     return respond({.method = "GET", .target = target, .scope = scope}, state).status;

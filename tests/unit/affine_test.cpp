@@ -9,11 +9,10 @@
 #include "common/patch/description.h"
 #include "common/view/lod.h"
 #include "tests/support/affines.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 void expect_near(const Vec3& a, const Vec3& b, double within) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(a[i], b[i], within);

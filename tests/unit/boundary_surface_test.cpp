@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
+#include <cmath>
 #include <map>
 #include <random>
 #include <set>
@@ -16,31 +16,31 @@
 #include "common/selection/stream_plan.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
 
 using Point = std::array<double, 3>;
-using Triangle = std::array<Point, 3>;
-constexpr double kInf = std::numeric_limits<double>::infinity();
+using Corners = std::array<Point, 3>;
 
 std::shared_ptr<const IntervalVolume> stretched_volume(const Volume& volume, const Range& range) {
   return testing::build_shared(testing::stretched(volume), {.range = range});
 }
 
-std::shared_ptr<const IntervalVolume> volume_of_seed(unsigned seed) {
+std::shared_ptr<const IntervalVolume> surfaces_volume(unsigned seed) {
   constexpr std::array<std::array<std::int32_t, 3>, 4> shapes{{{17, 17, 17}, {12, 7, 10}, {33, 2, 11}, {13, 40, 6}}};
   const auto& shape = shapes[seed / 2 % 4];
   if (seed % 2 == 0) return stretched_volume(testing::gyroid(shape), seed % 3 == 0 ? Range{-0.3, kInf} : Range{-0.3, 0.2});
   return stretched_volume(testing::digits(shape, seed), {3, 5.5});
 }
 
-Triangle turned(Triangle t) {  // the least corner first
+Corners turned(Corners t) {  // the least corner first
   while (t[0] > t[1] || t[0] > t[2]) t = {t[1], t[2], t[0]};
   return t;
 }
 
-bool is_flat(const Triangle& t) {
+bool is_flat(const Corners& t) {
   Point u, v;
   for (int i = 0; i < 3; ++i) {
     u[i] = t[1][i] - t[0][i];
@@ -55,10 +55,10 @@ Point in_samples(const Point& world, const Grid& grid) {
   return p;
 }
 
-std::multiset<Triangle> boundary_of(const Mesh& mesh, const Grid& grid) {
-  std::multiset<Triangle> triangles;
+std::multiset<Corners> boundary_of(const Mesh& mesh, const Grid& grid) {
+  std::multiset<Corners> triangles;
   for (const auto& t : boundary_triangles(mesh)) {
-    Triangle corners;
+    Corners corners;
     for (int k = 0; k < 3; ++k) corners[k] = in_samples(mesh.points[t[k]], grid);
     if (!is_flat(corners)) triangles.insert(turned(corners));
   }
@@ -81,11 +81,11 @@ class Page {
       pieces_[piece.id] = piece;
     }
   }
-  [[nodiscard]] std::multiset<Triangle> triangles() const {
-    std::multiset<Triangle> triangles;
+  [[nodiscard]] std::multiset<Corners> triangles() const {
+    std::multiset<Corners> triangles;
     for (const auto& [id, piece] : pieces_) {
       for (std::size_t i = 0; i < piece.indices.size(); i += 3) {
-        Triangle t;
+        Corners t;
         for (int k = 0; k < 3; ++k) {
           const SurfaceVertex& v = piece.vertices[piece.indices[i + k]];
           t[k] = {v.x, v.y, v.z};
@@ -103,7 +103,7 @@ class Page {
 
 class BoundarySurfaceOf : public ::testing::TestWithParam<unsigned> {
  protected:
-  std::shared_ptr<const IntervalVolume> volume = volume_of_seed(GetParam());
+  std::shared_ptr<const IntervalVolume> volume = surfaces_volume(GetParam());
   const Grid& grid = volume->description().grid;
   std::mt19937 random{GetParam()};
 };
@@ -303,6 +303,25 @@ TEST(BoundarySurface, WhatForgetsIsMadeAfresh) {
   EXPECT_TRUE(change.reset);
   page.take(surface, change, false);
   EXPECT_EQ(page.triangles(), boundary_of(client->mesh(), volume->description().grid));
+}
+
+TEST(Normals, TheQuickArcTangentIsOffByLittle) {
+  for (const double length : {1e-200, 1e-3, 1.0, 7e8}) {
+    for (int i = 1; i < 4000; ++i) {
+      const double angle = 3.14159265358979323846 * i / 4000, y = length * std::sin(angle), x = length * std::cos(angle);
+      ASSERT_NEAR(quick_arc_tangent(y, x), std::atan2(y, x), 2e-5) << "length " << length << ", angle " << angle;
+    }
+  }
+  EXPECT_NEAR(quick_arc_tangent(2, 0), std::atan2(2, 0), 1e-12);
+}
+
+TEST(Normals, TheNearestIntIsThatOfRint) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> some(-2147483000.0, 2147483000.0), small(-4, 4);
+  for (int i = 0; i < 10000; ++i) {
+    for (const double value : {some(random), small(random), double(i - 5000) / 2})
+      ASSERT_EQ(nearest_int(value), std::int32_t(std::rint(value))) << value;
+  }
 }
 
 }  // namespace

@@ -21,13 +21,13 @@ namespace {
 
 using testing::broken_law;
 
-constexpr std::array<testing::Dims, 4> kBoxes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
+constexpr std::array<testing::Dims, 4> kBudgetBoxes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
 
-IntervalVolume volume_of_seed(unsigned seed) { return testing::build(testing::trial_of_seed(seed, kBoxes)); }
+IntervalVolume budget_volume(unsigned seed) { return testing::build(testing::trial_of_seed(seed, kBudgetBoxes)); }
 
 class Budgets : public ::testing::TestWithParam<unsigned> {
  protected:
-  IntervalVolume volume_ = volume_of_seed(GetParam());
+  IntervalVolume volume_ = budget_volume(GetParam());
   std::mt19937 random_{GetParam()};  // the seed is the test's number
 };
 

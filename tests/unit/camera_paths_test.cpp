@@ -9,16 +9,12 @@
 #include <numbers>
 #include <set>
 
+#include "tests/support/cameras.h"
+
 namespace intervale {
 namespace {
 
-using Vector = std::array<double, 3>;
-
-Vector minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vector cross(const Vector& a, const Vector& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
-double length(const Vector& v) { return std::sqrt(dot(v, v)); }
-Vector unit(const Vector& v) { return {v[0] / length(v), v[1] / length(v), v[2] / length(v)}; }
+using testing::cross, testing::dot, testing::length, testing::minus, testing::unit, testing::Vector;
 
 CameraPath path_of(Scenario scenario, std::uint64_t seed) {
   CameraPath path;
@@ -54,7 +50,7 @@ TEST(CameraPaths, FullIsEverythingAtOnce) {
   for (std::uint64_t number : {0, 1, 100}) EXPECT_EQ(view_of(path_of(Scenario::full, 3), number), Lod{});
 }
 
-class Paths : public testing::TestWithParam<Scenario> {};
+class Paths : public ::testing::TestWithParam<Scenario> {};
 
 TEST_P(Paths, EveryViewIsALevelOfDetail) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
@@ -83,7 +79,7 @@ TEST_P(Paths, ViewsDependOnSeedAndNumberOnly) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(CameraPaths, Paths, testing::Values(Scenario::orbit, Scenario::zoom, Scenario::jump));
+INSTANTIATE_TEST_SUITE_P(CameraPaths, Paths, ::testing::Values(Scenario::orbit, Scenario::zoom, Scenario::jump));
 
 TEST(CameraPaths, WhileTheRangeIsDraggedTheCameraStaysWhereAnOrbitBegins) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {

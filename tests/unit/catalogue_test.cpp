@@ -42,9 +42,10 @@ TEST(Catalogue, NamesAreUtf8) {
     EXPECT_THAT(added.error().message, HasSubstr("UTF-8"));
   }
   const Metrics metrics;
+  const Memory memory;
   const StaticFiles viewer;
   const auto listed = respond({.method = "GET", .target = "/api/datasets", .scope = Scope::everything().get()},
-                              {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
+                              {.catalogue = catalogue, .metrics = metrics, .memory = memory, .viewer = viewer});
   EXPECT_EQ(listed.status, 200u) << "JSON can hold every name there is";
 }
 
@@ -70,9 +71,11 @@ TEST(Catalogue, OneDataSetTellsItsStatistics) {
   ASSERT_TRUE(catalogue.add(std::make_shared<const IntervalVolume>(of_every_range(build_value_volume(volume, format).take()).value())));
   ASSERT_TRUE(add(catalogue, "one"));
   const Metrics metrics;
+  const Memory memory;
   const StaticFiles viewer;
   const auto ask = [&](std::string_view target, const Scope* scope) {
-    return respond({.method = "GET", .target = target, .scope = scope}, {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
+    return respond({.method = "GET", .target = target, .scope = scope},
+                   {.catalogue = catalogue, .metrics = metrics, .memory = memory, .viewer = viewer});
   };
   const auto all = Scope::everything();
   const auto json = nlohmann::json::parse(*ask("/api/datasets/any%20range", all.get()).body);

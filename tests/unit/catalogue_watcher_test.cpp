@@ -6,10 +6,12 @@
 
 #include <filesystem>
 #include <fstream>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "common/ivm/ivm_file.h"
+#include "server/builder/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/temp_dir.h"
@@ -38,7 +40,8 @@ struct Watched : ::testing::Test {
   Watched() { spdlog::set_level(spdlog::level::off); }
   ~Watched() override { spdlog::set_level(spdlog::level::info); }
   TempDir folder;
-  CatalogueWatcher watcher{{folder.path()}};
+  Memory memory;
+  CatalogueWatcher watcher{{folder.path()}, memory};
 };
 
 using CatalogueWatcherTest = Watched;
@@ -144,7 +147,7 @@ TEST_F(CatalogueWatcherTest, AMissingFolderKeepsItsDataSets) {
   std::filesystem::create_directory(folder / "in");
   save(folder / "in/a.ivm", -0.3);
   for (const char* name : {"in", "in/", "./in//"}) {
-    CatalogueWatcher watch_in({folder / name});
+    CatalogueWatcher watch_in({folder / name}, memory);
     ASSERT_TRUE(watch_in.load());
     std::filesystem::rename(folder / "in", folder / "out");
     EXPECT_FALSE(watch_in.poll()) << name;
@@ -161,14 +164,14 @@ TEST_F(CatalogueWatcherTest, AFileWithAnInvalidNameIsSkipped) {
   for (const char* name : {"a?.ivm", "b\n.ivm", "c\xff.ivm", "d\xc2\x9b.ivm"}) std::filesystem::copy_file(folder / "a.ivm", folder / name);
   EXPECT_THAT(names(watcher.load().value()), ElementsAre("a"));
   EXPECT_FALSE(watcher.poll());
-  EXPECT_FALSE(CatalogueWatcher({folder / "a?.ivm"}).load()) << "one that is named is an error";
+  EXPECT_FALSE(CatalogueWatcher({folder / "a?.ivm"}, memory).load()) << "one that is named is an error";
 }
 
 TEST_F(CatalogueWatcherTest, OfTwoDataSetsOfOneNameTheFirstCounts) {
   std::filesystem::create_directory(folder / "x");
   std::filesystem::create_directory(folder / "y");
   save(folder / "y/a.ivm", -0.3);
-  CatalogueWatcher both({folder / "x", folder / "y"});
+  CatalogueWatcher both({folder / "x", folder / "y"}, memory);
   const auto first = both.load().value().find("a");
   save(folder / "x/a.ivm", -0.2);
   (void)both.poll();
@@ -176,23 +179,42 @@ TEST_F(CatalogueWatcherTest, OfTwoDataSetsOfOneNameTheFirstCounts) {
   ASSERT_TRUE(changed);
   EXPECT_NE(changed->find("a"), first);
   EXPECT_THAT(names(*changed), ElementsAre("a"));
-  const auto again = CatalogueWatcher({folder / "x", folder / "y"}).load();
+  const auto again = CatalogueWatcher({folder / "x", folder / "y"}, memory).load();
   ASSERT_FALSE(again) << "at the start it is an error";
   EXPECT_THAT(again.error().message, HasSubstr("two data sets are named 'a'"));
 }
 
 TEST_F(CatalogueWatcherTest, ReadsNothingAboveTheMemoryLimit) {
-  CatalogueWatcher poor({folder.path()}, 1);
+  Memory none(0);
+  const Memory::Share held(none, Memory::Holder::sessions, 1);
+  CatalogueWatcher poor({folder.path()}, none);
   save(folder / "a.ivm", -0.3);
   EXPECT_THAT(names(poor.load().value()), IsEmpty());
   for (int i = 0; i < 3; ++i) EXPECT_FALSE(poor.poll());
 }
 
-TEST_F(CatalogueWatcherTest, LoadingStopsWhenKeepGoingReturnsFalse) {
+TEST_F(CatalogueWatcherTest, AFileThatTakesMoreThanIsLeftIsReadOnceThereIsRoom) {
   save(folder / "a.ivm", -0.3);
-  save(folder / "b.ivm", -0.3);
-  int asked = 0;
-  EXPECT_THAT(names(watcher.load([&] { return ++asked < 3; }).value()), ElementsAre("a"));
+  Memory some(std::uint64_t(1) << 20);
+  Memory::Share others(some, Memory::Holder::sessions, (std::uint64_t(1) << 20) - 2000);
+  CatalogueWatcher patient({folder.path()}, some);
+  EXPECT_THAT(names(patient.load().value()), IsEmpty());
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(patient.poll());
+  others.resize(0);
+  const auto all = patient.poll();
+  ASSERT_TRUE(all);
+  EXPECT_THAT(names(*all), ElementsAre("a"));
+  EXPECT_EQ(some.bytes(), all->find("a")->memory_bytes());
+}
+
+TEST_F(CatalogueWatcherTest, ReadsNothingMoreOnceItIsStopped) {
+  save(folder / "a.ivm", -0.3);
+  std::stop_source stopped;
+  stopped.request_stop();
+  EXPECT_THROW((void)watcher.load(stopped.get_token()), Stopped);
+  EXPECT_FALSE(watcher.poll());
+  EXPECT_THROW((void)watcher.poll(stopped.get_token()), Stopped);
+  EXPECT_TRUE(watcher.poll()) << "nothing was lost";
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +11,7 @@
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/value_file.h"
+#include "common/patch/channel_bounds.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/value_builder.h"
 #include "tests/support/channels.h"
@@ -53,6 +55,27 @@ TEST(Channel, WhatCannotBeIsRefused) {
   EXPECT_TRUE(refuses([](auto& all) {
     for (std::size_t i = 0; i < kMaxChannels; ++i) all.push_back({std::to_string(i), {}, all[0].components});
   }));
+}
+
+TEST(Channel, NoVectorIsLongerThanItsGreatestValue) {
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    const std::vector<Channel> channels = some_volume(seed).description().channels;
+    for (const Channel& channel : channels) {
+      const auto [least, greatest] = bounds_of(channel);
+      double squares = 0;
+      for (const ChannelComponent& component : channel.components) {
+        const double most = std::max(-component.format.least(), component.format.greatest());
+        squares += most * most;
+      }
+      const ValueFormat& first = channel.components[0].format;
+      EXPECT_EQ(least, channel.components.size() == 1 ? first.least() : 0);
+      if (channel.components.size() == 1) {
+        EXPECT_EQ(greatest, first.greatest());
+      } else {
+        EXPECT_NEAR(greatest, std::sqrt(squares), 1e-12 * greatest);
+      }
+    }
+  }
 }
 
 TEST(Channel, AreFoundByName) {

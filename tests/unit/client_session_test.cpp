@@ -12,7 +12,7 @@
 namespace intervale {
 namespace {
 
-using protocol::Batch, protocol::CloseCode, protocol::Done, protocol::Fault, protocol::Opened;
+using protocol::CloseCode, protocol::Done, protocol::Fault, protocol::Opened;
 using State = ClientSession::State;
 
 using Server = testing::SessionServer<ClientSession>;
@@ -157,7 +157,7 @@ struct ClientSessionRefuses : ::testing::Test {
     EXPECT_FALSE(session.fault());
     EXPECT_FALSE(std::move(session).take_mesh());
   }
-  static Batch batch(std::uint64_t epoch, std::uint64_t sequence, std::size_t bytes = 10) {
+  static protocol::Batch batch(std::uint64_t epoch, std::uint64_t sequence, std::size_t bytes = 10) {
     return {.epoch = epoch, .sequence = sequence, .updates = 1, .payload = std::vector<std::uint8_t>(bytes)};
   }
 };

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "common/picture/text.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
 
 using Rgb = std::array<std::uint8_t, 3>;
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 Pixels white(int width, int height) { return {width, height, std::vector<std::uint8_t>(3 * std::size_t(width) * std::size_t(height), 255)}; }
 

@@ -7,12 +7,11 @@
 namespace intervale {
 namespace {
 
-using testing::Point;
 using testing::point;
 using testing::sorted;
 using testing::Tet;
 
-Point doubled(Vertex v) { return {2 * v.x, 2 * v.y, 2 * v.z}; }
+testing::Point doubled(Vertex v) { return {2 * v.x, 2 * v.y, 2 * v.z}; }
 bool inside(Vertex v, int n) { return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x <= n && v.y <= n && v.z <= n; }
 
 class DiamondTable : public ::testing::TestWithParam<int> {};
@@ -26,8 +25,8 @@ TEST_P(DiamondTable, EqualsRecursiveBisection) {
     ++seen;
     const Diamond d({place[0] / 2, place[1] / 2, place[2] / 2});
     ASSERT_LT(d.row->cls, 3);
-    std::set<Point> spine{point(d.vertex(0)), point(d.vertex(1))};
-    EXPECT_EQ(spine, (std::set<Point>{expected.spine[0], expected.spine[1]}));
+    std::set<testing::Point> spine{point(d.vertex(0)), point(d.vertex(1))};
+    EXPECT_EQ(spine, (std::set<testing::Point>{expected.spine[0], expected.spine[1]}));
     std::set<Tet> tets;
     for (int i = 0; i < d.row->tets; ++i) {
       Tet t{};
@@ -40,7 +39,7 @@ TEST_P(DiamondTable, EqualsRecursiveBisection) {
       if (exists) tets.insert(sorted(t));
     }
     EXPECT_EQ(tets, expected.tets);
-    std::set<Point> parents, children;
+    std::set<testing::Point> parents, children;
     for (int i = 0; i < d.row->parents; ++i) {
       const Vertex p = d.parent(i);  // the root's are corners: no diamonds
       const bool corner = p.x % n == 0 && p.y % n == 0 && p.z % n == 0;
@@ -50,7 +49,7 @@ TEST_P(DiamondTable, EqualsRecursiveBisection) {
     for (int i = 0; i < d.row->children; ++i) {
       const Offset f = d.row->child[i].child;
       const int unit = d.row->cls == 2 ? d.h : 2 * d.h;  // doubled coordinates
-      const Point c{place[0] + f.x * unit, place[1] + f.y * unit, place[2] + f.z * unit};
+      const testing::Point c{place[0] + f.x * unit, place[1] + f.y * unit, place[2] + f.z * unit};
       if (naive.contains(c) && c[0] >= 0 && c[1] >= 0 && c[2] >= 0) children.insert(c);
     }
     EXPECT_EQ(children, expected.children);

@@ -18,16 +18,14 @@
 #include "server/builder/error_steps.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/bisection.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
 
 using testing::bisect;
 using testing::NaiveDiamond;
-using testing::Point;
 using testing::Tet;
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 // Diamonds with whole centres, found by recursive bisection, and what design.md, sections 3 to 5, says about each.
 class NaiveHierarchy {
@@ -46,13 +44,13 @@ class NaiveHierarchy {
     for (const auto& [twice, d] : known_) judge(twice);
   }
 
-  [[nodiscard]] const std::map<Point, Diamond>& all() const { return judged_; }  // by twice the centre
+  [[nodiscard]] const std::map<testing::Point, Diamond>& all() const { return judged_; }  // by twice the centre
 
  private:
-  static bool whole(const Point& twice) { return twice[0] % 2 == 0 && twice[1] % 2 == 0 && twice[2] % 2 == 0; }
-  [[nodiscard]] Point clamp(const Point& p) const { return point(domain_.clamp({p[0], p[1], p[2]})); }
-  [[nodiscard]] double value(const Point& p) const {
-    const Point c = clamp(p);
+  static bool whole(const testing::Point& twice) { return twice[0] % 2 == 0 && twice[1] % 2 == 0 && twice[2] % 2 == 0; }
+  [[nodiscard]] testing::Point clamp(const testing::Point& p) const { return point(domain_.clamp({p[0], p[1], p[2]})); }
+  [[nodiscard]] double value(const testing::Point& p) const {
+    const testing::Point c = clamp(p);
     return testing::sample(volume_, c[0], c[1], c[2]);
   }
   [[nodiscard]] std::array<Vertex, 4> clamped(const Tet& t) const {
@@ -61,16 +59,16 @@ class NaiveHierarchy {
     return p;
   }
 
-  const Diamond& judge(const Point& twice) {
+  const Diamond& judge(const testing::Point& twice) {
     if (const auto done = judged_.find(twice); done != judged_.end()) return done->second;
     const NaiveDiamond& d = known_.at(twice);
-    const Point centre{twice[0] / 2, twice[1] / 2, twice[2] / 2};
+    const testing::Point centre{twice[0] / 2, twice[1] / 2, twice[2] / 2};
     Diamond result;
     std::set<Side> sides{side_of(value(centre), range_)};
     for (const Tet& t : d.tets) {
       if (!Domain::exists(clamped(t))) continue;
       result.exists = true;
-      for (const Point& v : t) sides.insert(side_of(value(v), range_));
+      for (const testing::Point& v : t) sides.insert(side_of(value(v), range_));
       result.error = std::max(result.error, error_in(t));
     }
     // Splitting a finest diamond whose centre clamps to an end of its spine changes nothing.
@@ -79,7 +77,7 @@ class NaiveHierarchy {
     if (result.exists && !idle) {
       result.relevant = sides.size() > 1 || (refine_ == Refine::uniform && sides.contains(Side::inside));
       result.saturated = result.error;
-      for (const Point& child : d.children) {
+      for (const testing::Point& child : d.children) {
         if (!whole(child)) continue;
         const Diamond& c = judge(child);
         if (!c.relevant) continue;
@@ -118,13 +116,13 @@ class NaiveHierarchy {
     return worst;
   }
 
-  static Point point(Vertex v) { return testing::point(v); }
+  static testing::Point point(Vertex v) { return testing::point(v); }
   const Volume& volume_;
   Range range_;
   Refine refine_;
   Domain domain_;
-  std::map<Point, NaiveDiamond> known_;
-  std::map<Point, Diamond> judged_;
+  std::map<testing::Point, NaiveDiamond> known_;
+  std::map<testing::Point, Diamond> judged_;
 };
 
 struct Trial {

@@ -6,11 +6,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <set>
+#include <thread>
 #include <vector>
 
+#include "common/ivm/value_bounds.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/surface_deviation.h"
 #include "tests/support/analytic_fields.h"
@@ -293,6 +297,19 @@ TEST(ValueKeys, HoldWhatWasSetInAsFewBytesAsTheGreatestNeeds) {
     for (std::size_t i = 0; i < 100; ++i) ASSERT_EQ(keys[i], model[i]);
     EXPECT_EQ(keys.size(), 100u);
   }
+}
+
+TEST(IntervalVolume, FindsItsBoundsWhenTheyAreFirstAskedFor) {
+  const IntervalVolume volume = *FieldHierarchy(testing::digits({17, 9, 12}, 3), {{0, 9}, Refine::uniform}).compact();
+  const std::size_t before = volume.memory_bytes();
+  std::array<const ValueBounds*, 4> found{};
+  {
+    std::vector<std::jthread> threads;
+    threads.reserve(found.size());
+    for (const ValueBounds*& bounds : found) threads.emplace_back([&volume, &bounds] { bounds = &volume.bounds(); });
+  }
+  EXPECT_EQ(std::set(found.begin(), found.end()).size(), 1u);
+  EXPECT_EQ(volume.memory_bytes(), before + found[0]->memory_bytes());
 }
 
 }  // namespace

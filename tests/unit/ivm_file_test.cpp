@@ -20,15 +20,16 @@
 #include "server/builder/value_steps.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/parts.h"
+#include "tests/support/special_values.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {
 namespace {
 
+using Parts = IntervalVolume::Parts;
+
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 IntervalVolume small_volume() { return testing::build(testing::gyroid({9, 7, 6}), {.range = {-0.3, 0.4}}); }
 
@@ -316,7 +317,6 @@ TEST(Assemble, PartsThatFitMakeAnEqualVolume) {
 }
 
 TEST(Assemble, PartsThatDoNotFitAreRefused) {
-  using Parts = IntervalVolume::Parts;
   const IntervalVolume sigma = small_volume();
   ASSERT_GT(sigma.error_steps().size(), 3u);
   const struct {

@@ -2,13 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <random>
+
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void expect_sides(const ValueFormat& format, const Range& range, const std::vector<ValueKey>& keys) {
   const KeySides sides(format, range);
@@ -29,15 +28,15 @@ TEST(KeySides, AreThoseOfTheValues) {
     for (int i = 0; i < 200; ++i) keys.push_back(ValueKey(random() % (std::uint64_t(format.last) + 1)));
     for (int i = 0; i < 200; ++i) {
       double alpha = format.value(keys[random() % keys.size()]), beta = format.value(keys[random() % keys.size()]);
-      if (random() % 3 == 0) alpha = std::nextafter(alpha, random() % 2 == 0 ? kInfinity : -kInfinity);
-      if (random() % 3 == 0) beta = std::nextafter(beta, random() % 2 == 0 ? kInfinity : -kInfinity);
-      if (random() % 9 == 0) alpha = -kInfinity;
-      if (random() % 9 == 0) beta = kInfinity;
+      if (random() % 3 == 0) alpha = std::nextafter(alpha, random() % 2 == 0 ? kInf : -kInf);
+      if (random() % 3 == 0) beta = std::nextafter(beta, random() % 2 == 0 ? kInf : -kInf);
+      if (random() % 9 == 0) alpha = -kInf;
+      if (random() % 9 == 0) beta = kInf;
       if (alpha > beta) std::swap(alpha, beta);
       expect_sides(format, {alpha, beta}, keys);
     }
-    expect_sides(format, {format.greatest() + 1, kInfinity}, keys);
-    expect_sides(format, {-kInfinity, format.least() - 1}, keys);
+    expect_sides(format, {format.greatest() + 1, kInf}, keys);
+    expect_sides(format, {-kInf, format.least() - 1}, keys);
   }
 }
 

@@ -7,11 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/special_values.h"
+
 namespace intervale {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 Lod of_error(double error) { return {.error = error}; }
 Lod of_percent(double percent) { return {.error_percent = percent}; }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
 
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -12,8 +13,9 @@
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
-using testing::MatchesRegex;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 
 // What is said while it lives.
 class Said {
@@ -58,6 +60,18 @@ TEST(Log, JsonLinesAreOneObjectEach) {
   EXPECT_FALSE(second.contains("session"));
   EXPECT_EQ(second.at("message"), "stopped");
   EXPECT_FALSE(std::getline(lines, line));
+}
+
+// U+202E shows what follows it from right to left; U+009B begins an escape sequence.
+TEST(Log, NoNameChangesHowItsLinesAreRead) {
+  const std::string name = "cli\u202e\u009b31m\u200bent";
+  const Said text(LogFormat::text);
+  spdlog::info(name);
+  EXPECT_THAT(text.lines(), EndsWith(" info cli??31m?ent\n"));
+  const Said json(LogFormat::json);
+  spdlog::info(name);
+  EXPECT_TRUE(std::ranges::all_of(json.lines(), [](char c) { return c == '\n' || (c >= ' ' && c < '\x7f'); })) << json.lines();
+  EXPECT_EQ(nlohmann::json::parse(json.lines()).at("message"), name);
 }
 
 TEST(Log, OmitsLinesBelowItsLevel) {

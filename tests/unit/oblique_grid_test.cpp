@@ -23,7 +23,7 @@
 namespace intervale {
 namespace {
 
-constexpr std::array<testing::Dims, 3> kBoxes{{{17, 17, 17}, {12, 7, 10}, {9, 20, 6}}};
+constexpr std::array<testing::Dims, 3> kObliqueBoxes{{{17, 17, 17}, {12, 7, 10}, {9, 20, 6}}};
 
 double six_fold_volume(const Mesh& mesh, const std::array<std::uint32_t, 4>& t) {
   const Vec3& o = mesh.points[t[0]];
@@ -49,7 +49,7 @@ class ObliqueGrid : public ::testing::TestWithParam<unsigned> {
   }
 
   std::mt19937 random_{GetParam()};
-  testing::Trial trial_ = testing::trial_of_seed(GetParam(), kBoxes);
+  testing::Trial trial_ = testing::trial_of_seed(GetParam(), kObliqueBoxes);
   IntervalVolume plain_ = testing::build(trial_);
   Affine map_ = testing::random_affine(random_, GetParam() % 5);
   Grid grid_{trial_.volume.grid.dims, map_};

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "common/util/vec3.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
@@ -26,7 +26,7 @@ Vec3 lab(const Palette::Colour& colour, const std::array<Vec3, 3>& vision) {
   return {116 * f(xyz[1]) - 16, 500 * (f(xyz[0]) - f(xyz[1])), 200 * (f(xyz[1]) - f(xyz[2]))};
 }
 
-class PaletteOf : public testing::TestWithParam<std::string_view> {
+class PaletteOf : public ::testing::TestWithParam<std::string_view> {
  protected:
   Palette palette_ = find_palette(GetParam()).value();
 };
@@ -53,7 +53,6 @@ TEST_P(PaletteOf, HasEighthsThatDifferForEverybody) {
 }
 
 TEST_P(PaletteOf, EndsWhereNumbersEnd) {
-  constexpr double kInf = std::numeric_limits<double>::infinity();
   EXPECT_EQ(palette_.at(-0.1), palette_.at(0));
   EXPECT_EQ(palette_.at(-kInf), palette_.at(0));
   EXPECT_EQ(palette_.at(std::nan("")), palette_.at(0));
@@ -68,7 +67,7 @@ TEST_P(PaletteOf, HasTheSameColoursAsBytes) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, PaletteOf, testing::ValuesIn(kPaletteNames), [](const auto& palette) { return std::string(palette.param); });
+INSTANTIATE_TEST_SUITE_P(All, PaletteOf, ::testing::ValuesIn(kPaletteNames), [](const auto& palette) { return std::string(palette.param); });
 
 // As their authors published them.
 TEST(Palettes, BeginAndEndWithPublishedColours) {

@@ -10,20 +10,19 @@
 #include <span>
 #include <string>
 
+#include "tests/support/special_values.h"
+
 namespace intervale::protocol {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Description some_description() {
   Description d;
   d.name = "buckyball";
   d.grid = {{129, 65, 2}, Affine{{1, 0.5, -0.25, -1, 0, 2, 0.125, 0, -3, 0, 4, 1e9}}};
   d.labels = {"mm", "density \u00e9", "g/cm\u00b3"};
-  d.range = {-kInfinity, 188};
+  d.range = {-kInf, 188};
   d.refine = Refine::uniform;
   d.max_error = 12.25;
   d.updates = 123456789012;
@@ -280,13 +279,13 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
   std::vector<Lod> wrong(9);
   wrong[0].error = -1;
   wrong[1].error = kNan;
-  wrong[2].error = kInfinity;
+  wrong[2].error = kInf;
   wrong[3].error_percent = 100.5;
   wrong[4].error_percent = kNan;
   wrong[5].roi = box;
   wrong[5].roi->min[1] = 2;
   wrong[6].roi = box;
-  wrong[6].roi->max[2] = kInfinity;
+  wrong[6].roi->max[2] = kInf;
   wrong[7].roi = box;
   wrong[7].roi->min[0] = kNan;
   wrong[8].error_percent = -0.5;
@@ -298,7 +297,7 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
   ASSERT_FALSE(five);
   EXPECT_EQ(five.error().message, "malformed message: a view of 5 ranges, of which at most 4 can be shown");
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {{}, Refine(2)}}))));
-  for (const double percent : {-1.0, 100.5, kNan, kInfinity, -kInfinity})
+  for (const double percent : {-1.0, 100.5, kNan, kInf, -kInf})
     EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = {}, .coarse_error_percent = percent})))) << percent;
   for (const Lod& lod : wrong) EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, lod})))) << &lod - wrong.data();
 }

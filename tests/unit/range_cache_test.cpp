@@ -3,8 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
-#include <limits>
+#include <functional>
 #include <semaphore>
 #include <stdexcept>
 #include <thread>
@@ -13,28 +14,37 @@
 
 #include "server/builder/find_relevant_updates.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
 
 struct RangeCacheTest : ::testing::Test {
+  Memory memory;
   std::shared_ptr<const IntervalVolume> volume = testing::build_shared(testing::gyroid({9, 9, 9}), {.range = {-1, 1}, .refine = Refine::uniform});
   std::atomic<int> found = 0;
   RangeCache::Find find = [this](PartFinder& finder, const RangePart& part) {
     ++found;
     return finder.find(part);
   };
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   // A range with one surface.
-  static ShownRanges above(int number) { return {{{0.01 * number, kInfinity}, Refine::boundary}}; }
+  static ShownRanges above(int number) { return {{{0.01 * number, kInf}, Refine::boundary}}; }
   static ShownRanges between(double low, double high) { return {{{low, high}, Refine::boundary}}; }
-  [[nodiscard]] static RangeCache::Relevant get(RangeCache& cache, const RangeCache::Volume& of, const ShownRanges& shown) {
-    return cache.get(of, shown, Distances::estimated);
+  FairScheduler scheduler{1};
+  std::shared_ptr<FairScheduler::Account> payer = std::make_shared<FairScheduler::Account>();
+  [[nodiscard]] RangeCache::Relevant get(RangeCache& cache, const RangeCache::Volume& of, const ShownRanges& shown,
+                                         Distances distances = Distances::estimated) const {
+    return cache.ask(of, shown, distances, payer, [] {})->result();
+  }
+  using OnReady = std::function<void()>;
+  [[nodiscard]] std::shared_ptr<const RangeCache::Answer> measure(
+      RangeCache& cache, const ShownRanges& shown, OnReady on_ready = [] {}) const {
+    return cache.ask(volume, shown, Distances::measured, payer, std::move(on_ready));
   }
 };
 
 TEST_F(RangeCacheTest, FindsEachRangeOnceForAllThreads) {
-  RangeCache cache(find);
+  RangeCache cache(memory, scheduler, find);
   std::vector<std::thread> threads;
   threads.reserve(4);
   std::atomic<int> same = 0;
@@ -52,9 +62,25 @@ TEST_F(RangeCacheTest, FindsEachRangeOnceForAllThreads) {
   EXPECT_EQ(found, 8);
 }
 
+// Parts and what they are put together to; also after the cache has dropped them, while somebody has them.
+TEST_F(RangeCacheTest, WhatItHoldsAndWhatIsInUseCounts) {
+  const auto counted = [this] { return memory.bytes(Memory::Holder::ranges); };
+  auto cache = std::make_unique<RangeCache>(memory, scheduler, find, 1);
+  auto one = get(*cache, volume, above(0));
+  EXPECT_EQ(counted(), one->memory_bytes());
+  auto several = get(*cache, volume, between(-0.5, 0.5));
+  EXPECT_GE(counted(), one->memory_bytes() + several->memory_bytes());
+  one.reset();
+  (void)get(*cache, volume, {volume->description().whole()});
+  cache.reset();
+  EXPECT_EQ(counted(), several->memory_bytes());
+  several.reset();
+  EXPECT_EQ(counted(), 0u);
+}
+
 // Whoever drags one end of a range needs nothing new of the other.
 TEST_F(RangeCacheTest, EachSurfaceIsFoundOnce) {
-  RangeCache cache(find);
+  RangeCache cache(memory, scheduler, find);
   const auto first = get(cache, volume, between(-0.5, 0.5));
   EXPECT_EQ(found, 2);
   (void)get(cache, volume, between(-0.5, 0.25));
@@ -70,7 +96,7 @@ TEST_F(RangeCacheTest, EachSurfaceIsFoundOnce) {
 
 TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
   const std::size_t bytes = PartFinder(*volume).find({above(1).front(), Distances::none})->memory_bytes();
-  RangeCache cache(find, 2 * bytes + bytes / 2);
+  RangeCache cache(memory, scheduler, find, 2 * bytes + bytes / 2);
   (void)get(cache, volume, above(1));
   (void)get(cache, volume, above(2));
   (void)get(cache, volume, above(1));
@@ -78,31 +104,37 @@ TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
   EXPECT_EQ(found, 3);
   (void)get(cache, volume, above(1));
   EXPECT_EQ(found, 3);
-  (void)get(cache, volume, above(2));
+  for (int i = 0; i < 1000 && found == 3; ++i) {  // once no thread has it any more
+    (void)get(cache, volume, above(2));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   EXPECT_EQ(found, 4);
 }
 
 TEST_F(RangeCacheTest, DropsWhatBelongsToDataSetsThatAreGone) {
   std::vector<std::weak_ptr<const RelevantUpdates>> parts;
-  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
+  RangeCache cache(memory, scheduler, [&](PartFinder& finder, const RangePart& part) {
     auto relevant = find(finder, part);
-    parts.push_back(relevant);
+    if (parts.empty()) parts.push_back(relevant);
     return relevant;
   });
   (void)get(cache, volume, above(1));
   ASSERT_EQ(parts.size(), 1u);
   EXPECT_FALSE(parts[0].expired());
   volume = testing::build_shared(testing::gyroid({9, 9, 9}), {.range = {-1, 1}, .refine = Refine::uniform});
-  (void)get(cache, volume, above(1));
+  // With the next part that is found, once no thread works on the data set any more.
+  for (int i = 1; i < 1000 && !parts[0].expired(); ++i) {
+    (void)get(cache, volume, above(i));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   EXPECT_TRUE(parts[0].expired());
-  EXPECT_EQ(found, 2);
 }
 
 TEST_F(RangeCacheTest, SeveralRangesAreUnitedOnceOfWhatEachNeeds) {
-  RangeCache cache(find);
+  RangeCache cache(memory, scheduler, find);
   const ShownRanges both = distinct({above(2).front(), between(-1, 0.02).front(), above(2).front()});
   ASSERT_EQ(both.size(), 2u);
-  const auto measured = [&](const ShownRanges& shown) { return cache.get(volume, shown, Distances::measured); };
+  const auto measured = [&](const ShownRanges& shown) { return get(cache, volume, shown, Distances::measured); };
   const auto first = measured(above(2)), all = measured(both);
   EXPECT_EQ(found, 3);
   EXPECT_EQ(all->shown(), both);
@@ -115,22 +147,22 @@ TEST_F(RangeCacheTest, SeveralRangesAreUnitedOnceOfWhatEachNeeds) {
 TEST_F(RangeCacheTest, EstimatesDoForAllRangesBetweenTwoKeys) {
   const ValueFormat& format = volume->description().format;
   const auto at = [&](ValueKey key, double share) { return std::lerp(format.value(key), format.value(key + 1), share); };
-  RangeCache cache(find);
+  RangeCache cache(memory, scheduler, find);
   const ShownRanges a = between(at(10, 0.25), at(60, 0)), b = between(at(10, 0.5), at(60, 0.75)), c = between(at(11, 0.25), at(60, 0.5));
   for (const ShownRanges& shown : {a, b, a}) EXPECT_EQ(get(cache, volume, shown)->shown(), shown);
   EXPECT_EQ(found, 2);
   (void)get(cache, volume, c);
   EXPECT_EQ(found, 3);
-  (void)cache.get(volume, a, Distances::measured);
-  (void)cache.get(volume, b, Distances::measured);
+  (void)get(cache, volume, a, Distances::measured);
+  (void)get(cache, volume, b, Distances::measured);
   EXPECT_EQ(found, 3 + 4);
 }
 
 // With few keys all surfaces between two of them are one, as lower ends and as upper ones.
 TEST_F(RangeCacheTest, WithFewKeysWhatIsMeasuredDoesForAllRangesBetweenTwoKeys) {
   volume = testing::build_shared(testing::digits({9, 9, 9}, 1), {.range = {0, 9}, .refine = Refine::uniform});
-  RangeCache cache(find);
-  const auto measured = [&](double low, double high) { return cache.get(volume, between(low, high), Distances::measured); };
+  RangeCache cache(memory, scheduler, find);
+  const auto measured = [&](double low, double high) { return get(cache, volume, between(low, high), Distances::measured); };
   const auto first = measured(2.25, 5), second = measured(3, 5.75), turned = measured(5.5, 8.5);
   EXPECT_EQ(found, 3) << "2 to 3, 5 to 6, and 8 to 9";
   EXPECT_EQ(first->shown(), between(2.25, 5));
@@ -142,16 +174,16 @@ TEST_F(RangeCacheTest, WithFewKeysWhatIsMeasuredDoesForAllRangesBetweenTwoKeys) 
   }
   (void)get(cache, volume, between(2.5, 8.25));
   EXPECT_EQ(found, 3) << "better known than by estimates";
-  EXPECT_TRUE(cache.measure(volume, between(2.75, 8.25), [] {})->is_ready());
+  EXPECT_TRUE(measure(cache, between(2.75, 8.25))->is_soon());
 }
 
 TEST_F(RangeCacheTest, StopsWhileItMeasures) {
   std::binary_semaphore began(0);
-  RangeCache cache([&](PartFinder& finder, const RangePart& part) -> RangeCache::Relevant {
+  RangeCache cache(memory, scheduler, [&](PartFinder& finder, const RangePart& part) -> RangeCache::Relevant {
     began.release();
     for (;;) (void)finder.find(part);
   });
-  const auto request = cache.measure(volume, above(1), [] {});
+  const auto request = measure(cache, above(1));
   began.acquire();
   cache.stop();
   EXPECT_THROW((void)request->result(), Stopped);
@@ -160,14 +192,14 @@ TEST_F(RangeCacheTest, StopsWhileItMeasures) {
 // One surface is done when its last requests are: those of others that have it need not wait for their turn.
 TEST_F(RangeCacheTest, HandsASurfaceToAllThatWaitForIt) {
   std::counting_semaphore<> may_go(0), began(0), ready(0);
-  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
+  RangeCache cache(memory, scheduler, [&](PartFinder& finder, const RangePart& part) {
     began.release();
     may_go.acquire();
     return find(finder, part);
   });
-  const auto first = cache.measure(volume, between(-0.5, 0.5), [&] { ready.release(); });
+  const auto first = measure(cache, between(-0.5, 0.5), [&] { ready.release(); });
   began.acquire();
-  const auto second = cache.measure(volume, {{{-0.5, kInfinity}, Refine::boundary}}, [&] { ready.release(); });
+  const auto second = measure(cache, {{{-0.5, kInf}, Refine::boundary}}, [&] { ready.release(); });
   may_go.release();
   ready.acquire();
   EXPECT_TRUE(second->is_ready());
@@ -180,7 +212,7 @@ TEST_F(RangeCacheTest, HandsASurfaceToAllThatWaitForIt) {
 
 TEST_F(RangeCacheTest, TriesAgainAfterAFailure) {
   bool fails = true;
-  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
+  RangeCache cache(memory, scheduler, [&](PartFinder& finder, const RangePart& part) {
     if (std::exchange(fails, false)) throw std::runtime_error("no memory");
     return find(finder, part);
   });
@@ -188,7 +220,7 @@ TEST_F(RangeCacheTest, TriesAgainAfterAFailure) {
   EXPECT_NE(get(cache, volume, above(1)), nullptr);
   fails = true;
   std::counting_semaphore<> ready(0);
-  const auto failed = cache.measure(volume, above(1), [&] { ready.release(); });
+  const auto failed = measure(cache, above(1), [&] { ready.release(); });
   ready.acquire();
   EXPECT_THROW((void)failed->result(), std::runtime_error);
 }
@@ -199,13 +231,13 @@ TEST_F(RangeCacheTest, MeasuresTheNewestThatIsStillWanted) {
   std::vector<double> measured;
   const auto whole = ShownRanges{volume->description().whole()};
   std::counting_semaphore<> ready(0);
-  RangeCache cache([&](PartFinder& finder, const RangePart& part) {
+  RangeCache cache(memory, scheduler, [&](PartFinder& finder, const RangePart& part) {
     measured.push_back(part.shown.range.alpha);
     began.release();
     may_go.acquire();
     return find(finder, part);
   });
-  const auto request = [&](int number) { return cache.measure(volume, above(number), [&] { ready.release(); }); };
+  const auto request = [&](int number) { return measure(cache, above(number), [&] { ready.release(); }); };
   const auto first = request(1);
   began.acquire();
   const auto second = request(2);
@@ -216,9 +248,30 @@ TEST_F(RangeCacheTest, MeasuresTheNewestThatIsStillWanted) {
   may_go.release(3);
   for (int i = 0; i < 3; ++i) ready.acquire();
   EXPECT_EQ(measured, (std::vector{0.01, 0.04, 0.02}));
-  EXPECT_EQ(first->result(), cache.get(volume, above(1), Distances::measured));
+  EXPECT_EQ(first->result(), get(cache, volume, above(1), Distances::measured));
   EXPECT_TRUE(request(2)->is_ready()) << "it is known";
-  EXPECT_EQ(cache.measure(volume, whole, [] {})->result().get(), &volume->relevant());
+  EXPECT_EQ(measure(cache, whole)->result().get(), &volume->relevant());
+}
+
+// However many requests another account has.
+TEST_F(RangeCacheTest, WhoeverSpentLessIsServedFirst) {
+  std::counting_semaphore<> may_go(0), began(0), ready(0);
+  std::vector<double> measured;
+  RangeCache cache(memory, scheduler, [&](PartFinder& finder, const RangePart& part) {
+    measured.push_back(part.shown.range.alpha);
+    began.release();
+    may_go.acquire();
+    return find(finder, part);
+  });
+  scheduler.charge(*payer, std::chrono::seconds(1));
+  const auto on_ready = [&] { ready.release(); };
+  const auto first = measure(cache, above(1), on_ready);
+  began.acquire();
+  const auto other = cache.ask(volume, above(2), Distances::measured, std::make_shared<FairScheduler::Account>(), on_ready);
+  const auto third = measure(cache, above(3), on_ready);
+  may_go.release(3);
+  for (int i = 0; i < 3; ++i) ready.acquire();
+  EXPECT_EQ(measured, (std::vector{0.01, 0.02, 0.03}));
 }
 
 }  // namespace

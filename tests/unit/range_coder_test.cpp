@@ -8,6 +8,8 @@
 #include <random>
 #include <string>
 
+#include "common/codec/coding_rate.h"
+
 namespace intervale {
 namespace {
 
@@ -63,6 +65,28 @@ TEST(RangeCoder, GivesBackWhatWasWritten) {
     bool spent = false;
     EXPECT_EQ(decode_exact(bytes, values.size(), spent), written) << "seed " << seed;
     EXPECT_TRUE(spent) << "seed " << seed;
+  }
+}
+
+TEST(RangeCoder, EvenBitsAreCodedLikeOthers) {
+  std::mt19937 random(5);
+  for (const double share : {0.0, 0.02, 0.5, 0.9, 1.0}) {
+    std::bernoulli_distribution one(share);
+    std::vector<bool> bits(3000);
+    std::generate(bits.begin(), bits.end(), [&] { return one(random); });
+    RangeEncoder others, evens;
+    BitModel of_others, of_evens;
+    for (const bool bit : bits) {
+      others.bit(of_others, bit);
+      evens.even_bit(of_evens, bit);
+      ASSERT_EQ(of_evens.of_zero(), of_others.of_zero());
+    }
+    const auto bytes = others.finish();
+    EXPECT_EQ(evens.finish(), bytes);
+    RangeDecoder decoder(bytes);
+    BitModel model;
+    for (const bool bit : bits) ASSERT_EQ(decoder.even_bit(model), bit);
+    EXPECT_TRUE(decoder.is_spent());
   }
 }
 
@@ -131,6 +155,21 @@ TEST(RangeCoder, AnyBytesGiveBits) {
     for (auto& b : bytes) b = round % 3 == 0 ? 0xff : std::uint8_t(random());
     bool spent = false;
     EXPECT_EQ(decode_exact(bytes, 400, spent).size(), 400u);
+  }
+}
+
+// What most_coded_bits() says is nearly reached, and never exceeded.
+TEST(RangeCoder, HoldsNoMoreBitsThanItsBestRate) {
+  for (const bool bit : {false, true}) {
+    for (const std::size_t count : {0u, 1u, 100u, 20'000u, 3'000'000u}) {
+      RangeEncoder coder;
+      BitModel model;
+      for (std::size_t i = 0; i < count; ++i) coder.bit(model, bit);
+      const std::size_t bytes = coder.finish().size();
+      EXPECT_LE(count, most_coded_bits(bytes));
+      EXPECT_TRUE(count < 1'000'000 || double(count) >= 0.95 * double(most_coded_bits(bytes))) << bytes;
+      EXPECT_GE(std::min(model.of_zero(), 65536 - model.of_zero()), kLeastProbability);
+    }
   }
 }
 

@@ -1,5 +1,6 @@
 // Laws of the ranges that the clients of a load drag.
 #include "client/load/range_path.h"
+#include "tests/support/special_values.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,6 @@
 namespace intervale {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t kViews = 500;
 
 RangePath path_of(const Range& start, std::uint64_t seed) { return {.start = start, .values = {-20, 180}, .seed = seed}; }
@@ -25,8 +25,8 @@ std::vector<Range> ranges_of(const RangePath& path) {
 }
 
 TEST(RangePath, EveryRangeIsWithinTheValuesAndTheRightWayRound) {
-  for (const Range& start : {Range{40, 60}, Range{-20, 180}, Range{7, 7}, Range{-20, -20}, Range{180, 180}, Range{-kInfinity, 3},
-                             Range{-kInfinity, kInfinity}, Range{500, 600}}) {
+  for (const Range& start :
+       {Range{40, 60}, Range{-20, 180}, Range{7, 7}, Range{-20, -20}, Range{180, 180}, Range{-kInf, 3}, Range{-kInf, kInf}, Range{500, 600}}) {
     for (std::uint64_t seed = 0; seed < 30; ++seed) {
       for (const Range& range : ranges_of(path_of(start, seed))) {
         ASSERT_LE(-20, range.alpha) << "seed " << seed;
@@ -39,7 +39,7 @@ TEST(RangePath, EveryRangeIsWithinTheValuesAndTheRightWayRound) {
 
 TEST(RangePath, ItStartsWhereItIsTold) {
   EXPECT_EQ(range_of(path_of({0.1, 60.7}, 3), 0), (Range{0.1, 60.7}));
-  EXPECT_EQ(range_of(path_of({-kInfinity, 500}, 3), 0), (Range{-20, 180}));
+  EXPECT_EQ(range_of(path_of({-kInf, 500}, 3), 0), (Range{-20, 180}));
   EXPECT_EQ(upper_half({-20, 180}), (Range{80, 180}));
 }
 

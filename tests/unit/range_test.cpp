@@ -2,14 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <random>
 #include <utility>
 
+#include "tests/support/special_values.h"
+
 namespace intervale {
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 TEST(Range, AValueEqualToABoundIsInside) {
   EXPECT_EQ(side_of(1, {1, 2}), Side::inside);

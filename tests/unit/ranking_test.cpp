@@ -22,29 +22,11 @@ namespace {
 using testing::NaiveCamera;
 using testing::Vector;
 
-constexpr std::array<testing::Dims, 5> kBoxes{{{17, 17, 17}, {24, 17, 20}, {12, 5, 7}, {40, 9, 20}, {30, 2, 11}}};
+constexpr std::array<testing::Dims, 5> kRankingBoxes{{{17, 17, 17}, {24, 17, 20}, {12, 5, 7}, {40, 9, 20}, {30, 2, 11}}};
 
-IntervalVolume volume_of_seed(unsigned seed) {
-  const auto trial = testing::trial_of_seed(seed, kBoxes);
+IntervalVolume ranking_volume(unsigned seed) {
+  const auto trial = testing::trial_of_seed(seed, kRankingBoxes);
   return testing::build(seed % 3 != 0 ? testing::stretched(trial.volume) : trial.volume, trial.options);
-}
-
-Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
-  const Grid& g = v.description().grid;
-  Lod lod;
-  if (random() % 2 == 0) lod.error_percent = double(random() % 40);
-  if (random() % 3 == 0) {
-    lod.roi.emplace();
-    for (int i = 0; i < 3; ++i) {
-      lod.roi->min[i] = g.affine.origin()[i] + g.affine.spacing()[i] * testing::uniform(random, -1, g.dims[i]);
-      lod.roi->max[i] = lod.roi->min[i] + g.affine.spacing()[i] * testing::uniform(random, 0, 8);
-    }
-  }
-  if (random() % 3 != 0) {
-    lod.camera = testing::random_camera(g, random);
-    lod.camera->pixel_error = std::pow(2.0, testing::uniform(random, -1, 8));
-  }
-  return lod;
 }
 
 using Visit = std::function<void(const Place&, Ranking::Rank)>;
@@ -104,13 +86,13 @@ bool meets(const IntervalVolume& v, const Diamond& d, const Box& roi) {
 
 class Ranks : public ::testing::TestWithParam<unsigned> {
  protected:
-  IntervalVolume volume_ = volume_of_seed(GetParam());
+  IntervalVolume volume_ = ranking_volume(GetParam());
   std::mt19937 random_{GetParam()};  // the seed is the test's number
 };
 
 TEST_P(Ranks, NoUpdateRanksAboveItsBrick) {
   for (int trial = 0; trial < 40; ++trial) {
-    const Ranking ranking(volume_, random_lod(volume_, random_));
+    const Ranking ranking(volume_, testing::random_lod(volume_.description().grid, random_));
     for_each_rank(volume_, ranking,
                   [&](const Place& p, Ranking::Rank rank) { ASSERT_GE(ranking.of_brick(p.brick).bound(), rank) << "trial " << trial; });
   }
@@ -118,7 +100,7 @@ TEST_P(Ranks, NoUpdateRanksAboveItsBrick) {
 
 TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
   for (int trial = 0; trial < 40; ++trial) {
-    const Ranking ranking(volume_, random_lod(volume_, random_));
+    const Ranking ranking(volume_, testing::random_lod(volume_.description().grid, random_));
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
       const unsigned level = volume_.relevant().supercube_error_steps()[p.supercube];
       ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level), rank) << "trial " << trial;
@@ -129,7 +111,7 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
 TEST_P(Ranks, WantedIsWhatTheNaiveModelWants) {
   std::size_t wanted = 0;
   for (int trial = 0; trial < 40; ++trial) {
-    const Lod lod = random_lod(volume_, random_);
+    const Lod lod = testing::random_lod(volume_.description().grid, random_);
     const double threshold = error_of(lod, volume_.description().max_error);
     std::optional<ScreenError> view;
     if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
@@ -176,7 +158,7 @@ TEST_P(Ranks, WhatIsNotWantedDoesNotShow) {
 
 TEST_P(Ranks, BoundIsNoLessThanWhatIsLeft) {
   for (int trial = 0; trial < 40; ++trial) {
-    const Lod lod = random_lod(volume_, random_);
+    const Lod lod = testing::random_lod(volume_.description().grid, random_);
     std::optional<ScreenError> view;
     if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
     const Ranking ranking(volume_, lod);
@@ -222,7 +204,7 @@ TEST_P(Ranks, BoundIsANumberWhateverTheCamera) {
 // What a camera wants, and the ancestors of that, and nothing else.
 TEST_P(Ranks, SelectIsClosedUnderParentsAndMinimal) {
   for (int trial = 0; trial < 40; ++trial) {
-    const Lod lod = random_lod(volume_, random_);
+    const Lod lod = testing::random_lod(volume_.description().grid, random_);
     const Ranking ranking(volume_, lod);
     SplitSet expected(volume_.size());
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
@@ -255,7 +237,7 @@ TEST_P(Ranks, AFinerPictureChoosesNoLess) {
 
 TEST_P(Ranks, InOrderParentsComeFirstAndRanksDoNotAscend) {
   for (int trial = 0; trial < 10; ++trial) {
-    const Lod lod = random_lod(volume_, random_);
+    const Lod lod = testing::random_lod(volume_.description().grid, random_);
     const Ranking ranking(volume_, lod);
     const SplitSet chosen = select(volume_, lod);
     const auto order = in_order(volume_, chosen, lod);

@@ -14,29 +14,11 @@ namespace {
 
 const Box kEverywhere{{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
 
-Lod of_error(double error) {
-  Lod lod;
-  lod.error = error;
-  return lod;
-}
-
-Lod of_percent(double percent) {
-  Lod lod;
-  lod.error_percent = percent;
-  return lod;
-}
-
-Lod of_region(const Box& box) {
-  Lod lod;
-  lod.roi = box;
-  return lod;
-}
-
-constexpr std::array<testing::Dims, 5> kBoxes{{{9, 9, 9}, {17, 17, 17}, {12, 5, 7}, {2, 9, 20}, {10, 16, 3}}};
+constexpr std::array<testing::Dims, 5> kRefinementBoxes{{{9, 9, 9}, {17, 17, 17}, {12, 5, 7}, {2, 9, 20}, {10, 16, 3}}};
 
 // Boxes of several shapes, in world coordinates that are not the samples'.
-IntervalVolume volume_of_seed(unsigned seed) {
-  const auto trial = testing::trial_of_seed(seed, kBoxes);
+IntervalVolume refinement_volume(unsigned seed) {
+  const auto trial = testing::trial_of_seed(seed, kRefinementBoxes);
   return testing::build(testing::stretched(trial.volume), trial.options);
 }
 
@@ -73,7 +55,7 @@ Box random_box(const Grid& g, std::mt19937& random) {
 class Select : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Select, IsClosedUnderParentsAndWantsNothingElse) {
-  const IntervalVolume v = volume_of_seed(GetParam());
+  const IntervalVolume v = refinement_volume(GetParam());
   const Grid& g = v.description().grid;
   std::mt19937 random(GetParam());
   for (int trial = 0; trial < 20; ++trial) {
@@ -104,19 +86,19 @@ TEST_P(Select, IsClosedUnderParentsAndWantsNothingElse) {
 }
 
 TEST_P(Select, ErrorZeroMeansAllAndTheLargestErrorNone) {
-  const IntervalVolume v = volume_of_seed(GetParam());
+  const IntervalVolume v = refinement_volume(GetParam());
   EXPECT_EQ(select(v, Lod{}).count(), v.size());
-  EXPECT_EQ(select(v, of_percent(0)).count(), v.size());
-  EXPECT_EQ(select(v, of_percent(100)).count(), 0u);
-  EXPECT_EQ(select(v, of_error(v.description().max_error)).count(), 0u);
-  EXPECT_EQ(select(v, of_region(kEverywhere)).count(), v.size());
+  EXPECT_EQ(select(v, Lod{.error_percent = 0}).count(), v.size());
+  EXPECT_EQ(select(v, Lod{.error_percent = 100}).count(), 0u);
+  EXPECT_EQ(select(v, Lod{.error = v.description().max_error}).count(), 0u);
+  EXPECT_EQ(select(v, Lod{.roi = kEverywhere}).count(), v.size());
 }
 
 TEST_P(Select, AFinerErrorChoosesNoLess) {
-  const IntervalVolume v = volume_of_seed(GetParam());
+  const IntervalVolume v = refinement_volume(GetParam());
   SplitSet coarser(v.size());
   for (double percent : {90.0, 60.0, 30.0, 10.0, 3.0, 0.3, 0.0}) {
-    const SplitSet chosen = select(v, of_percent(percent));
+    const SplitSet chosen = select(v, Lod{.error_percent = percent});
     expect_closed(v, chosen);
     for (UpdateIndex i{0}; i < v.size(); ++i) {
       EXPECT_TRUE(!coarser.contains(i) || chosen.contains(i));
@@ -127,12 +109,12 @@ TEST_P(Select, AFinerErrorChoosesNoLess) {
 }
 
 TEST_P(Select, ARegionOutsideTheBoxChoosesNothing) {
-  const IntervalVolume v = volume_of_seed(GetParam());
+  const IntervalVolume v = refinement_volume(GetParam());
   const Grid& g = v.description().grid;
   for (int axis = 0; axis < 3; ++axis) {
     for (const double steps : {0.01, 0.5, 1.0, 3.0, 1e6}) {
       for (const bool before : {false, true}) {
-        Lod lod = of_region(kEverywhere);
+        Lod lod{.roi = kEverywhere};
         if (before)
           lod.roi->max[axis] = g.affine.origin()[axis] - steps * g.affine.spacing()[axis];
         else
@@ -145,7 +127,7 @@ TEST_P(Select, ARegionOutsideTheBoxChoosesNothing) {
 }
 
 TEST_P(Select, InOrderParentsComeFirstAndErrorsDoNotAscend) {
-  const IntervalVolume v = volume_of_seed(GetParam());
+  const IntervalVolume v = refinement_volume(GetParam());
   std::mt19937 random(GetParam());
   for (int trial = 0; trial < 4; ++trial) {
     Lod lod;

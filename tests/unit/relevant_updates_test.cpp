@@ -17,7 +17,7 @@
 namespace intervale {
 namespace {
 
-constexpr std::array<testing::Dims, 4> kBoxes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
+constexpr std::array<testing::Dims, 4> kRelevantBoxes{{{17, 17, 17}, {24, 17, 20}, {40, 9, 20}, {30, 5, 11}}};
 
 using Each = std::vector<std::shared_ptr<const RelevantUpdates>>;
 
@@ -43,7 +43,7 @@ class United : public ::testing::TestWithParam<unsigned> {
 
   std::mt19937 random_{GetParam()};
   std::shared_ptr<const IntervalVolume> volume_ =
-      testing::build_shared(testing::gyroid(kBoxes[GetParam() % kBoxes.size()]), {.range = {-1.5, 1.5}, .refine = Refine::uniform});
+      testing::build_shared(testing::gyroid(kRelevantBoxes[GetParam() % kRelevantBoxes.size()]), {.range = {-1.5, 1.5}, .refine = Refine::uniform});
 };
 
 TEST_P(United, IsWhatEachRangeNeeds) {

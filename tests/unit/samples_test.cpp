@@ -12,13 +12,13 @@
 namespace intervale {
 namespace {
 
-std::span<const float> samples_of(const Volume& volume) {
+std::span<const float> floats_of(const Volume& volume) {
   return {reinterpret_cast<const float*>(volume.bytes.data()), volume.bytes.size() / sizeof(float)};
 }
 
 // How many connected parts the samples within [low, high] have, neighbours along axes.
 int parts(const Volume& volume, float low, float high) {
-  const auto samples = samples_of(volume);
+  const auto samples = floats_of(volume);
   const auto n = static_cast<std::size_t>(volume.grid.dims[0]);
   std::vector<bool> seen(samples.size());
   int count = 0;
@@ -55,7 +55,7 @@ TEST(Samples, SpanTheCubeFromMinusOneToOne) {
       const double spacing = 2.0 / (size - 1);
       EXPECT_EQ(volume->grid, (Grid{{size, size, size}, Affine::of({spacing, spacing, spacing}, {-1, -1, -1})}));
       ASSERT_EQ(volume->bytes.size(), volume->grid.sample_count() * 4);
-      for (const float sample : samples_of(*volume)) ASSERT_TRUE(std::isfinite(sample));
+      for (const float sample : floats_of(*volume)) ASSERT_TRUE(std::isfinite(sample));
     }
 }
 
@@ -64,7 +64,7 @@ TEST(Samples, StayInTheirRangeAndUseIt) {
     SCOPED_TRACE(name);
     const auto volume = make_sample(name, 97);
     ASSERT_TRUE(volume);
-    const auto samples = samples_of(*volume);
+    const auto samples = floats_of(*volume);
     const auto [low, high] = std::minmax_element(samples.begin(), samples.end());
     const bool is_gyroid = name == "gyroid";
     EXPECT_GE(*low, is_gyroid ? -1.5001F : 0);
@@ -86,7 +86,7 @@ TEST(Samples, BuckyballHasSixtyAtomsJoinedIntoOneCage) {
   EXPECT_EQ(parts(*volume, 200, 256), 60);
   EXPECT_EQ(parts(*volume, 128, 256), 1);
   EXPECT_EQ(parts(*volume, 128, 188), 1);
-  EXPECT_LT(samples_of(*volume)[64 + 129 * (64 + 129 * 64)], 1);
+  EXPECT_LT(floats_of(*volume)[64 + 129 * (64 + 129 * 64)], 1);
 }
 
 TEST(Samples, UnknownNamesAndSizesAreMisuse) {

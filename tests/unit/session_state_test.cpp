@@ -17,7 +17,11 @@ using protocol::CloseCode;
 
 TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
   const AtomicSharedPtr<Catalogue> catalogue;
-  RangeCache ranges;
+  Memory memory;
+  FairScheduler scheduler(1);
+  RangeCache ranges(memory, scheduler);
+  Background background(scheduler, memory, 1);
+  const auto account = std::make_shared<FairScheduler::Account>();
   const struct {
     std::uint32_t payload;
     const char* text;
@@ -25,7 +29,7 @@ TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
                {1, "the client reads batches of version 1, and this server sends version 3: update the client"},
                {4, "the client reads batches of version 4, and this server sends version 3: update the server"}};
   for (const auto& c : cases) {
-    SessionState state(catalogue, ranges, Scope::everything());
+    SessionState state(catalogue, ranges, background, Scope::everything(), account);
     const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});
     ASSERT_TRUE(fault);
     EXPECT_EQ(fault->code, CloseCode::other_version);

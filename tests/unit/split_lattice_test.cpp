@@ -104,6 +104,8 @@ TEST_P(SplitLattices, ReadyIsWhatAFrontCanSplit) {
         const std::uint64_t ready = lattice.splittable(kAllSlots), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
         ASSERT_EQ(is_split & ~ready, 0u) << "the ancestors of what is split are split";
         ASSERT_EQ(lattice.splittable(~is_split & kAllSlots), ready & ~is_split);
+        lattice.move_to(SlotGroup{b, s, key, 0});
+        ASSERT_EQ(lattice.splittable(kAllSlots), ready) << "the same without a lookup";
         for (Slot slot{0}; slot < kSlots; ++slot) {
           const bool can_be = front.find(centre_of(key, slot)).has_value();
           ASSERT_EQ(((ready & ~is_split) >> slot & 1) != 0, can_be) << "share " << share << ", slot " << slot;

@@ -9,7 +9,7 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kMost = 2048;
+constexpr std::size_t kMostSplits = 2048;
 
 std::vector<SlotGroup> some_groups(unsigned seed) {
   std::mt19937_64 random(seed);
@@ -28,7 +28,7 @@ std::vector<SlotGroup> some_groups(unsigned seed) {
 Result<std::vector<SlotGroup>> decode_exact(const std::vector<std::uint8_t>& bytes, std::size_t size) {
   const auto exact = std::make_unique<std::uint8_t[]>(size);
   std::copy_n(bytes.begin(), size, exact.get());
-  return decode_splits({exact.get(), size}, kMost);
+  return decode_splits({exact.get(), size}, kMostSplits);
 }
 
 TEST(SplitNames, ComeBackAsTheyWere) {
@@ -56,7 +56,7 @@ TEST(SplitNames, ChangedBytesAreRefusedOrMeanSomethingElseInOrder) {
     for (int k = 0; k < 3; ++k) spoilt[random() % spoilt.size()] = std::uint8_t(random());
     const auto back = decode_exact(spoilt, spoilt.size());
     if (!back) continue;
-    EXPECT_LE(back->size(), kMost);
+    EXPECT_LE(back->size(), kMostSplits);
     for (std::size_t i = 0; i < back->size(); ++i) {
       EXPECT_NE((*back)[i].slots, 0u);
       EXPECT_EQ((*back)[i].slots >> kSlots, 0u);

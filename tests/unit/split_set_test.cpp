@@ -16,9 +16,9 @@
 namespace intervale {
 namespace {
 
-constexpr std::array<testing::Dims, 5> kBoxes{{{17, 17, 17}, {24, 17, 20}, {33, 12, 7}, {40, 9, 20}, {30, 2, 11}}};
+constexpr std::array<testing::Dims, 5> kSplitSetBoxes{{{17, 17, 17}, {24, 17, 20}, {33, 12, 7}, {40, 9, 20}, {30, 2, 11}}};
 
-IntervalVolume volume_of_seed(unsigned seed) { return testing::build(testing::trial_of_seed(seed, kBoxes)); }
+IntervalVolume split_set_volume(unsigned seed) { return testing::build(testing::trial_of_seed(seed, kSplitSetBoxes)); }
 
 // Closed under parents: some of the updates, and their ancestors.
 SplitSet some_of(const IntervalVolume& volume, double share, std::mt19937& random) {
@@ -28,7 +28,7 @@ SplitSet some_of(const IntervalVolume& volume, double share, std::mt19937& rando
 
 class SplitSets : public ::testing::TestWithParam<unsigned> {
  protected:
-  IntervalVolume volume_ = volume_of_seed(GetParam());
+  IntervalVolume volume_ = split_set_volume(GetParam());
   std::mt19937 random_{GetParam()};  // the seed is the test's number
 };
 

@@ -12,10 +12,10 @@
 namespace intervale {
 namespace {
 
-using testing::Contains;
-using testing::HasSubstr;
-using testing::Not;
-using testing::Pair;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::Pair;
 
 struct Viewer {
   TempDir folder;
@@ -34,9 +34,10 @@ struct Viewer {
 HttpResponse get(const StaticFiles& viewer, HttpRequest request) {
   const Catalogue catalogue;
   const Metrics metrics;
+  const Memory memory;
   if (request.method.empty()) request.method = "GET";
   request.scope = Scope::everything().get();
-  return respond(request, {.catalogue = catalogue, .metrics = metrics, .viewer = viewer});
+  return respond(request, {.catalogue = catalogue, .metrics = metrics, .memory = memory, .viewer = viewer});
 }
 
 std::string body_of(const HttpResponse& answer) { return answer.body ? *answer.body : "none"; }

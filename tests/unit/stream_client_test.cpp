@@ -12,6 +12,7 @@
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
@@ -20,13 +21,11 @@ using testing::broken_law;
 using testing::canonical;
 
 constexpr std::size_t kBatchBytes = 4096;
-constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-constexpr std::array<testing::Dims, 4> kBoxes{{{9, 9, 9}, {12, 7, 10}, {22, 2, 11}, {13, 13, 6}}};
+constexpr std::array<testing::Dims, 4> kClientBoxes{{{9, 9, 9}, {12, 7, 10}, {22, 2, 11}, {13, 13, 6}}};
 
-std::shared_ptr<const IntervalVolume> volume_of_seed(unsigned seed) {
-  auto trial = testing::trial_of_seed(seed, kBoxes);
+std::shared_ptr<const IntervalVolume> client_volume(unsigned seed) {
+  auto trial = testing::trial_of_seed(seed, kClientBoxes);
   if (seed % 5 == 0) trial.options.range.beta = kInf;
   if (seed % 5 == 1) trial.options.range.beta = trial.options.range.alpha;
   return testing::build_shared(testing::stretched(trial.volume), trial.options);
@@ -69,7 +68,7 @@ void stream(StreamPlan& plan, StreamClient& client, const Lod& lod, int batches 
 
 class Stream : public ::testing::TestWithParam<unsigned> {
  protected:
-  std::shared_ptr<const IntervalVolume> volume = volume_of_seed(GetParam());
+  std::shared_ptr<const IntervalVolume> volume = client_volume(GetParam());
   StreamPlan plan{volume};
 };
 
@@ -165,7 +164,7 @@ TEST_P(Stream, DamagedAndRepeatedBatchesAreRefused) {
 INSTANTIATE_TEST_SUITE_P(Random, Stream, ::testing::Range(0u, 10u));
 
 TEST(StreamClient, ADescriptionThatCannotBeIsRefused) {
-  const Description good = volume_of_seed(0)->description();
+  const Description good = client_volume(0)->description();
   ASSERT_TRUE(StreamClient::start(good));
   const struct {
     const char* what;

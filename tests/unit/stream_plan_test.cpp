@@ -15,16 +15,16 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kBatchBytes = 4096;
+constexpr std::size_t kPlanBatchBytes = 4096;
 
-constexpr std::array<testing::Dims, 3> kBoxes{{{17, 17, 17}, {24, 17, 20}, {30, 2, 11}}};
+constexpr std::array<testing::Dims, 3> kPlanBoxes{{{17, 17, 17}, {24, 17, 20}, {30, 2, 11}}};
 
-std::shared_ptr<const IntervalVolume> volume_of_seed(unsigned seed) {
-  const auto trial = testing::trial_of_seed(seed, kBoxes);
+std::shared_ptr<const IntervalVolume> plan_volume(unsigned seed) {
+  const auto trial = testing::trial_of_seed(seed, kPlanBoxes);
   return testing::build_shared(trial.volume, trial.options);
 }
 
-Lod random_lod(const IntervalVolume& v, std::mt19937& random) {
+Lod plan_lod(const IntervalVolume& v, std::mt19937& random) {
   Lod lod;
   if (random() % 2 == 0) lod.error_percent = double(random() % 40);
   if (random() % 3 == 0) lod.max_updates = random() % (v.size() + 10);
@@ -108,13 +108,13 @@ class Receiver {
 class Plan : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Plan, SendsEveryWantedUpdateOnceWhateverViewsFollow) {
-  const auto volume = volume_of_seed(GetParam());
+  const auto volume = plan_volume(GetParam());
   std::mt19937 random(GetParam());
   StreamPlan plan(volume);
   Receiver receiver(volume);
-  EXPECT_FALSE(plan.next(kBatchBytes)) << "nothing is wanted yet";
+  EXPECT_FALSE(plan.next(kPlanBatchBytes)) << "nothing is wanted yet";
   for (int view = 0; view < 8; ++view) {
-    const Lod lod = view == 7 ? Lod{} : random_lod(*volume, random);
+    const Lod lod = view == 7 ? Lod{} : plan_lod(*volume, random);
     plan.set_lod(lod);
     receiver.set_lod(lod);
     ASSERT_GE(plan.remaining().updates, receiver.own_left(lod).updates);
@@ -144,17 +144,17 @@ TEST_P(Plan, SendsEveryWantedUpdateOnceWhateverViewsFollow) {
     }
   }
   EXPECT_EQ(plan.sent(), volume->size());
-  EXPECT_FALSE(plan.next(kBatchBytes));
+  EXPECT_FALSE(plan.next(kPlanBatchBytes));
 }
 
 // Bands of falling error: half of the updates already leave no more than the error that the plain order leaves after a
 // quarter.
 TEST_P(Plan, GreatErrorsAreSentEarly) {
-  const auto volume = volume_of_seed(GetParam());
+  const auto volume = plan_volume(GetParam());
   const auto order = in_order(*volume, select(*volume, {}), {});
   StreamPlan plan(volume);
   plan.set_lod({});
-  while (const auto batch = plan.next(kBatchBytes)) {
+  while (const auto batch = plan.next(kPlanBatchBytes)) {
     if (plan.sent() > 8192 && plan.sent() < order.size()) {
       EXPECT_LE(plan.remaining().error, volume->error(order[plan.sent() / 4])) << plan.sent() << " sent";
     }
@@ -162,11 +162,11 @@ TEST_P(Plan, GreatErrorsAreSentEarly) {
 }
 
 TEST_P(Plan, RemainingErrorNeverGrowsWithinAView) {
-  const auto volume = volume_of_seed(GetParam());
+  const auto volume = plan_volume(GetParam());
   StreamPlan plan(volume);
   plan.set_lod({});
   double before = volume->description().max_error, last = before;
-  while (const auto batch = plan.next(kBatchBytes)) {
+  while (const auto batch = plan.next(kPlanBatchBytes)) {
     EXPECT_LE(plan.remaining().error, before);
     before = last = plan.remaining().error;
   }
@@ -174,20 +174,20 @@ TEST_P(Plan, RemainingErrorNeverGrowsWithinAView) {
 }
 
 TEST_P(Plan, TheSameViewSendsNothingTheSecondTime) {
-  const auto volume = volume_of_seed(GetParam());
+  const auto volume = plan_volume(GetParam());
   StreamPlan plan(volume);
   Lod lod;
   lod.error_percent = 10;
   plan.set_lod(lod);
-  while (plan.next(kBatchBytes)) {
+  while (plan.next(kPlanBatchBytes)) {
   }
   const auto sent = plan.sent();
   EXPECT_EQ(sent, select(*volume, lod).count());
   plan.set_lod(lod);
-  EXPECT_FALSE(plan.next(kBatchBytes));
+  EXPECT_FALSE(plan.next(kPlanBatchBytes));
   lod.error_percent = 20;
   plan.set_lod(lod);
-  EXPECT_FALSE(plan.next(kBatchBytes)) << "a coarser view has all it needs";
+  EXPECT_FALSE(plan.next(kPlanBatchBytes)) << "a coarser view has all it needs";
   EXPECT_EQ(plan.sent(), sent);
 }
 
@@ -199,7 +199,7 @@ TEST(StreamPlan, AVolumeWithoutUpdatesSendsNothing) {
   StreamPlan plan(std::make_shared<const IntervalVolume>(*empty));
   plan.set_lod({});
   EXPECT_TRUE(plan.done());
-  EXPECT_FALSE(plan.next(kBatchBytes));
+  EXPECT_FALSE(plan.next(kPlanBatchBytes));
 }
 
 }  // namespace

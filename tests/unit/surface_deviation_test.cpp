@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <set>
 #include <span>
@@ -16,11 +15,11 @@
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/bisection.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr int kTopScale = 4;           // coarser diamonds have their width
 constexpr double kLeast = 1e-4;        // of the finest diamonds' width: smaller moves are none
 constexpr double kFloat = 1e-5;        // of the field's span: what rounding does to an interpolant

@@ -8,12 +8,14 @@
 #include <random>
 #include <string>
 
+#include "tests/support/cameras.h"
+
 namespace intervale {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-double uniform(std::mt19937& random, double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); }
+using testing::uniform;
 
 TEST(OpacityCurve, IsReadFromText) {
   EXPECT_EQ(parse_opacity("5:1").value(), (OpacityCurve{{5, 1}}));

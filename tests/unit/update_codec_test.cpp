@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <random>
 
@@ -18,6 +17,7 @@
 #include "tests/support/batches.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
@@ -213,12 +213,11 @@ Bytes coded_part(std::span<const std::uint8_t> batch) {
 
 // All diamonds are relevant, so every flag is that of an update.
 TEST(UpdateCodec, ValuesWithoutAnyPatternTakeNoMoreThanTheirBits) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::mt19937 random(11);
   std::vector<std::uint32_t> noise(17 * 17 * 17);
   for (std::uint32_t& sample : noise) sample = std::uint32_t(random() % 4294967295u);
   const Volume volume = testing::volume_of_type(SampleType::u32, {17, 17, 17}, noise);
-  const IntervalVolume v = testing::build(volume, {.range = {-kInfinity, kInfinity}, .refine = Refine::uniform});
+  const IntervalVolume v = testing::build(volume, {.range = {-kInf, kInf}, .refine = Refine::uniform});
   const auto queue = queue_of(v);
   ASSERT_EQ(queue.size(), noise.size() - 8);
   for (const std::size_t n : {std::size_t(1), std::size_t(100), queue.size()}) {
@@ -366,7 +365,6 @@ TEST(Nearness, OfSeveralRangesIsThatOfTheNearest) {
 }
 
 TEST(Nearness, HoldsAtTheBordersOfTheKeys) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const ValueKey last = ~ValueKey(0) - 1;
   const ValueFormat format{SampleType::u32, 1, 0, last};
   const auto near = [&](const Range& range, ValueKey a, ValueKey b) {
@@ -375,7 +373,7 @@ TEST(Nearness, HoldsAtTheBordersOfTheKeys) {
     around[1] = b;
     return nearness(KeySides(format, range), Refine::boundary, around, 6);
   };
-  const Range none{5e9, 6e9}, all{-kInfinity, kInfinity}, negative{-2, -1};
+  const Range none{5e9, 6e9}, all{-kInf, kInf}, negative{-2, -1};
   EXPECT_EQ(near(none, last, last), 4) << "one key off, of one";  // 8 has four bits
   EXPECT_EQ(near(none, 0, 0), kNearness - 1);
   EXPECT_EQ(near(none, 0, last), 1) << "they differ by 2^32";
@@ -384,8 +382,8 @@ TEST(Nearness, HoldsAtTheBordersOfTheKeys) {
   EXPECT_EQ(near(negative, 0, last), 1);
   EXPECT_EQ(near(all, 0, last), 1);
   EXPECT_EQ(near(all, 1000, 1000), kNearness - 1);
-  EXPECT_EQ(near({double(last), kInfinity}, last - 1, last), 0);
-  EXPECT_EQ(near({double(last), kInfinity}, last - 1, last - 1), 4);
+  EXPECT_EQ(near({double(last), kInf}, last - 1, last), 0);
+  EXPECT_EQ(near({double(last), kInf}, last - 1, last - 1), 4);
   EXPECT_EQ(near({0, 0}, 0, 0), 4);
   EXPECT_EQ(near({0, 0}, 0, 1), 0);
   EXPECT_EQ(near({0, 0}, 1, 1), 4);

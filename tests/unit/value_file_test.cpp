@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "common/ivm/value_page.h"
 #include "common/ivm/value_verify.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/value_builder.h"
+#include "tests/support/special_values.h"
 #include "tests/support/temp_dir.h"
 #include "tests/support/value_fields.h"
 
@@ -19,8 +19,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using Dims = std::array<std::int32_t, 3>;
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 ValueVolume build(const testing::ValueField& field) {
   Volume volume = field.volume;

@@ -10,14 +10,14 @@ namespace intervale {
 namespace {
 
 // A centre of each class, and the keys at its vertices of a field that is linear in the coordinates.
-struct Case {
+struct PredictionCase {
   Diamond diamond;
   VertexKeys keys{};
   ValueKey centre;
 };
-Case linear_case(Vertex centre, const std::array<int, 3>& slope) {
+PredictionCase linear_case(Vertex centre, const std::array<int, 3>& slope) {
   const auto key = [&](Vertex v) { return ValueKey(1000 + slope[0] * v.x + slope[1] * v.y + slope[2] * v.z); };
-  Case made{Diamond(centre), {}, key(centre)};
+  PredictionCase made{Diamond(centre), {}, key(centre)};
   for (int v = 0; v < made.diamond.row->vertices; ++v) made.keys[std::size_t(v)] = key(made.diamond.vertex(v));
   return made;
 }
@@ -25,7 +25,7 @@ Case linear_case(Vertex centre, const std::array<int, 3>& slope) {
 TEST(ValuePrediction, IsExactForALinearField) {
   for (const Vertex centre : {Vertex{5, 3, 7}, Vertex{6, 3, 7}, Vertex{6, 4, 7}, Vertex{20, 12, 4}, Vertex{8, 12, 4}}) {
     for (const PredictorWeights& weights : {PredictorWeights{}, PredictorWeights{100, -50, 300}, PredictorWeights{-1024, 1024, 77}}) {
-      const Case c = linear_case(centre, {7, -11, 5});
+      const PredictionCase c = linear_case(centre, {7, -11, 5});
       EXPECT_EQ(predict(predictor_values(c.diamond.row->cls, c.keys), weights, 5000).key, c.centre);
     }
   }

@@ -10,7 +10,7 @@
 namespace intervale {
 namespace {
 
-constexpr double kMost = std::numeric_limits<double>::max(), kLeast = 5e-324;
+constexpr double kMostValue = std::numeric_limits<double>::max(), kLeastValue = 5e-324;
 
 std::vector<std::vector<double>> tables() {
   std::vector<double> random;
@@ -18,7 +18,7 @@ std::vector<std::vector<double>> tables() {
   for (int i = 0; i < 1000; ++i) random.push_back(std::ldexp(double(numbers()) - 2e9, int(numbers() % 1900) - 1000));
   std::sort(random.begin(), random.end());
   random.erase(std::unique(random.begin(), random.end()), random.end());
-  return {{0}, {-kMost, kMost}, {-kMost, -1, -kLeast, 0, kLeast, 2 * kLeast, 1, kMost}, random};
+  return {{0}, {-kMostValue, kMostValue}, {-kMostValue, -1, -kLeastValue, 0, kLeastValue, 2 * kLeastValue, 1, kMostValue}, random};
 }
 
 TEST(ValueTable, ComesBackTheSame) {
@@ -48,8 +48,8 @@ TEST(ValueTable, KeysAreThoseOfTheNearestValues) {
       EXPECT_EQ(format.value(key), table[key]);
       EXPECT_EQ(format.key(table[key]), key);
     }
-    EXPECT_EQ(format.key(-kMost), 0u);
-    EXPECT_EQ(format.key(kMost), format.last);
+    EXPECT_EQ(format.key(-kMostValue), 0u);
+    EXPECT_EQ(format.key(kMostValue), format.last);
   }
   const ValueFormat format = format_of_table(SampleType::i32, {-10, 0, 1, 4});
   EXPECT_EQ(format.key(-5.5), 0u);

@@ -15,13 +15,13 @@ namespace intervale {
 namespace {
 
 using testing::canonical;
-using Server = testing::SessionServer<ViewingSession>;
+using ViewingServer = testing::SessionServer<ViewingSession>;
 
 std::shared_ptr<const IntervalVolume> volume_of(const testing::Dims& dims) {
   return testing::build_shared(testing::gyroid(dims), {.range = {-0.3, 0.2}});
 }
 
-const Camera kCamera{.eye = {40, 30, 60}, .look_at = {8, 8, 8}, .viewport = {640, 480}};
+const Camera kSessionCamera{.eye = {40, 30, 60}, .look_at = {8, 8, 8}, .viewport = {640, 480}};
 const Box kAll{{-1, -1, -1}, {100, 100, 100}};
 
 struct ViewingSessionTest : ::testing::Test {
@@ -30,8 +30,8 @@ struct ViewingSessionTest : ::testing::Test {
 };
 
 TEST_F(ViewingSessionTest, RefinesARegionToTheEnd) {
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
-  Server server(volume, session);
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll}));
+  ViewingServer server(volume, session);
   server.run();
   EXPECT_TRUE(session.is_done());
   EXPECT_FALSE(session.session().stats().is_full);
@@ -40,13 +40,13 @@ TEST_F(ViewingSessionTest, RefinesARegionToTheEnd) {
 }
 
 TEST_F(ViewingSessionTest, RefinesEachViewAsFarAsItIsSeen) {
-  ASSERT_TRUE(session.look({.camera = kCamera}));
-  Server server(volume, session);
+  ASSERT_TRUE(session.look({.camera = kSessionCamera}));
+  ViewingServer server(volume, session);
   server.run();
   EXPECT_TRUE(session.is_done());
   const auto before = session.session().stats().updates;
   EXPECT_LT(before, volume->size());
-  Camera near = kCamera;
+  Camera near = kSessionCamera;
   near.eye = {12, 12, 20};
   ASSERT_TRUE(session.look({.camera = near}));
   EXPECT_FALSE(session.is_done());
@@ -57,23 +57,23 @@ TEST_F(ViewingSessionTest, RefinesEachViewAsFarAsItIsSeen) {
 }
 
 TEST_F(ViewingSessionTest, DoesNotAskForTheSameViewAgain) {
-  ASSERT_TRUE(session.look({.camera = kCamera}));
-  Server server(volume, session);
+  ASSERT_TRUE(session.look({.camera = kSessionCamera}));
+  ViewingServer server(volume, session);
   server.run();
-  ASSERT_TRUE(session.look({.camera = kCamera}));
+  ASSERT_TRUE(session.look({.camera = kSessionCamera}));
   EXPECT_TRUE(session.take_messages().empty());
   EXPECT_TRUE(session.is_done());
 }
 
 TEST_F(ViewingSessionTest, ResumesWithNothingSentTwice) {
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll}));
   for (int k = 0; k < 3; ++k) {
-    Server server(volume, session);
+    ViewingServer server(volume, session);
     server.run(3);
     EXPECT_EQ(server.resumed(), k > 0);
     session.disconnected();
   }
-  Server server(volume, session);
+  ViewingServer server(volume, session);
   server.run();
   EXPECT_TRUE(server.resumed());
   EXPECT_TRUE(session.is_done());
@@ -82,46 +82,46 @@ TEST_F(ViewingSessionTest, ResumesWithNothingSentTwice) {
 }
 
 TEST_F(ViewingSessionTest, StartsAgainWithOtherData) {
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll}));
   {
-    Server server(volume, session);
+    ViewingServer server(volume, session);
     server.run(3);
     session.disconnected();
   }
   const auto other = std::make_shared<const IntervalVolume>(decode_ivm(encode_ivm(*volume_of({12, 20, 9})), volume->description().name).value());
-  Server server(other, session);
+  ViewingServer server(other, session);
   server.run();
   EXPECT_EQ(session.session().stats().updates, other->size());
   EXPECT_FALSE(server.resumed());
 }
 
 TEST_F(ViewingSessionTest, KeepsTheBudgetOfTetrahedraAtEveryMoment) {
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_tets = 3000}}));
-  Server server(volume, session);
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll, .budget = {.max_tets = 3000}}));
+  ViewingServer server(volume, session);
   for (int k = 0; k < 1000 && !session.is_done(); ++k) {
     server.run(1);
     ASSERT_TRUE(session.mesh()->tet_count() <= 3000);
   }
   EXPECT_EQ(session.mesh()->updates(), volume->size()) << "all is kept";
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll}));
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll}));
   EXPECT_EQ(session.mesh()->tet_count(), volume->description().full.tets) << "and shown when there is room";
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_tets = 2000}}));
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll, .budget = {.max_tets = 2000}}));
   EXPECT_LE(session.mesh()->tet_count(), 2000u);
 }
 
 TEST_F(ViewingSessionTest, KeepsTheRoomForUpdatesWhichMayChange) {
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_updates = 1000}}));
-  Server server(volume, session);
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll, .budget = {.max_updates = 1000}}));
+  ViewingServer server(volume, session);
   server.run();
   EXPECT_TRUE(session.is_done());
   EXPECT_TRUE(session.session().stats().is_full);
   EXPECT_LE(session.mesh()->updates(), 1000u);
-  ASSERT_TRUE(session.look({.camera = kCamera, .region = kAll, .budget = {.max_updates = 2000}}));
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = kAll, .budget = {.max_updates = 2000}}));
   server.run();
   EXPECT_GT(session.mesh()->updates(), 1000u);
   EXPECT_LE(session.mesh()->updates(), 2000u);
   for (int k = 0; k < 4; ++k) {  // less, seen from elsewhere each time
-    Camera camera = kCamera;
+    Camera camera = kSessionCamera;
     camera.eye[k % 3] += 5 * k + 5;
     ASSERT_TRUE(session.look({.camera = camera, .region = kAll, .budget = {.max_updates = 1100}}));
     server.run();
@@ -131,16 +131,16 @@ TEST_F(ViewingSessionTest, KeepsTheRoomForUpdatesWhichMayChange) {
 
 TEST_F(ViewingSessionTest, InvalidMessagesAndFaultsEndIt) {
   EXPECT_FALSE(session.look({.camera = {.eye = {1, 1, 1}, .look_at = {1, 1, 1}}}));
-  EXPECT_FALSE(session.look({.camera = kCamera, .budget = {.max_updates = 1}}));
-  ASSERT_TRUE(session.look({.camera = kCamera}));
+  EXPECT_FALSE(session.look({.camera = kSessionCamera, .budget = {.max_updates = 1}}));
+  ASSERT_TRUE(session.look({.camera = kSessionCamera}));
   session.connected({});
   EXPECT_FALSE(session.receive(std::vector<std::uint8_t>{1, 2, 3}, {}));
   ViewingSession early("made", "test");
-  ASSERT_TRUE(early.look({.camera = kCamera}));
+  ASSERT_TRUE(early.look({.camera = kSessionCamera}));
   early.connected({});
   EXPECT_FALSE(early.receive(protocol::encode(protocol::ServerMessage(protocol::Done{1, 0, false})), {}));
   ViewingSession refused("nothing", "test");
-  ASSERT_TRUE(refused.look({.camera = kCamera}));
+  ASSERT_TRUE(refused.look({.camera = kSessionCamera}));
   refused.connected({});
   const auto taken =
       refused.receive(protocol::encode(protocol::ServerMessage(protocol::Fault{protocol::CloseCode::no_such_dataset, "no\nsuch"})), {});

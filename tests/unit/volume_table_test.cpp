@@ -19,14 +19,14 @@
 #include "tests/support/analytic_fields.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/naive_volume.h"
+#include "tests/support/special_values.h"
 
 namespace intervale {
 namespace {
 
-constexpr double kInf = std::numeric_limits<double>::infinity();
 using testing::Dims;
 
-constexpr std::array<Dims, 7> kBoxes{{{9, 7, 5}, {9, 9, 9}, {8, 6, 4}, {2, 2, 2}, {3, 8, 2}, {12, 5, 10}, {6, 17, 3}}};
+constexpr std::array<Dims, 7> kTableBoxes{{{9, 7, 5}, {9, 9, 9}, {8, 6, 4}, {2, 2, 2}, {3, 8, 2}, {12, 5, 10}, {6, 17, 3}}};
 
 double cells_of(const Volume& v) { return double(v.grid.dims[0] - 1) * double(v.grid.dims[1] - 1) * double(v.grid.dims[2] - 1); }
 
@@ -98,8 +98,8 @@ double any_value(const Volume& v, const VolumeTable& table, std::mt19937& random
 }
 
 TEST(VolumeTable, IsTheSumOverTheMeshRefinedEverywhere) {
-  for (unsigned seed = 0; seed < kKinds * kBoxes.size(); ++seed) {
-    const Volume v = field(seed % kKinds, kBoxes[seed / kKinds], seed);
+  for (unsigned seed = 0; seed < kKinds * kTableBoxes.size(); ++seed) {
+    const Volume v = field(seed % kKinds, kTableBoxes[seed / kKinds], seed);
     SCOPED_TRACE("seed " + std::to_string(seed));
     const VolumeTable table = make_volume_table(v);
     expect_order(table);

@@ -95,6 +95,25 @@ TEST_P(VolumeTetsOf, AreOrderedFromTheFarthestToTheNearest) {
   for (std::size_t i = 1; i < distances.size(); ++i) EXPECT_LT(distances[i], distances[i - 1] + tolerance);
 }
 
+// The differences of the distances are then those along the line of sight.
+TEST_P(VolumeTetsOf, AreOrderedHoweverFarTheEyeIs) {
+  const Vec3 centre = map_.point({4, 3, 3.5}), direction = normalized(subtract(eye_, centre));
+  for (const double far : {1e12, 1e19, 1e25, 1e30, 1e300}) {
+    const auto order = tets_.order({far * direction[0], far * direction[1], far * direction[2]});
+    ASSERT_EQ(std::set<std::uint32_t>(order.begin(), order.end()).size(), tets_.tets().size());
+    std::vector<double> depths;
+    depths.reserve(order.size());
+    for (const std::uint32_t tet : order) {
+      Vec3 middle{};
+      for (const VolumePoint& p : corners(tet)) middle = {middle[0] + p.x / 4.0, middle[1] + p.y / 4.0, middle[2] + p.z / 4.0};
+      depths.push_back(-dot(subtract(map_.point(middle), centre), direction));
+    }
+    const auto [nearest, farthest] = std::minmax_element(depths.begin(), depths.end());
+    const double tolerance = (*farthest - *nearest) / 30000;
+    for (std::size_t i = 1; i < depths.size(); ++i) ASSERT_LT(depths[i], depths[i - 1] + tolerance) << far;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Grids, VolumeTetsOf, ::testing::Range(0U, 10U));
 
 TEST(VolumeTets, WithoutAMeshThereIsNothing) {

@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 
-import { digestOf, fetched, kBuckyball, kGyroid, killServers, launch, makeData, open, progressOf, serve, settled, throttledProxy } from './support.mjs';
+import { digestOf, fetched, kBuckyball, kGyroid, killServers, launch, makeData, open, progressOf, refusingProxy, serve, settled, throttledProxy } from './support.mjs';
 
 let data;
 let browser;
@@ -53,6 +53,21 @@ describe('After the server is lost', () => {
     await close();
     await second.kill();
   });
+});
+
+test('the reason that a server ends a session with is text, whatever is in it', async () => {
+  const server = await serve(data);
+  const markup = '<img src=x onerror="document.title=1">';
+  for (const code of [1011, 4400, 4416]) {
+    const port = await refusingProxy(server.port, code, `\u001b[2J${markup}\n\u202eend`);
+    const { page, close } = await open(browser, `http://127.0.0.1:${port}/#data=buckyball`);
+    await page.waitForFunction(() => document.getElementById('banner-text').textContent.includes('onerror'));
+    const text = await page.textContent('#banner-text');
+    assert.ok(text.includes(`?[2J${markup}??end`), text);
+    assert.equal(await page.locator('img[src=x]').count(), 0);
+    await close();
+  }
+  await server.kill();
 });
 
 test('A token that the server requires is requested from the user, and is never part of the address', async () => {

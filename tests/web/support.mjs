@@ -3,12 +3,15 @@
 // tests/browser.mjs; INTERVALE_WEB_OUT, where pictures are written.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
+import { createHash } from 'node:crypto';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import net from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { inflateSync } from 'node:zlib';
+
+import { encode, server as messages } from '../e2e/peers/conversations.mjs';
 
 const kTimeoutMs = 60_000; // for every wait on a page
 
@@ -91,6 +94,35 @@ export async function throttledProxy(port, bytesPerSecond) {
         queue = queue.subarray(bytesPerSecond / 20);
         if (queue.length === 0) server.resume();
       }, 50);
+    });
+  });
+  await new Promise((resolve) => proxy.listen(0, '127.0.0.1', resolve));
+  proxy.unref();
+  return proxy.address().port;
+}
+
+const frame = (head, bytes) => Buffer.concat([Buffer.from([head, 126, bytes.length >> 8, bytes.length & 255]), bytes]);
+
+// A TCP proxy to a local port that ends each session itself: with Fault, as an answer to the first message, and with its
+// code. Returns the proxy's port.
+export async function refusingProxy(port, code, text) {
+  const proxy = net.createServer((client) => {
+    client.on('error', () => client.destroy());
+    client.once('data', (request) => {
+      if (!request.includes('/v1/stream')) {
+        const server = net.connect(port, '127.0.0.1', () => server.write(request));
+        server.on('error', () => client.destroy());
+        client.pipe(server).pipe(client);
+        return;
+      }
+      const key = /Sec-WebSocket-Key: (\S+)/i.exec(request)[1] + '258EAFA5-E914-47DA-95CA-C5AB0DC85B11';
+      const accept = createHash('sha1').update(key).digest('base64');
+      client.write('HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+        + `Sec-WebSocket-Accept: ${accept}\r\nSec-WebSocket-Protocol: intervale.v1\r\n\r\n`);
+      client.once('data', () => {
+        client.write(frame(0x82, encode({ 0: messages.Fault, 1: { 0: BigInt(code), 1: text } })));
+        client.end(Buffer.from([0x88, 2, code >> 8, code & 255]));
+      });
     });
   });
   await new Promise((resolve) => proxy.listen(0, '127.0.0.1', resolve));

@@ -19,15 +19,15 @@ struct Format {
   SurfaceWriter write_surface;  // null: the format holds tetrahedra
 };
 
-constexpr double kDouble = std::numeric_limits<double>::max(), kFloat = std::numeric_limits<float>::max();
+constexpr double kLargestDouble = std::numeric_limits<double>::max(), kLargestFloat = std::numeric_limits<float>::max();
 
 constexpr std::array<Format, 6> kFormats{{
-    {".vtu", kDouble, nullptr},
-    {".vtp", kDouble, write_vtp},
-    {".ply", kDouble, write_ply},
-    {".stl", kFloat, write_stl},
-    {".obj", kDouble, write_obj},
-    {".glb", kFloat, write_glb},
+    {".vtu", kLargestDouble, nullptr},
+    {".vtp", kLargestDouble, write_vtp},
+    {".ply", kLargestDouble, write_ply},
+    {".stl", kLargestFloat, write_stl},
+    {".obj", kLargestDouble, write_obj},
+    {".glb", kLargestFloat, write_glb},
 }};
 
 Result<const Format*> format_of(const std::filesystem::path& path) {

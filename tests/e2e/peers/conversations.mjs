@@ -3,11 +3,12 @@
 export const WINDOW = 256 << 10;
 const ENVELOPE = 160;
 const PAYLOAD = 3; // the version of batches
-const client = { Open: 1, View: 2, Credit: 3 }, server = { Opened: 1, Batch: 2, Done: 3, Fault: 4 };
+const client = { Open: 1, View: 2, Credit: 3 };
+export const server = { Opened: 1, Batch: 2, Done: 3, Fault: 4 };
 
 // Tables as objects of field numbers: a number is a byte, a bigint a uint64 (or, if small, a uint32), a string a string,
 // an object a table.
-function encode(root) {
+export function encode(root) {
   const bytes = new Uint8Array(4096), at = new DataView(bytes.buffer);
   let end = 4;
   const put = (value) => {
