@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <span>
 #include <utility>
@@ -43,7 +44,44 @@ std::size_t add_edges(std::span<const std::uint32_t> triangles, std::vector<std:
 
 }  // namespace
 
-BoundarySurface::BoundarySurface(const Front& front) : mesher_(front.state()), is_mirrored_(front.state().grid.affine.is_mirrored()) {
+// Adds what triangles contribute to the normals at their corners, or takes it back.
+class BoundarySurface::NormalAdder {
+ public:
+  NormalAdder(BoundarySurface& surface, int sign) : surface_(surface), sign_(sign) {}
+  // Those on alpha and beta. What was added counts after flush().
+  void add(const Part& part) {
+    for (const Triangle& t : std::span(part.triangles).first(part.end[kBeta])) {
+      if (count_ == kLanes) flush();
+      const Position &p0 = surface_.position(t[0]), &p1 = surface_.position(t[1]), &p2 = surface_.position(t[2]);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        sides_.first[axis][count_] = float(p1[axis] - p0[axis]);
+        sides_.second[axis][count_] = float(p2[axis] - p0[axis]);
+      }
+      triangles_[count_++] = t;
+    }
+  }
+  void flush() {
+    surface_.corner_normals_.sum(sides_, sums_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        NormalSum& normal = surface_.points_[triangles_[i][k]].normal;
+        for (std::size_t axis = 0; axis < 3; ++axis) normal[axis] += sign_ * sums_[k][axis][i];
+      }
+    }
+    count_ = 0;
+  }
+
+ private:
+  BoundarySurface& surface_;
+  const int sign_;
+  std::size_t count_ = 0;  // of triangles that wait
+  Lanes<Triangle> triangles_{};
+  CornerNormals::Sides sides_;
+  CornerNormals::Sums sums_{};
+};
+
+BoundarySurface::BoundarySurface(const Front& front)
+    : mesher_(front.state()), is_mirrored_(front.state().grid.affine.is_mirrored()), corner_normals_(front.state().grid.affine) {
   const Affine inverse = front.state().grid.affine.inverse();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Vec3 normal{};
@@ -57,9 +95,10 @@ void BoundarySurface::forget_all() {
   for (Part& part : parts_) {
     part.shown = 0;
     part.triangles.clear();
+    part.end = {};
   }
   for (auto& members : members_) members.clear();
-  std::fill(normal_.begin(), normal_.end(), NormalSum{});
+  points_.clear();
   std::fill(drawn_.begin(), drawn_.end(), std::uint8_t(0));
   known_ = 0;
   triangles_ = 0;
@@ -105,9 +144,7 @@ std::vector<std::uint8_t> BoundarySurface::find_changes() {
     if (items.capacity() < points) items.reserve(points + points / 8);
     items.resize(points);
   };
-  grow(position_);
-  grow(kinds_);
-  grow(normal_);
+  grow(points_);
   grow(vertex_of_);
   parts_.resize(count);
   for (std::size_t i = before; i < count; ++i) {
@@ -125,34 +162,36 @@ std::vector<std::uint8_t> BoundarySurface::find_changes() {
     dirty[i] = 1;
     parts_[i].shown = shown;
     if (before != 0) mark_parents(i, changed, dirty);  // otherwise all are to be made
-    points_.clear();
-    mesher_.append_points(i, points_);
+    if (shown == 0) continue;
+    mesh_points_.clear();
+    mesher_.append_points(i, mesh_points_);
     const bool is_border = is_at_border(i);
-    for (const FrontMesher::Point& p : points_) {
-      position_[p.id] = p.position;
-      kinds_[p.id] = kinds_of(p, is_border);
+    for (const FrontMesher::Point& p : mesh_points_) {
+      points_[p.id].position = p.position;
+      points_[p.id].kinds = kinds_of(p, is_border);
     }
   }
   return dirty;
 }
 
 double BoundarySurface::volume_of(const Tet& tet) const {
-  const Position &o = position_[tet[0]], &a = position_[tet[1]], &b = position_[tet[2]], &c = position_[tet[3]];
+  const Position &o = position(tet[0]), &a = position(tet[1]), &b = position(tet[2]), &c = position(tet[3]);
   const auto from = [&o](const Position& p) { return Vec3{double(p[0] - o[0]), double(p[1] - o[1]), double(p[2] - o[2])}; };
   return triple_product(from(a), from(b), from(c)) / 6;
 }
 
-// Six times the volume under each triangle as seen from the middle of the box, with its sign: over a closed surface this
-// sums up to what it encloses.
-double BoundarySurface::volume_under(const std::vector<Triangle>& triangles) const {
-  const Vertex last = mesher_.state().domain.last();
-  const Position middle{last.x * (FrontMesher::kSteps / 2), last.y * (FrontMesher::kSteps / 2), last.z * (FrontMesher::kSteps / 2)};
-  const auto from_middle = [&](PointId point) {
-    const Position& p = position_[point];
-    return Vec3{double(p[0] - middle[0]), double(p[1] - middle[1]), double(p[2] - middle[2])};
-  };
+// The volume between each triangle and the plane across z through the middle of the box, with its sign: over a closed
+// surface this sums up to what it encloses. In steps, cubed.
+double BoundarySurface::volume_under(const Part& part) const {
+  const std::int64_t middle = std::int64_t(mesher_.state().domain.last().z) * (FrontMesher::kSteps / 2);
   double sum = 0;
-  for (const Triangle& t : triangles) sum += triple_product(from_middle(t.points[0]), from_middle(t.points[1]), from_middle(t.points[2]));
+  for (const Triangle& t : part.triangles) {
+    const Position &p = position(t[0]), &q = position(t[1]), &r = position(t[2]);
+    // Twice the area seen along z, and three times the mean distance
+    const std::int64_t area = std::int64_t(q[0] - p[0]) * (r[1] - p[1]) - std::int64_t(q[1] - p[1]) * (r[0] - p[0]);
+    const std::int64_t height = std::int64_t(p[2]) + q[2] + r[2] - 3 * middle;
+    sum += double(area) * double(height);
+  }
   return sum / 6;
 }
 
@@ -170,7 +209,7 @@ std::uint8_t BoundarySurface::kinds_of(const FrontMesher::Point& point, bool is_
 }
 
 Surface BoundarySurface::surface(PointId id) const {
-  const unsigned kinds = kinds_[id];
+  const unsigned kinds = points_[id].kinds;
   return (kinds >> kAlpha & 1) != 0 ? Surface::alpha : (kinds >> kBeta & 1) != 0 ? Surface::beta : Surface::inside;
 }
 
@@ -182,34 +221,25 @@ bool BoundarySurface::is_at_border(std::size_t number) const {
   return reaches(p.x, last.x) || reaches(p.y, last.y) || reaches(p.z, last.z);
 }
 
-void BoundarySurface::add_normals(const std::vector<Triangle>& triangles, int sign) {
-  const Affine& affine = mesher_.state().grid.affine;
-  for (const Triangle& t : triangles) {
-    if (t.kind >= kBox) continue;
-    std::array<Vec3, 3> corners{};  // from the first one
-    const Position& first = position_[t.points[0]];
-    for (std::size_t k = 1; k < 3; ++k) {
-      const Position& p = position_[t.points[k]];
-      corners[k] = affine.direction({double(p[0] - first[0]), double(p[1] - first[1]), double(p[2] - first[2])});
-    }
-    const auto added = angle_weighted_normals(corners, quick_arc_tangent);
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t i = 0; i < 3; ++i) normal_[t.points[k]][i] += sign * added[k][i];
+// Makes what the supercubes that are dirty left of the boundary.
+void BoundarySurface::remake(const std::vector<std::uint8_t>& dirty) {
+  NormalAdder take_back(*this, -1), add(*this, 1);
+  for (std::size_t number = 0; number < dirty.size(); ++number) {
+    if (dirty[number] != 0) take_back.add(parts_[number]);
   }
-}
-
-void BoundarySurface::remake(std::size_t number) {
-  Part& part = parts_[number];
-  add_normals(part.triangles, -1);
-  triangles_ -= part.triangles.size();
-  find_triangles(number);
-  // Exactly as much room as they need, if less than half of it is needed.
-  if (part.triangles.capacity() > 2 * triangles_made_.size()) part.triangles = std::vector<Triangle>();
-  part.triangles.assign(triangles_made_.begin(), triangles_made_.end());
-  part.volume = volume_under(part.triangles);
-  part.has_bound = false;
-  add_normals(part.triangles, 1);
-  triangles_ += part.triangles.size();
+  take_back.flush();
+  for (std::size_t number = 0; number < dirty.size(); ++number) {
+    if (dirty[number] == 0) continue;
+    Part& part = parts_[number];
+    triangles_ -= part.triangles.size();
+    find_triangles(number);
+    keep_triangles(part);
+    triangles_ += part.triangles.size();
+    part.volume = volume_under(part);
+    part.has_bound = false;
+    add.add(part);
+  }
+  add.flush();
 }
 
 void BoundarySurface::find_bound(std::size_t number, Part& part) {
@@ -228,33 +258,45 @@ void BoundarySurface::find_bound(std::size_t number, Part& part) {
   }
 }
 
-// Makes in triangles_made_ what a supercube left of the boundary.
+// Finds what a supercube left of the boundary.
 void BoundarySurface::find_triangles(std::size_t number) {
-  triangles_made_.clear();
+  for (auto& triangles : found_) triangles.clear();
   faces_.clear();
   mesher_.append_faces(number, faces_);
-  const auto lod = std::uint8_t(mesher_.block(number).scale);
   for (auto& [points, surface] : faces_) {
     if (is_mirrored_) std::swap(points[1], points[2]);
-    triangles_made_.push_back({points, std::uint8_t(surface == Surface::alpha ? kAlpha : kBeta), lod});
+    found_[surface == Surface::alpha ? kAlpha : kBeta].push_back(points);
   }
-  if (is_at_border(number)) add_box_faces(number);
+  if (is_at_border(number)) find_box_faces(number);
 }
 
-void BoundarySurface::add_box_faces(std::size_t number) {
-  const auto lod = std::uint8_t(mesher_.block(number).scale);
+void BoundarySurface::find_box_faces(std::size_t number) {
   tets_.clear();
   mesher_.append_tets(number, tets_);
   for (const Tet& tet : tets_) {
     std::array<unsigned, 4> kinds;
-    for (std::size_t k = 0; k < 4; ++k) kinds[k] = kinds_[tet[k]];
+    for (std::size_t k = 0; k < 4; ++k) kinds[k] = points_[tet[k]].kinds;
     for (const auto& face : kTetFaces) {
       const unsigned common = kinds[face[0]] & kinds[face[1]] & kinds[face[2]];
       if (common < 1u << kBox || (common & (1u << kAlpha | 1u << kBeta)) != 0) continue;
-      std::array<PointId, 3> points{tet[face[0]], tet[face[1]], tet[face[2]]};
+      Triangle points{tet[face[0]], tet[face[1]], tet[face[2]]};
       if (is_mirrored_) std::swap(points[1], points[2]);
-      triangles_made_.push_back({points, std::uint8_t(std::countr_zero(common)), lod});
+      found_[std::size_t(std::countr_zero(common))].push_back(points);
     }
+  }
+}
+
+// In place of what the part had, in order of kinds: exactly as much room as they need, if less than half of its room is needed.
+void BoundarySurface::keep_triangles(Part& part) {
+  std::size_t count = 0;
+  for (const auto& triangles : found_) count += triangles.size();
+  assert(count <= 0xffff && "each of a supercube's diamonds has a few dozen at most");
+  if (part.triangles.capacity() > 2 * count) part.triangles = std::vector<Triangle>();
+  part.triangles.clear();
+  part.triangles.reserve(count);
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    part.triangles.insert(part.triangles.end(), found_[kind].begin(), found_[kind].end());
+    part.end[kind] = std::uint16_t(part.triangles.size());
   }
 }
 
@@ -262,77 +304,75 @@ bool BoundarySurface::is_empty(std::uint32_t piece) const {
   return std::all_of(members_[piece].begin(), members_[piece].end(), [this](std::uint32_t number) { return parts_[number].triangles.empty(); });
 }
 
-SurfaceVertex BoundarySurface::vertex(PointId point, const Triangle& t) const {
-  const Position& p = position_[point];
-  SurfaceVertex v{float(p[0]) / FrontMesher::kSteps, float(p[1]) / FrontMesher::kSteps, float(p[2]) / FrontMesher::kSteps};
-  Vec3 normal{};
-  if (t.kind >= kBox) {
-    normal = scaled((t.kind - kBox) % 2 == 0 ? -1 : 1, box_normals_[std::size_t(t.kind - kBox) / 2]);
-  } else {
-    const NormalSum& sum = normal_[point];
-    normal = {double(sum[0]), double(sum[1]), double(sum[2])};
-    const double squared = dot(normal, normal);
-    normal = scaled(squared > 0 ? 1 / std::sqrt(squared) : 0, normal);
+// Appends a piece's triangles of one kind, and vertices for them with nothing but their level of detail.
+void BoundarySurface::add_triangles(std::size_t kind, SurfacePiece& piece) {
+  const std::size_t first = piece.points.size();  // of this kind's vertices
+  for (const std::uint32_t member : members_[piece.id]) {
+    const auto lod = std::uint8_t(mesher_.block(member).scale);
+    for (const Triangle& t : parts_[member].of_kind(kind)) {
+      for (const PointId point : t) {
+        // A sparse set (Briggs and Torczon 1993): vertex_of_ is not cleared; its entry counts if that vertex is this
+        // point's.
+        std::uint32_t& number = vertex_of_[point];
+        if (number < first || number >= piece.points.size() || piece.points[number] != point) {
+          number = std::uint32_t(piece.points.size());
+          piece.points.push_back(point);
+          piece.vertices.emplace_back().lod = lod;
+        }
+        piece.indices.push_back(number);
+        auto& finest = piece.vertices[number].lod;
+        finest = std::min(finest, lod);
+      }
+    }
   }
-  const auto coded = [](double c) { return std::int8_t(nearest_int(127 * c)); };
-  v.nx = coded(normal[0]);
-  v.ny = coded(normal[1]);
-  v.nz = coded(normal[2]);
-  v.lod = t.lod;
-  return v;
 }
 
-// Appends triangles of one kind, with their vertices. points: of the piece's vertices.
-void BoundarySurface::add_triangles(const std::vector<const Triangle*>& triangles, std::vector<PointId>& points, SurfacePiece& piece) {
-  const std::size_t first = points.size();  // of this kind's vertices
-  for (const Triangle* t : triangles) {
-    for (const PointId point : t->points) {
-      // A sparse set (Briggs and Torczon 1993): vertex_of_ is not cleared; its entry counts if that vertex is this
-      // point's.
-      std::uint32_t& number = vertex_of_[point];
-      if (number < first || number >= points.size() || points[number] != point) {
-        number = std::uint32_t(points.size());
-        points.push_back(point);
-        piece.vertices.push_back(vertex(point, *t));
-      }
-      piece.indices.push_back(number);
-      auto& lod = piece.vertices[number].lod;
-      lod = std::min(lod, t->lod);
+// The positions and normals of a piece's vertices from the given one on, which are all of one kind.
+void BoundarySurface::set_vertices(std::size_t kind, std::size_t first, SurfacePiece& piece) const {
+  Vec3 of_side{};
+  if (kind >= kBox) of_side = scaled((kind - kBox) % 2 == 0 ? -1 : 1, box_normals_[(kind - kBox) / 2]);
+  VectorLanes<float> vectors{};
+  VectorLanes<std::int8_t> normals{};
+  for (; first < piece.vertices.size(); first += kLanes) {
+    const std::size_t count = std::min(kLanes, piece.vertices.size() - first);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Point& point = points_[piece.points[first + i]];
+      SurfaceVertex& v = piece.vertices[first + i];
+      v.x = float(point.position[0]) / FrontMesher::kSteps;
+      v.y = float(point.position[1]) / FrontMesher::kSteps;
+      v.z = float(point.position[2]) / FrontMesher::kSteps;
+      for (std::size_t axis = 0; axis < 3; ++axis) vectors[axis][i] = kind >= kBox ? float(of_side[axis]) : float(point.normal[axis]);
+    }
+    make_unit_normals(vectors, normals);
+    for (std::size_t i = 0; i < count; ++i) {
+      SurfaceVertex& v = piece.vertices[first + i];
+      v.nx = normals[0][i];
+      v.ny = normals[1][i];
+      v.nz = normals[2][i];
     }
   }
 }
 
 SurfacePiece BoundarySurface::piece(std::uint32_t id, bool edges) {
-  std::array<std::size_t, kKinds> counts{};
-  std::size_t triangles = 0;
-  for (const std::uint32_t number : members_[id]) {
-    triangles += parts_[number].triangles.size();
-    for (const Triangle& t : parts_[number].triangles) ++counts[t.kind];
-  }
-  std::array<std::vector<const Triangle*>, kKinds> by_kind;
-  for (std::size_t kind = 0; kind < kKinds; ++kind) by_kind[kind].reserve(counts[kind]);
-  for (const std::uint32_t number : members_[id]) {
-    for (const Triangle& t : parts_[number].triangles) by_kind[t.kind].push_back(&t);
-  }
   SurfacePiece piece;
   piece.id = id;
-  std::vector<PointId> points;  // of the vertices: about one for two triangles
-  points.reserve(triangles);
+  std::size_t triangles = 0;
+  for (const std::uint32_t member : members_[id]) triangles += parts_[member].triangles.size();
+  piece.points.reserve(triangles);  // about one for two triangles
   piece.vertices.reserve(triangles);
   piece.indices.reserve(3 * triangles);
-  for (int kind = 0; kind < kKinds; ++kind) {
-    const int group = std::min(kind, kBox);
-    const std::size_t first = piece.indices.size();
-    add_triangles(by_kind[kind], points, piece);
-    piece.triangles[group] += std::uint32_t(by_kind[kind].size());
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    const std::size_t group = std::min(kind, kBox), first = piece.indices.size(), first_vertex = piece.vertices.size();
+    add_triangles(kind, piece);
+    set_vertices(kind, first_vertex, piece);
+    piece.triangles[group] += std::uint32_t((piece.indices.size() - first) / 3);
     if (edges) piece.edge_counts[group] += std::uint32_t(add_edges(std::span(piece.indices).subspan(first), piece.edges));
   }
-  piece.points = std::move(points);
   if (piece.vertices.empty()) return piece;
   piece.min = piece.max = {piece.vertices[0].x, piece.vertices[0].y, piece.vertices[0].z};
   for (const SurfaceVertex& v : piece.vertices) {
     const std::array<float, 3> p{v.x, v.y, v.z};
-    for (int i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3; ++i) {
       piece.min[i] = std::min(piece.min[i], p[i]);
       piece.max[i] = std::max(piece.max[i], p[i]);
     }
@@ -347,11 +387,11 @@ BoundarySurface::Change BoundarySurface::update() {
     change.reset = true;
   }
   const std::vector<std::uint8_t> dirty = find_changes();
+  remake(dirty);
   std::vector<std::uint8_t> pieces(members_.size());
   for (std::size_t i = 0; i < dirty.size(); ++i) {
     if (!dirty[i]) continue;
     change.is_other_mesh = true;
-    remake(i);
     pieces[parts_[i].piece] = 1;
   }
   for (std::uint32_t id = 0; id < pieces.size(); ++id) {

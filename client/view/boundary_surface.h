@@ -8,8 +8,10 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "client/view/corner_normals.h"
 #include "common/front/front.h"
 #include "common/front/front_mesher.h"
 #include "common/mesh/normals.h"
@@ -66,49 +68,56 @@ class BoundarySurface {
 
   // What the mesh is made of, and its points.
   [[nodiscard]] const FrontMesher& mesher() const { return mesher_; }
-  [[nodiscard]] const FrontMesher::Position& position(PointId id) const { return position_[id]; }
+  [[nodiscard]] const FrontMesher::Position& position(PointId id) const { return points_[id].position; }
   [[nodiscard]] Surface surface(PointId id) const;
 
  private:
   // What a triangle lies on: alpha, beta, or a side of the box: kBox + 2 * axis + (1 at the far side).
-  static constexpr int kAlpha = 0, kBeta = 1, kBox = 2, kKinds = 8;
-  struct Triangle {
-    std::array<PointId, 3> points;
-    std::uint8_t kind = 0, lod = 0;
+  static constexpr std::size_t kAlpha = 0, kBeta = 1, kBox = 2, kKinds = 8;
+  using Triangle = std::array<PointId, 3>;  // counterclockwise from outside in the world
+  struct Point {
+    FrontMesher::Position position{};
+    NormalSum normal{};      // of the triangles of the point's own surface
+    std::uint8_t kinds = 0;  // what it lies on, a bit each
   };
   struct Part {  // what a supercube left
     std::uint64_t shown = 0;
     std::uint32_t piece = 0;
     bool has_bound = false;
     double volume = 0, bound = 0;
-    std::vector<Triangle> triangles;
+    std::vector<Triangle> triangles;          // by kind
+    std::array<std::uint16_t, kKinds> end{};  // of each kind's triangles
+    [[nodiscard]] std::span<const Triangle> of_kind(std::size_t kind) const {
+      const std::size_t begin = kind == 0 ? 0 : end[kind - 1];
+      return std::span(triangles).subspan(begin, end[kind] - begin);
+    }
   };
+  class NormalAdder;
 
   [[nodiscard]] double samples_in_world() const;  // the volume of a cube of samples / kSteps, less than 0 if mirrored
   void forget_all();
   std::vector<std::uint8_t> find_changes();
   void mark_parents(std::size_t number, std::uint64_t slots, std::vector<std::uint8_t>& dirty) const;
   [[nodiscard]] std::uint32_t piece_of(std::size_t number) const;
-  void remake(std::size_t number);
   void find_bound(std::size_t number, Part& part);
   void find_triangles(std::size_t number);
-  void add_box_faces(std::size_t number);
-  [[nodiscard]] double volume_under(const std::vector<Triangle>& triangles) const;
+  void find_box_faces(std::size_t number);
+  void keep_triangles(Part& part);
+  [[nodiscard]] double volume_under(const Part& part) const;
   [[nodiscard]] std::uint8_t kinds_of(const FrontMesher::Point& point, bool is_border) const;
   [[nodiscard]] bool is_at_border(std::size_t number) const;
-  void add_normals(const std::vector<Triangle>& triangles, int sign);
+  void remake(const std::vector<std::uint8_t>& dirty);
   [[nodiscard]] bool is_empty(std::uint32_t piece) const;
   [[nodiscard]] double volume_of(const FrontMesher::Tet& tet) const;
-  [[nodiscard]] SurfaceVertex vertex(PointId point, const Triangle& t) const;
-  void add_triangles(const std::vector<const Triangle*>& triangles, std::vector<PointId>& points, SurfacePiece& piece);
+  void add_triangles(std::size_t kind, SurfacePiece& piece);
+  void set_vertices(std::size_t kind, std::size_t first, SurfacePiece& piece) const;
 
   FrontMesher mesher_;
   bool is_mirrored_;                 // what is counterclockwise in samples is not in the world
   std::array<Vec3, 3> box_normals_;  // by axis, in the world: of the box's far side
   std::uint64_t point_generation_ = 0;
-  std::vector<FrontMesher::Position> position_;      // by PointId
-  std::vector<std::uint8_t> kinds_;                  // by PointId: what it lies on, a bit each
-  std::vector<NormalSum> normal_;                    // by PointId: of the triangles of the point's own surface
+  CornerNormals corner_normals_;
+  std::vector<Point> points_;                        // by PointId
   std::vector<std::uint32_t> vertex_of_;             // by PointId: its vertex in the piece being assembled, if that vertex has this id
   std::vector<Part> parts_;                          // by number of the supercube
   std::size_t known_ = 0;                            // how many of them the last update saw
@@ -116,11 +125,11 @@ class BoundarySurface {
   std::vector<std::uint8_t> drawn_;                  // whether a piece had triangles, by id
   std::uint64_t triangles_ = 0;
   // Room to work in.
-  std::vector<FrontMesher::Point> points_;
+  std::vector<FrontMesher::Point> mesh_points_;
   FrontMesher::Tets tets_;
   std::vector<FrontMesher::Half> halves_;
   std::vector<FrontMesher::Face> faces_;
-  std::vector<Triangle> triangles_made_;
+  std::array<std::vector<Triangle>, kKinds> found_;  // by kind
 };
 
 }  // namespace intervale

@@ -155,8 +155,8 @@ class SupercubeNeighbours {
   int scale_ = 0;
   Vertex position_;
   const std::array<Links, kSlots>* links_ = nullptr;
-  std::array<std::uint64_t, 2> known_{};  // a bit for each neighbour looked up; unused for pointers
-  std::array<Found, kNeighbours> found_{};
+  std::array<std::uint64_t, 2> known_{};         // a bit for each neighbour looked up; unused for pointers
+  std::array<Found, kNeighbours> found_;         // unset until it moves: some front cursors look at one supercube only
   std::array<Slot, kNeighbours> corner_slot_{};  // of a corner's vertex; 0 elsewhere
 };
 

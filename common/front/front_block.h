@@ -58,18 +58,41 @@ class SlotSplits {
     split.bits = std::uint32_t(from[4]) | std::uint32_t(from[5]) << 8 | std::uint32_t(from[6]) << 16;
     return split;
   }
-  void set(std::size_t slot, const FrontSplit& split) {
-    std::uint8_t* const to = bytes_.obtain(slot, kBytes);
-    std::memcpy(to, &split.first, sizeof split.first);
-    for (int i = 0; i < 3; ++i) to[4 + i] = std::uint8_t(split.bits >> (8 * i));
+  void set(std::size_t slot, const FrontSplit& split) { store(bytes_.obtain(slot, kBytes), split); }
+  void clear() { bytes_.replace(0, kBytes); }
+  // Keeps the splits of `slots`, all of which were set, and no others.
+  void keep(std::uint64_t slots) { bytes_.reshape(slots, kBytes); }
+  // Replaces all: with split_of(slot), called for each of `slots` in ascending order.
+  template <class SplitOf>
+  void assign(std::uint64_t slots, const SplitOf& split_of) {
+    bytes_.replace(slots, kBytes);
+    std::uint8_t* to = begin();
+    for (const int slot : set_bits(slots)) {
+      store(to, split_of(std::size_t(slot)));
+      to += kBytes;
+    }
   }
-  // Keeps the splits of `slots` and no others; those that were not set are to be set.
-  void reshape(std::uint64_t slots) { bytes_.reshape(slots, kBytes); }
+  // Gives the points of all splits numbers that are greater by so many.
+  void renumber(PointId by) {
+    std::uint8_t* to = begin();
+    for (int left = std::popcount(slots()); left > 0; --left) {
+      PointId first = 0;
+      std::memcpy(&first, to, sizeof first);
+      first += by;
+      std::memcpy(to, &first, sizeof first);
+      to += kBytes;
+    }
+  }
   [[nodiscard]] std::size_t memory_bytes() const { return bytes_.memory_bytes(); }
 
  private:
   static constexpr std::size_t kBytes = 7;
   static_assert(FrontSplit::kSideBit + 2 <= 8 * (int(kBytes) - int(sizeof(PointId))));
+  static void store(std::uint8_t* to, const FrontSplit& split) {
+    std::memcpy(to, &split.first, sizeof split.first);
+    for (int i = 0; i < 3; ++i) to[4 + i] = std::uint8_t(split.bits >> (8 * i));
+  }
+  [[nodiscard]] std::uint8_t* begin() { return slots() == 0 ? nullptr : bytes_.at(std::size_t(std::countr_zero(slots()))); }
   SlotBytes bytes_;
 };
 

@@ -97,23 +97,31 @@ void FrontMesher::append_cuts(FrontCursor& cursor, const Diamond& d, std::vector
   const bool on_border = may_clamp && is_on_border(d.centre);
   const Vertex c = may_clamp ? state_.domain.clamp(d.centre) : d.centre;
   const double centre = values.format.value(cursor.here().key[slot]);
+  const std::array<double, 3> kappa{0, values.range.alpha, values.range.beta};
   PointId id = split.first;
   for (std::uint32_t bits = split.cut_bits(); bits != 0;) {
     const int v = std::countr_zero(bits) / 2;
     const PointId first = id;
-    const Surface surface = (bits >> (2 * v) & 1) != 0 ? Surface::alpha : Surface::beta;
-    id += PointId(split.cut_count(v));
+    const unsigned surfaces = split.cuts_to(v);
+    id += PointId(std::popcount(surfaces));
     bits &= ~(3u << (2 * v));
     if (!wanted.empty() && wanted[first] == 0 && wanted[id - 1] == 0) continue;
     const FrontCursor::Neighbour vertex = cursor.at(links.vertex[v]);
-    const Cuts cuts = cuts_between(centre, values.format.value(vertex.block.key[vertex.slot]), values.range);
+    const double value = values.format.value(vertex.block.key[vertex.slot]);
     const Vertex end = d.vertex(v), e = may_clamp ? state_.domain.clamp(end) : end;
     const bool ends_on_border = on_border || (may_clamp && is_on_border(end));
-    for (int i = 0; i < cuts.count; ++i) {
-      const std::int32_t t = 2 * cuts.q[i] + 1;
+    const auto add = [&](PointId point, std::uint8_t q, Surface surface) {
+      const std::int32_t t = 2 * q + 1;
       const Position at{c.x * kSteps + (e.x - c.x) * t, c.y * kSteps + (e.y - c.y) * t, c.z * kSteps + (e.z - c.z) * t};
-      points.push_back({first + PointId(i), at, i == 0 ? surface : Surface::beta, ends_on_border});
+      points.push_back({point, at, surface, ends_on_border});
       if (ends != nullptr) ends->push_back({d.centre, end, t});
+    };
+    if (surfaces == 3) {
+      const Cuts cuts = cuts_between(centre, value, values.range);
+      add(first, cuts.q[0], Surface::alpha);
+      add(first + 1, cuts.q[1], Surface::beta);
+    } else {
+      add(first, cut_between(centre, value, kappa[surfaces]), surfaces == 1 ? Surface::alpha : Surface::beta);
     }
   }
   if (split.side() != Side::inside) return;

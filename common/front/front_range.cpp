@@ -3,6 +3,8 @@
 // Passes over the supercubes, each of which many threads can share: the sides of the centres; which diamonds count;
 // ancestors of those, from the finest scale on and class by class, so that a parent is complete before its own parents
 // follow; then the points of what is shown. Only the first pass visits supercubes whose diamonds are all on one side.
+// What counts is looked at with its vertices once: its cuts, and the tetrahedra that it adds, are kept until its points
+// are placed.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -56,53 +58,71 @@ class Reclassification {
 
   // The sides of all centres. Finds the supercubes where diamonds may count.
   void find_sides() {
-    std::vector<std::vector<Block*>> found((state_.blocks.size() + kPiece - 1) / kPiece);
+    std::vector<std::vector<std::uint32_t>> found((state_.blocks.size() + kPiece - 1) / kPiece);
     for_each_piece(state_.blocks.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
       for (std::size_t number = std::max<std::size_t>(1, begin); number < end; ++number) {  // the first has the corners
         Block& block = state_.blocks[number];
         block.shown = block.counts = 0;
-        block.placed.reshape(0);
         const std::optional<Side> all = side_of_all(block);
         if (all) {
           block.above = *all == Side::above ? block.split : 0;
           block.inside = *all == Side::inside ? block.split : 0;
-          if (*all != Side::inside || values_.refine != Refine::uniform) continue;
+          if (*all != Side::inside || values_.refine != Refine::uniform) {
+            block.placed.clear();
+            continue;
+          }
         } else {
           block.above = block.key.at_least(values_.sides.first_above()) & block.split;
           block.inside = block.key.at_least(values_.sides.first_inside()) & block.split & ~block.above;
         }
-        if (block.split != 0) found[piece].push_back(&block);
+        if (block.split != 0) found[piece].push_back(std::uint32_t(number));
       }
     });
     for (const auto& some : found) active_.insert(active_.end(), some.begin(), some.end());
   }
 
   void find_counting() {
-    for_each_piece(active_.size(), [this](std::size_t begin, std::size_t end, std::size_t) {
+    cut_bits_.resize((active_.size() + kPiece - 1) / kPiece);
+    cut_bits_of_.resize(state_.blocks.size());
+    std::vector<std::int64_t> tets(cut_bits_.size());
+    for_each_piece(active_.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
       FrontCursor cursor(state_);
-      for (std::size_t i = begin; i < end; ++i) count_in(*active_[i], cursor);
+      std::size_t splits = 0;
+      for (std::size_t i = begin; i < end; ++i) splits += std::size_t(std::popcount(state_.blocks[active_[i]].split));
+      std::vector<std::uint32_t>& bits = cut_bits_[piece];
+      bits.reserve(splits);
+      for (std::size_t i = begin; i < end; ++i) {
+        cut_bits_of_[active_[i]] = bits.data() + bits.size();
+        tets[piece] += count_in(state_.blocks[active_[i]], cursor, bits);
+      }
     });
+    for (const std::int64_t some : tets) state_.tet_count += std::uint64_t(some);
   }
 
-  // Shows the diamonds that count, and writes the bits of their splits.
-  void count_in(Block& block, FrontCursor& cursor) const {
+  // Shows the diamonds that count, and appends which edges of each are cut. Returns how many tetrahedra their splits
+  // add.
+  [[nodiscard]] std::int64_t count_in(Block& block, FrontCursor& cursor, std::vector<std::uint32_t>& cut_bits) const {
     cursor.move_to(block.scale, block.position);
-    std::array<Split, kSlots> splits;
+    std::int64_t tets = 0;
     for (const Slot slot : set_bits<Slot>(block.split)) {
       const Side side = block.side(slot);
       if (!cursor.gather_sides(slot) || !counts(cursor.context(), side, values_.refine)) continue;
       block.counts |= bit(slot);
-      splits[slot].bits = cursor.context().cut_bits(side) | std::uint32_t(side) << Split::kSideBit;
+      cut_bits.push_back(cursor.context().cut_bits(side));
+      tets += cursor.added_tets(split_of(side, cut_bits.back()));
     }
-    block.placed.reshape(block.counts);
-    for (const Slot slot : set_bits<Slot>(block.counts)) block.placed.set(slot, splits[slot]);
     block.shown = block.counts;
+    if (block.shown == 0) block.placed.clear();
+    return tets;
   }
+
+  static Split split_of(Side side, std::uint32_t cut_bits) { return {cut_bits | std::uint32_t(side) << Split::kSideBit, 0}; }
 
   void show_ancestors() {
     std::array<std::vector<Block*>, kMaxLevels + 1> of_scale;
-    for (Block* const block : active_) {
-      if (block->shown != 0) of_scale[std::size_t(block->scale)].push_back(block);
+    for (const std::uint32_t number : active_) {
+      Block& block = state_.blocks[number];
+      if (block.shown != 0) of_scale[std::size_t(block.scale)].push_back(&block);
     }
     std::vector<std::vector<Block*>> reached;  // by piece: supercubes where nothing was shown before
     for (std::vector<Block*>& blocks : of_scale) {
@@ -149,9 +169,8 @@ class Reclassification {
     for_each_piece(shown_.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
       FrontCursor cursor(state_);
       for (std::size_t i = begin; i < end; ++i) {
-        Block& block = state_.blocks[shown_[i]];
-        placed[piece].shown += std::uint64_t(std::popcount(block.shown));
-        placed[piece].tets += place_in(block, cursor, placed[piece].points);
+        placed[piece].shown += std::uint64_t(std::popcount(state_.blocks[shown_[i]].shown));
+        placed[piece].tets += place_in(shown_[i], cursor, placed[piece].points);
       }
     });
     state_.shown_count = 0;
@@ -164,30 +183,27 @@ class Reclassification {
       state_.tet_count += std::uint64_t(piece.tets);
     }
     for_each_piece(shown_.size(), [&](std::size_t begin, std::size_t end, std::size_t piece) {
-      for (std::size_t i = begin; i < end; ++i) {
-        Block& block = state_.blocks[shown_[i]];
-        for (const Slot slot : set_bits<Slot>(block.placed.slots())) {
-          Split split = block.placed[slot];
-          split.first += base[piece];
-          block.placed.set(slot, split);
-        }
-      }
+      for (std::size_t i = begin; i < end; ++i) state_.blocks[shown_[i]].placed.renumber(base[piece]);
     });
   }
 
-  // points: how many were given before. Returns how many tetrahedra the splits add.
-  static std::int64_t place_in(Block& block, FrontCursor& cursor, PointId& points) {
-    std::int64_t tets = 0;
-    block.placed.reshape(block.counts | (block.shown & block.inside));
-    cursor.move_to(block.scale, block.position);
-    for (const Slot slot : set_bits<Slot>(block.shown)) {
-      // What does not count has its vertices and its centre on one side.
-      Split split{std::uint32_t(block.side(slot)) << Split::kSideBit, points};
-      if (block.is_counting(slot)) split.bits = block.placed[slot].bits;
-      if (block.placed.has(slot)) block.placed.set(slot, split);
+  // points: how many were given before. Returns how many tetrahedra the splits add that do not count.
+  [[nodiscard]] std::int64_t place_in(std::uint32_t number, FrontCursor& cursor, PointId& points) const {
+    Block& block = state_.blocks[number];
+    const std::uint32_t* cut_bits = cut_bits_of_[number];
+    block.placed.assign(block.counts | (block.shown & block.inside), [&](std::size_t slot) {
+      Split split = split_of(block.side(Slot(slot)), block.is_counting(Slot(slot)) ? *cut_bits++ : 0);
+      split.first = points;
       points += split.points();
-      cursor.gather_own(slot);
-      tets += cursor.added_tets(split);
+      return split;
+    });
+    // What does not count has its vertices and its centre on one side.
+    std::int64_t tets = 0;
+    const std::uint64_t whole = block.shown & block.inside & ~block.counts;
+    if (whole != 0) cursor.move_to(block.scale, block.position);
+    for (const Slot slot : set_bits<Slot>(whole)) {
+      cursor.gather_one_sided(slot);
+      tets += cursor.added_tets(split_of(Side::inside, 0));
     }
     return tets;
   }
@@ -195,8 +211,10 @@ class Reclassification {
   FrontState& state_;
   FrontValues& values_;
   const ParallelFor& parallel_;
-  std::vector<Block*> active_;        // supercubes with diamonds that may count
-  std::vector<std::uint32_t> shown_;  // numbers of the supercubes with diamonds that are shown
+  std::vector<std::uint32_t> active_;                 // numbers of the supercubes with diamonds that may count
+  std::vector<std::vector<std::uint32_t>> cut_bits_;  // by piece of those: of the diamonds that count
+  std::vector<const std::uint32_t*> cut_bits_of_;     // by number of the supercube: where its diamonds' begin
+  std::vector<std::uint32_t> shown_;                  // numbers of the supercubes with diamonds that are shown
 };
 
 // Hides all splits, and shows those that count from the coarsest scale on until one does not fit.

@@ -27,7 +27,7 @@ void FrontState::pack() {
   std::deque<Block> kept;
   PointId kept_points = 0;
   const auto pack_points = [&](Block& block) {
-    block.placed.reshape(block.placed.slots() & block.shown);
+    block.placed.keep(block.placed.slots() & block.shown);
     for (const Slot slot : set_bits<Slot>(block.placed.slots())) {
       Split s = block.placed[slot];
       s.first = kept_points;

@@ -35,4 +35,14 @@ void SlotBytes::reshape(std::uint64_t slots, std::size_t bytes) {
   *this = std::move(to);
 }
 
+void SlotBytes::replace(std::uint64_t slots, std::size_t bytes) {
+  const auto size = std::size_t(std::popcount(slots));
+  if (bytes != bytes_per_ || size > capacity_ || 2 * size < capacity_) {
+    bytes_per_ = std::uint8_t(bytes);
+    capacity_ = std::uint8_t(size);
+    bytes_ = size == 0 ? nullptr : std::make_unique<std::uint8_t[]>(memory_bytes());
+  }
+  slots_ = slots;
+}
+
 }  // namespace intervale

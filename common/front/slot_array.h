@@ -43,6 +43,8 @@ class SlotBytes {
   std::uint8_t* obtain(std::size_t slot, std::size_t bytes);
   // Keeps the elements of `slots` and no others; those that were not set are new.
   void reshape(std::uint64_t slots, std::size_t bytes);
+  // Elements of any value for `slots`, and no others. In the memory it has, if it needs half of that or more.
+  void replace(std::uint64_t slots, std::size_t bytes);
 
  private:
   static constexpr std::size_t kGrowth = 8;  // elements
@@ -60,7 +62,7 @@ class SlotKeys {
   void set(std::size_t slot, ValueKey key, ValueKey last) { store(bytes_.obtain(slot, width(last)), key); }
   // Replaces all: keys[slot] for each of `slots`.
   void assign(std::uint64_t slots, const std::array<ValueKey, kSlots>& keys, ValueKey last) {
-    bytes_.reshape(slots, width(last));
+    bytes_.replace(slots, width(last));
     std::uint8_t* to = slots == 0 ? nullptr : bytes_.at(std::size_t(std::countr_zero(slots)));
     for (const int slot : set_bits(slots)) {
       store(to, keys[std::size_t(slot)]);

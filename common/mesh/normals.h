@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <numbers>
 
 #include "common/util/vec3.h"
@@ -19,6 +20,7 @@ namespace intervale {
 
 // In steps of 2^-20; only its direction matters.
 using NormalSum = std::array<std::int32_t, 3>;
+inline constexpr double kNormalSteps = 1 << 20;
 
 // The nearest whole number, of two the even one. value: within 2^31 of 0. Its bits follow a sum that has no bits below
 // 1: one addition, where std::rint() and a conversion are several instructions.
@@ -34,7 +36,7 @@ using NormalSum = std::array<std::int32_t, 3>;
 // 0. Its precision is the caller's choice, since it takes much of the time.
 template <class ArcTangent>
 [[nodiscard]] std::array<NormalSum, 3> angle_weighted_normals(const std::array<Vec3, 3>& corners, const ArcTangent& arc_tangent) {
-  constexpr double kSteps = 1 << 20, kPi = 3.14159265358979323846;
+  constexpr double kPi = std::numbers::pi;
   std::array<NormalSum, 3> added{};
   const Vec3 first = subtract(corners[1], corners[0]), second = subtract(corners[2], corners[1]), third = subtract(corners[0], corners[2]);
   const Vec3 normal = cross(first, second);
@@ -44,21 +46,22 @@ template <class ArcTangent>
   // same number.
   const double a = arc_tangent(twice_area, -dot(third, first)), b = arc_tangent(twice_area, -dot(first, second));
   const std::array<double, 3> angle{a, b, kPi - a - b};
-  const double steps = kSteps / twice_area;
+  const double steps = kNormalSteps / twice_area;
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t i = 0; i < 3; ++i) added[k][i] = nearest_int(angle[k] * steps * normal[i]);
   }
   return added;
 }
 
-// To 1e-5 (Abramowitz and Stegun 4.4.47), several times faster than std::atan2. y: above 0. Without branches, which would
-// be as likely to go one way as the other.
-[[nodiscard]] inline double quick_arc_tangent(double y, double x) {
-  constexpr double kHalf = std::numbers::pi / 2, kQuarter = std::numbers::pi / 4;
-  const double along = std::abs(x), t = std::min(y, along) / std::max(y, along), s = t * t;
-  const double part = t * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))));
-  const double angle = kQuarter - std::copysign(kQuarter - part, along - y);  // part, or what it lacks to a right angle
-  return kHalf - std::copysign(kHalf - angle, x);                             // angle, or what it lacks to a straight one
+// To 1e-5 (Abramowitz and Stegun 4.4.47), several times faster than std::atan2. y: 0 or above; of two zeros, some finite
+// number. Without branches, which would be as likely to go one way as the other.
+template <class Real>
+[[nodiscard]] inline Real quick_arc_tangent(Real y, Real x) {
+  constexpr Real kHalf = std::numbers::pi_v<Real> / 2, kQuarter = kHalf / 2;
+  const Real along = std::abs(x), t = std::min(y, along) / std::max(std::max(y, along), std::numeric_limits<Real>::min()), s = t * t;
+  const Real part = t * (Real(0.9998660) + s * (Real(-0.3302995) + s * (Real(0.1801410) + s * (Real(-0.0851330) + s * Real(0.0208351)))));
+  const Real angle = kQuarter - std::copysign(kQuarter - part, along - y);  // part, or what it lacks to a right angle
+  return kHalf - std::copysign(kHalf - angle, x);                           // angle, or what it lacks to a straight one
 }
 
 }  // namespace intervale

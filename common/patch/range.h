@@ -35,20 +35,31 @@ struct Cuts {
   return c;
 }
 
+// How far kappa lies from `low` to `high`, in 512ths rounded down, at most 511. low < high, kappa between them.
+[[nodiscard]] inline unsigned half_steps_to(double kappa, double low, double high) {
+  const double whole = high / 2 - low / 2;  // halved: the difference of two doubles can overflow
+  return unsigned(std::clamp((kappa / 2 - low / 2) / whole * 512, 0.0, 511.0));
+}
+
+// The cut of an edge by the surface of kappa alone. The ends' values are on different sides of it. Without branches, for
+// either end is as likely to be the greater one.
+[[nodiscard]] inline std::uint8_t cut_between(double from, double to, double kappa) {
+  const unsigned q = half_steps_to(kappa, std::min(from, to), std::max(from, to)) / 2;
+  return std::uint8_t(q ^ (0u - unsigned(from > to)));  // 255 - q seen from the other end
+}
+
 // The cuts of an edge whose ends have the finite values `from` and `to`; exchanging the ends gives the reversed cuts.
 // Where alpha < beta and both surfaces cut, the cut nearer to `from` stays strictly nearer: if quantisation makes them
 // equal, one moves by a step, so that neither is off by more than a step; nor by more than one and a half at the ends of the edge.
 [[nodiscard]] inline Cuts cuts_between(double from, double to, const Range& range) {
   const double low = std::min(from, to), high = std::max(from, to);
   const Side a = side_of(low, range), b = side_of(high, range);
-  const double whole = high / 2 - low / 2;  // halved: the difference of two doubles can overflow
-  const auto half_steps = [low, whole](double kappa) { return unsigned(std::clamp((kappa / 2 - low / 2) / whole * 512, 0.0, 511.0)); };
   Cuts cuts;
-  if (alpha_cuts(a, b)) cuts.q[cuts.count++] = std::uint8_t(half_steps(range.alpha) / 2);
-  if (beta_cuts(a, b)) cuts.q[cuts.count++] = std::uint8_t(half_steps(range.beta) / 2);
+  if (alpha_cuts(a, b)) cuts.q[cuts.count++] = std::uint8_t(half_steps_to(range.alpha, low, high) / 2);
+  if (beta_cuts(a, b)) cuts.q[cuts.count++] = std::uint8_t(half_steps_to(range.beta, low, high) / 2);
   if (cuts.count == 2 && range.alpha < range.beta && cuts.q[0] == cuts.q[1]) {
     // If beta lies in the lower half of the step, so does alpha.
-    const bool is_lower = half_steps(range.beta) % 2 == 0;
+    const bool is_lower = half_steps_to(range.beta, low, high) % 2 == 0;
     if (cuts.q[0] == 255 || (is_lower && cuts.q[0] > 0)) {
       --cuts.q[0];
     } else {

@@ -312,7 +312,7 @@ TEST(Normals, TheQuickArcTangentIsOffByLittle) {
       ASSERT_NEAR(quick_arc_tangent(y, x), std::atan2(y, x), 2e-5) << "length " << length << ", angle " << angle;
     }
   }
-  EXPECT_NEAR(quick_arc_tangent(2, 0), std::atan2(2, 0), 1e-12);
+  EXPECT_NEAR(quick_arc_tangent(2.0, 0.0), std::atan2(2, 0), 1e-12);
 }
 
 TEST(Normals, TheNearestIntIsThatOfRint) {

@@ -49,6 +49,20 @@ TEST(Range, AnEdgeIsCutAlikeFromBothEnds) {
   }
 }
 
+TEST(Range, TheCutOfOneSurfaceIsThatOfTheRangeItBounds) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> value(-10, 10);
+  for (int i = 0; i < 100000; ++i) {
+    const double from = value(random), to = value(random), kappa = value(random);
+    for (const Range range : {Range{kappa, kInf}, Range{-kInf, kappa}}) {
+      const Cuts cuts = cuts_between(from, to, range);
+      if (cuts.count != 0) {
+        ASSERT_EQ(cuts.q[0], cut_between(from, to, kappa)) << from << " to " << to << ", " << kappa;
+      }
+    }
+  }
+}
+
 TEST(Range, EqualBoundsCutAtOnePlace) {
   const Cuts c = cuts_between(0, 10, {5, 5});
   EXPECT_EQ(c.count, 2);
