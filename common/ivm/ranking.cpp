@@ -17,6 +17,8 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
   if (lod.camera) {
     screen_.emplace(*lod.camera, g);
     pixel_error_ = float(lod.camera->pixel_error);
+    const Vec3 spacing = g.affine.spacing();
+    spacing_ = std::cbrt(spacing[0]) * std::cbrt(spacing[1]) * std::cbrt(spacing[2]);
   }
 }
 
@@ -36,13 +38,22 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
     b.bound_ = Rank(step + 1);
     return b;
   }
-  b.pixels_ = float(screen_->pixels_per_unit(region));
+  b.pixels_ = pixels_per_unit(region);
   b.near_ = screen_->is_near(region);
+  b.area_ = area_of(region, b.scale_, b.pixels_, !b.near_);
   const float pixels = object_error * b.pixels_;
-  if (pixels > pixel_error_) b.bound_ = rank_of(pixels);
-  b.off_centre_ = screen_->is_central(region) ? 0 : kOffCentre;  // the middle of the picture comes a little sooner
-  if (!b.near_ && b.bound_ != 0) b.bound_ = Rank(b.bound_ - b.off_centre_);
+  if (pixels > pixel_error_) b.bound_ = rank_of(importance_of(pixels, b.area_));
   return b;
+}
+
+float Ranking::pixels_per_unit(const ScreenError::Region& region) const {
+  return float(std::min(screen_->pixels_per_unit(region), double(kMostImportance)));
+}
+
+// Of the surfaces of a diamond in the region; if not exact, at most. pixels: of one world unit there.
+float Ranking::area_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const {
+  const double h = std::ldexp(spacing_, scale) * double(pixels);
+  return float(std::clamp(h * h * (is_exact ? screen_->seen_share(region) : 1), 1e-30, 1e30));
 }
 
 Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, SupercubeKey key) const {
@@ -52,20 +63,16 @@ Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, Supercube
   s.key_ = key;
   s.scale_ = scale_;
   s.pixels_ = pixels_;
-  s.off_centre_ = off_centre_;
+  s.area_ = area_;
   if (near_) {
     const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
-    s.pixels_ = float(ranking_->screen_->pixels_per_unit(region));
-    s.off_centre_ = ranking_->screen_->is_central(region) ? 0 : kOffCentre;
+    s.pixels_ = ranking_->pixels_per_unit(region);
+    s.area_ = ranking_->area_of(region, scale_, s.pixels_, true);
   }
   return s;
 }
 
-double Ranking::bound(Rank rank) const {
-  if (rank == 0) return 0;
-  if (!screen_) return double(volume_.error_steps()[rank - 1u]);
-  return double(pixels_of(rank + 1 + kOffCentre));
-}
+double Ranking::error(Rank rank) const { return rank == 0 ? 0 : double(volume_.error_steps()[rank - 1u]); }
 
 Ranking::Rank Ranking::band_below(Rank top) const {
   if (screen_) return Rank(std::max(1, top - kBand + 1));

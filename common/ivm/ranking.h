@@ -1,11 +1,15 @@
 // Which updates a level of detail wants for their own sake, not as an ancestor of another, and in which order. Pure: a
 // function of the data set and the level of detail.
 //
-// Without a camera, updates are ranked by their field error; with one, by the deviation in pixels, on the screen, of
-// the surfaces that they move. Pixels a world unit are computed once a supercube, or once a brick that is far away, for
-// its nearest visible point.
+// Without a camera, updates are ranked by their field error. With one, those are wanted that move surfaces by more than
+// its pixel error; they are ranked by the squared deviation on the screen that they remove, summed up over the picture:
+// by the square of the deviation in pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2,
+// as far as they are in the picture. So what is large in the picture comes before what is far off in one place. Pixels
+// a world unit, for the nearest visible point, and the share that is seen are computed once a supercube, or once a
+// brick that is far away.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -37,16 +41,16 @@ class Ranking {
       if (step < ranking_->least_step_) return 0;
       if (!ranking_->screen_) return float(step + 1);
       const float pixels = ranking_->relevant_.object_error(supercube_, scale_, step) * pixels_;
-      return pixels > ranking_->pixel_error_ ? pixels : 0;
+      return pixels > ranking_->pixel_error_ ? importance_of(pixels, area_) : 0;
     }
     // The least importance of this rank, 1 or more; and the rank of an importance.
     [[nodiscard]] float least(Rank rank) const {
       if (!ranking_->screen_) return float(rank);
-      return rank + off_centre_ <= kLast ? std::numeric_limits<float>::denorm_min() : pixels_of(rank + off_centre_);
+      return rank <= 1 ? kLeastImportance : std::bit_cast<float>(std::uint32_t(rank + kRankFrom) << kRankShift);
     }
     [[nodiscard]] Rank rank(float importance) const {
       if (importance == 0) return 0;
-      return ranking_->screen_ ? Rank(rank_of(importance) - off_centre_) : Rank(importance);
+      return ranking_->screen_ ? rank_of(importance) : Rank(importance);
     }
     // No lower than the rank of any update here whose error step is no higher.
     [[nodiscard]] Rank bound(unsigned step) const { return rank(importance(step)); }
@@ -64,8 +68,9 @@ class Ranking {
     const Ranking* ranking_ = nullptr;
     SupercubeIndex supercube_;
     SupercubeKey key_ = 0;
-    int scale_ = 0, off_centre_ = 0;
+    int scale_ = 0;
     float pixels_ = 0;  // of one world unit
+    float area_ = 0;    // that the surfaces of a diamond cover in the picture, in pixels
   };
 
   // Ranks the supercubes of one brick.
@@ -74,13 +79,16 @@ class Ranking {
     // No lower than the rank of any update here.
     [[nodiscard]] Rank bound() const { return bound_; }
     [[nodiscard]] Supercube supercube(SupercubeIndex supercube, SupercubeKey key) const;
+    // With a camera: no less than the deviation in pixels of any update here whose object error is no larger, or 2^100.
+    // Above 0.
+    [[nodiscard]] float pixels(float object_error) const { return std::clamp(object_error * pixels_, kLeastImportance, kMostImportance); }
 
    private:
     friend class Ranking;
     const Ranking* ranking_ = nullptr;
-    int scale_ = 0, off_centre_ = 0;
+    int scale_ = 0;
     bool near_ = false;  // distances from the camera to its supercubes differ much
-    float pixels_ = 0;
+    float pixels_ = 0, area_ = 0;
     Rank bound_ = 0;
   };
   [[nodiscard]] Brick of_brick(BrickIndex brick) const {
@@ -89,25 +97,26 @@ class Ranking {
   // The same, if only updates with no higher error step and no larger object error remain.
   [[nodiscard]] Brick of_brick(BrickIndex brick, unsigned step, float object_error) const;
 
-  // The error that remains once all updates of higher ranks are applied: the largest field error, or the pixels on the
-  // screen, of this rank.
-  [[nodiscard]] double bound(Rank rank) const;
-  // The lowest rank of the band that is sent as one with `top`: errors on the screen differ by a factor of 2 at most,
-  // field errors by 4.
+  // Without a camera: the largest field error that remains once all updates of higher ranks are applied.
+  [[nodiscard]] double error(Rank rank) const;
+  // The lowest rank of the band that is sent as one with `top`: field errors, and with a camera importances, differ by a
+  // factor of 4 at most.
   [[nodiscard]] Rank band_below(Rank top) const;
 
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
 
  private:
-  // Pixels as ranks: sixteen an octave, from the bits of the float. The lowest is kLast; pixels are capped at 2^100, so
-  // that bound() is finite for any camera. Outside the middle of the picture, ranks are lower by kOffCentre.
-  static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 16, kOffCentre = 4, kLast = kOffCentre + 1;
-  [[nodiscard]] static Rank rank_of(float pixels) {
-    const int rank = int(std::bit_cast<std::uint32_t>(pixels < 0x1p100f ? pixels : 0x1p100f) >> kRankShift) - kRankFrom;
-    return Rank(rank < kLast ? kLast : rank);
+  static constexpr float kLeastImportance = std::numeric_limits<float>::min(), kMostImportance = 0x1p100f;
+  // Squared deviation times area, in pixels to the fourth. Above 0.
+  [[nodiscard]] static float importance_of(float pixels, float area) { return std::max(pixels * pixels * area, kLeastImportance); }
+  // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1.
+  static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 32;
+  [[nodiscard]] static Rank rank_of(float importance) {
+    const int rank = int(std::bit_cast<std::uint32_t>(importance < kMostImportance ? importance : kMostImportance) >> kRankShift) - kRankFrom;
+    return Rank(std::max(rank, 1));
   }
-  // The least pixels of a rank in the middle of the picture.
-  [[nodiscard]] static float pixels_of(int rank) { return std::bit_cast<float>(std::uint32_t(rank + kRankFrom) << kRankShift); }
+  [[nodiscard]] float pixels_per_unit(const ScreenError::Region& region) const;
+  [[nodiscard]] float area_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const;
 
   const IntervalVolume& volume_;
   const RelevantUpdates& relevant_;
@@ -115,6 +124,7 @@ class Ranking {
   std::optional<SeenBox> roi_;
   std::optional<ScreenError> screen_;
   float pixel_error_ = 0;
+  double spacing_ = 0;  // between samples, the geometric mean over the axes
 };
 
 }  // namespace intervale

@@ -156,7 +156,9 @@ void StreamPlan::rank_bricks() {
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     const Pending& w = pending_[b];
     if (w.unsent == 0) continue;
-    set_pending(b, std::max(ranking_->of_brick(b, w.error_step, float(w.object_error)).bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
+    const Ranking::Brick ranking = ranking_->of_brick(b, w.error_step, float(w.object_error));
+    pending_[b].pixels = Up16(ranking_->has_camera() ? ranking.pixels(float(w.object_error)) : 0);
+    set_pending(b, std::max(ranking.bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
   }
   begin_band();
 }
@@ -184,13 +186,14 @@ StreamPlan::Remaining StreamPlan::remaining() const {
   Remaining remaining{wanted_count_, 0, 0};
   if (top == 0) return remaining;
   if (!ranking_->has_camera()) {
-    remaining.error = ranking_->bound(top);
+    remaining.error = ranking_->error(top);
     return remaining;
   }
-  remaining.pixels = ranking_->bound(top);
   unsigned error_step = 0;
-  for (BrickIndex b{0}; b < pending_.size(); ++b) {
-    if (pending_[b].rank != 0) error_step = std::max(error_step, unsigned(pending_[b].error_step));
+  for (const Pending& w : pending_) {
+    if (w.rank == 0) continue;
+    error_step = std::max(error_step, unsigned(w.error_step));
+    remaining.pixels = std::max(remaining.pixels, double(float(w.pixels)));
   }
   remaining.error = volume_->error_steps()[error_step];
   return remaining;
@@ -281,6 +284,7 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   set_pending(brick, rest.rank, rest.wanted);
   pending_[brick].error_step = std::uint16_t(rest.error_step);
   pending_[brick].object_error = Up16(object_error);
+  if (ranking_->has_camera()) pending_[brick].pixels = Up16(ranking.pixels(object_error));
   return true;
 }
 

@@ -1,11 +1,10 @@
 // Selects what a session sends next: a pure function of the data set, the level of detail and the updates sent. No
 // I/O.
 //
-// Updates are sent in bands of falling rank (ranking.h): within a band, errors differ by a factor of 2 on the screen,
-// or of 4 without a camera. Within a band they are sent region by region, each after its missing ancestors:
-// neighbours share names and code tables, which makes the batch smaller. Bounds of the unsent updates are kept for
-// each brick and supercube, and a brick is visited only if its bound is in the band: a new view costs O(bricks), and
-// then the work for what it sends.
+// Updates are sent in bands of falling rank (ranking.h): within a band, importances differ by a factor of 4. Within a
+// band they are sent region by region, each after its missing ancestors: neighbours share names and code tables, which
+// makes the batch smaller. Bounds of the unsent updates are kept for each brick and supercube, and a brick is visited
+// only if its bound is in the band: a new view costs O(bricks), and then the work for what it sends.
 #pragma once
 
 #include <bit>
@@ -36,7 +35,7 @@ struct Batch {
 // large, up to protocol::kMaxBatchPayload.
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
-// The stream of one session over one data set. One thread at a time. Memory besides the data set: ten bytes for each
+// The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
 // brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and a byte
 // for each supercube.
 class StreamPlan {
@@ -124,6 +123,7 @@ class StreamPlan {
     std::uint16_t wanted = 0;  // bound on the number of those that are wanted
     std::uint16_t error_step = 0;
     Up16 object_error;
+    Up16 pixels;  // on the camera's screen; 0 without one
   };
   void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
   [[nodiscard]] unsigned error_step(SupercubeIndex s) const;

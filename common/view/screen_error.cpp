@@ -17,12 +17,11 @@ double reach_along(const Vec3& reach, const Vec3& n) { return reach[0] * std::ab
 ScreenError::ScreenError(const Camera& camera, const Grid& grid) : turned_(grid.affine), eye_(turned_.turned(camera.eye)) {
   const Vec3 ahead = normalized(subtract(camera.look_at, camera.eye)), right = normalized(cross(ahead, normalized(camera.up)));
   ahead_ = turned_.turned(ahead);
-  right_ = turned_.turned(right);
-  up_ = turned_.turned(cross(right, ahead));
-  tan_y_ = std::tan(camera.fov * (std::numbers::pi / 360));
-  tan_x_ = tan_y_ * camera.viewport[0] / camera.viewport[1];
-  scale_ = camera.viewport[1] / (2 * tan_y_);
-  cos_corner_ = 1 / std::hypot(1.0, tan_x_, tan_y_);
+  const Vec3 to_right = turned_.turned(right), to_top = turned_.turned(cross(right, ahead));
+  // Of half the angles of view
+  const double tan_y = std::tan(camera.fov * (std::numbers::pi / 360)), tan_x = tan_y * camera.viewport[0] / camera.viewport[1];
+  scale_ = camera.viewport[1] / (2 * tan_y);
+  cos_corner_ = 1 / std::hypot(1.0, tan_x, tan_y);
   const Vec3 spacing = grid.affine.spacing();
   least_depth_ = 1e-3 * std::min({spacing[0], spacing[1], spacing[2]});
   const auto side = [this](const Vec3& across, double sign, double tangent) {
@@ -33,19 +32,23 @@ ScreenError::ScreenError(const Camera& camera, const Grid& grid) : turned_(grid.
     }
     return Side{normalized(n), normalized(e)};
   };
-  sides_ = {side(right_, 1, tan_x_), side(right_, -1, tan_x_), side(up_, 1, tan_y_), side(up_, -1, tan_y_)};
+  sides_ = {side(to_right, 1, tan_x), side(to_right, -1, tan_x), side(to_top, 1, tan_y), side(to_top, -1, tan_y)};
+}
+
+double ScreenError::least_depth_of(const Vec3& at, const Vec3& reach) const {
+  double gap2 = 0;  // to the nearest point of the region
+  for (int i = 0; i < 3; ++i) {
+    const double gap = std::max(0.0, std::abs(at[i]) - reach[i]);
+    gap2 += gap * gap;
+  }
+  return std::max({dot(at, ahead_) - reach_along(reach, ahead_), std::sqrt(gap2) * cos_corner_, least_depth_});
 }
 
 double ScreenError::pixels_per_unit(const Region& region) const {
   const Vec3 at = subtract(turned_.map.point(region.middle), eye_), reach = turned_.map.reach(region.reach);
-  double gap2 = 0, far2 = 0;  // to the nearest point of the region, and to its furthest corner
-  for (int i = 0; i < 3; ++i) {
-    const double gap = std::max(0.0, std::abs(at[i]) - reach[i]);
-    gap2 += gap * gap;
-    far2 += (std::abs(at[i]) + reach[i]) * (std::abs(at[i]) + reach[i]);
-  }
-  // The visible part of the region is no nearer than that.
-  const double depth = std::max({dot(at, ahead_) - reach_along(reach, ahead_), std::sqrt(gap2) * cos_corner_, least_depth_});
+  const double depth = least_depth_of(at, reach);
+  double far2 = 0;  // to the region's furthest corner
+  for (int i = 0; i < 3; ++i) far2 += (std::abs(at[i]) + reach[i]) * (std::abs(at[i]) + reach[i]);
   // The distance of the whole region beyond a side of the view frustum; behind a right angle, from the side's middle
   // line.
   double outside = 0;
@@ -68,10 +71,37 @@ bool ScreenError::is_near(const Region& region) const {
   return gap2 < 9 * across2;
 }
 
-bool ScreenError::is_central(const Region& region) const {
-  const Vec3 at = subtract(turned_.map.point(region.middle), eye_);
-  const double depth = dot(at, ahead_);
-  return std::abs(dot(at, right_)) <= tan_x_ / 2 * depth && std::abs(dot(at, up_)) <= tan_y_ / 2 * depth;
+double ScreenError::seen_share(const Region& region) const {
+  constexpr double kLeast = 1e-6;
+  const Vec3 at = subtract(turned_.map.point(region.middle), eye_), whole_reach = turned_.map.reach(region.reach);
+  const Vec3 reach = scaled(1.0 / 3, whole_reach);  // of a part
+  // Distances from the planes through the eye that bound the picture, and from that across the line of sight.
+  struct Distance {
+    double of_middle = 0, reach = 0;
+    Vec3 step{};  // from a part to the next, along each axis of the samples
+    [[nodiscard]] double of_part(int x, int y, int z) const { return of_middle + x * step[0] + y * step[1] + z * step[2]; }
+  };
+  const auto from_plane = [&](const Vec3& normal) {
+    const Vec3 steps = turned_.map.transposed(normal);
+    Distance d{dot(at, normal), reach_along(reach, normal), {}};
+    for (std::size_t i = 0; i < 3; ++i) d.step[i] = 2.0 / 3 * region.reach[i] * steps[i];
+    return d;
+  };
+  const std::array<Distance, 5> planes{from_plane(ahead_), from_plane(sides_[0].inward), from_plane(sides_[1].inward), from_plane(sides_[2].inward),
+                                       from_plane(sides_[3].inward)};
+  const double least_depth = least_depth_of(at, whole_reach), radius = length(reach);
+  double sum = 0;
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        bool is_beside = false;
+        for (const Distance& d : planes) is_beside |= d.of_part(x, y, z) + d.reach < 0;
+        const double ratio = least_depth / std::max({planes[0].of_part(x, y, z), radius, least_depth});
+        sum += is_beside ? 0 : ratio * ratio * ratio * ratio;
+      }
+    }
+  }
+  return std::clamp(sum / 27, kLeast, 1.0);
 }
 
 // Diamonds extend below their supercube by h, and not above it.

@@ -31,22 +31,28 @@ class ScreenError {
   // Whether the region is so near that the pixels a unit of its parts differ by more than a third.
   [[nodiscard]] bool is_near(const Region& region) const;
 
-  // Whether the middle of the region lies in the middle of the picture: within half its width and half its height.
-  [[nodiscard]] bool is_central(const Region& region) const;
+  // How much of the picture the region's surfaces take, and how large deviations show there, against surfaces that are
+  // all seen and at its nearest point: the mean over 3 x 3 x 3 parts of (pixels of a part / pixels_per_unit())^4, where
+  // those beside the picture count nothing. A deviation's square grows with the square of its pixels a unit, and so does
+  // the area that shows it. At least 1e-6, at most 1.
+  [[nodiscard]] double seen_share(const Region& region) const;
 
  private:
+  // The visible part of a region is no nearer than this along the line of sight. at: its middle from the eye; reach: half
+  // its sides.
+  [[nodiscard]] double least_depth_of(const Vec3& at, const Vec3& reach) const;
+
   // Everything is seen along the axes that turned_ has, so that a rotation of the world changes nothing. Regions are
   // taken for boxes with sides along them, which they are unless the grid is sheared: then those are larger.
-  TurnedAffine turned_;            // of the grid
-  Vec3 eye_, right_, up_, ahead_;  // the camera's axes have length 1
+  TurnedAffine turned_;  // of the grid
+  Vec3 eye_, ahead_;     // ahead_: of length 1
   struct Side {
     Vec3 inward, edge;  // of one side of the view frustum: its normal, and the direction of its middle line from the eye
   };
   std::array<Side, 4> sides_;
-  double scale_ = 0;              // pixels of one unit across, one unit ahead
-  double least_depth_ = 0;        // smaller depths count as this
-  double tan_x_ = 0, tan_y_ = 0;  // of half the angles of view
-  double cos_corner_ = 0;         // of the angle between the line of sight and the picture's corners
+  double scale_ = 0;        // pixels of one unit across, one unit ahead
+  double least_depth_ = 0;  // smaller depths count as this
+  double cos_corner_ = 0;   // of the angle between the line of sight and the picture's corners
 };
 
 // The region of the diamonds of a cube of `cells` supercubes a side, of which this key's is the lowest; clipped to the

@@ -277,10 +277,10 @@ void print_rows(const std::vector<Row>& rows) {
   fmt::print(
       "\nBytes until 99 % of {} points are off by at most that many pixels on the screen. The points lie on the surface of the\n"
       "full mesh, within the picture of 1920 x 1080. Values between measurements are interpolated. Ideal: one update at a time,\n"
-      "the greatest projected error first, each with the ancestors that it lacks; its bytes are what the updates so far would\n"
-      "take in one batch, the fewest possible. By level: coarse before fine, as a level-of-detail pyramid is sent. By field\n"
-      "error: the same order whatever the view. When done: the bytes sent for a pixel error of 1, over the fewest bytes for\n"
-      "that.\n",
+      "first that which removes most squared deviation from the picture, each with the ancestors that it lacks; its bytes are\n"
+      "what the updates so far would take in one batch, the fewest possible. By level: coarse before fine, as a\n"
+      "level-of-detail pyramid is sent. By field error: the same order whatever the view. When done: the bytes sent for a\n"
+      "pixel error of 1, over the fewest bytes for that.\n",
       kPoints);
 }
 

@@ -67,11 +67,14 @@ ScreenError::Region region_of(const IntervalVolume& v, SupercubeKey first, Super
   return region;
 }
 
-// Pixels of one world unit around an update: by its supercube, or its brick where that is far away.
-double pixels_per_unit(const IntervalVolume& v, const ScreenError& view, const Place& p) {
+// What is around an update: its supercube, or its brick where that is far away.
+ScreenError::Region region_around(const IntervalVolume& v, const ScreenError& view, const Place& p) {
   const ScreenError::Region brick = region_of(v, p.key & ~SupercubeKey(63), p.key | 63);
-  return view.pixels_per_unit(view.is_near(brick) ? region_of(v, p.key, p.key) : brick);
+  return view.is_near(brick) ? region_of(v, p.key, p.key) : brick;
 }
+
+// Pixels of one world unit there.
+double pixels_per_unit(const IntervalVolume& v, const ScreenError& view, const Place& p) { return view.pixels_per_unit(region_around(v, view, p)); }
 
 bool meets(const IntervalVolume& v, const Diamond& d, const Box& roi) {
   const Grid& g = v.description().grid;
@@ -156,35 +159,66 @@ TEST_P(Ranks, WhatIsNotWantedDoesNotShow) {
   }
 }
 
-TEST_P(Ranks, BoundIsNoLessThanWhatIsLeft) {
-  for (int trial = 0; trial < 40; ++trial) {
-    const Lod lod = testing::random_lod(volume_.description().grid, random_);
-    std::optional<ScreenError> view;
-    if (lod.camera) view.emplace(*lod.camera, volume_.description().grid);
+TEST_P(Ranks, GrowWithTheSquaredDeviationInThePicture) {
+  const Grid& g = volume_.description().grid;
+  const double spacing = std::cbrt(g.affine.spacing()[0] * g.affine.spacing()[1] * g.affine.spacing()[2]);
+  for (int trial = 0; trial < 20; ++trial) {
+    Lod lod;
+    lod.camera = testing::random_camera(g, random_);
+    lod.camera->pixel_error = std::pow(2.0, testing::uniform(random_, -8, 3));
+    const ScreenError view(*lod.camera, g);
     const Ranking ranking(volume_, lod);
-    EXPECT_EQ(ranking.bound(0), 0);
-    std::vector<std::pair<Ranking::Rank, double>> all;  // ranks, and the errors that they stand for
+    std::vector<std::pair<Ranking::Rank, double>> all;  // with what they stand for
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
       if (rank == 0) return;
-      const double error = view ? object_error(volume_, p) * pixels_per_unit(volume_, *view, p) : double(volume_.error(p.index));
-      ASSERT_LE(error, ranking.bound(rank) * (1 + 1e-5)) << "trial " << trial;
-      ASSERT_LE(ranking.bound(rank), view ? 2 * error : error) << "trial " << trial << ": and not much more";
-      all.emplace_back(rank, error);
+      const double a_unit = pixels_per_unit(volume_, view, p), pixels = object_error(volume_, p) * a_unit;
+      ASSERT_LE(pixels, ranking.of_brick(p.brick).pixels(volume_.relevant().brick_object_error(p.brick)) * (1 + 1e-5)) << "trial " << trial;
+      const double h = std::exp2(scale_of_key(p.key)) * spacing * a_unit;
+      all.emplace_back(rank, pixels * pixels * h * h * view.seen_share(region_around(volume_, view, p)));
     });
     std::sort(all.begin(), all.end());
-    for (std::size_t i = 1; i < all.size(); ++i) ASSERT_LE(ranking.bound(all[i - 1].first), ranking.bound(all[i].first));
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      const auto [lower, less] = all[i - 1];
+      const auto [higher, more] = all[i];
+      if (lower <= 1) continue;
+      // A rank holds a sixteenth of an octave.
+      ASSERT_GE(more, less / 1.07) << "trial " << trial;
+      if (higher - lower > 1) {
+        ASSERT_GT(more, less * (1 - 1e-5)) << "trial " << trial;
+      }
+    }
     // A band: from its top down to what it still takes.
     for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / 20) {
       const Ranking::Rank top = all[i].first, low = ranking.band_below(top);
       ASSERT_GE(low, 1);
       ASSERT_LE(low, top);
-      ASSERT_LE(ranking.bound(top), ranking.bound(low) * (view ? 2.0 : 4.0) * (1 + 1e-6)) << "trial " << trial;
+      const auto last = std::lower_bound(all.begin(), all.end(), std::pair(low, 0.0));
+      if (low > 1) {
+        ASSERT_LE(all[i].second, last->second * 4 * 1.07) << "trial " << trial;
+      }
     }
   }
 }
 
+TEST_P(Ranks, WithoutACameraErrorsAreThoseThatAreLeft) {
+  for (int trial = 0; trial < 40; ++trial) {
+    Lod lod = testing::random_lod(volume_.description().grid, random_);
+    lod.camera.reset();
+    const Ranking ranking(volume_, lod);
+    EXPECT_EQ(ranking.error(0), 0);
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+      if (rank == 0) return;
+      ASSERT_EQ(ranking.error(rank), double(volume_.error(p.index))) << "trial " << trial;
+      const Ranking::Rank low = ranking.band_below(rank);
+      ASSERT_GE(low, 1);
+      ASSERT_LE(low, rank);
+      ASSERT_LE(ranking.error(rank), ranking.error(low) * 4) << "trial " << trial;
+    });
+  }
+}
+
 // The narrowest of views show everything larger than any number.
-TEST_P(Ranks, BoundIsANumberWhateverTheCamera) {
+TEST_P(Ranks, PixelsAreANumberWhateverTheCamera) {
   Lod lod;
   lod.camera = testing::random_camera(volume_.description().grid, random_);
   for (const double fov : {1e-306, 1e-100, 1e-37, 1e-30, 179.999999}) {
@@ -194,7 +228,7 @@ TEST_P(Ranks, BoundIsANumberWhateverTheCamera) {
       ASSERT_TRUE(check_lod(lod));
       const Ranking ranking(volume_, lod);
       for (BrickIndex b{0}; b < volume_.set().bricks().size(); ++b) {
-        ASSERT_TRUE(std::isfinite(ranking.bound(ranking.of_brick(b).bound()))) << "fov " << fov << ", pixel error " << pixel_error;
+        ASSERT_TRUE(std::isfinite(ranking.of_brick(b).pixels(volume_.relevant().brick_object_error(b)))) << "fov " << fov;
       }
       for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ASSERT_LE(rank, ranking.of_brick(p.brick).bound()); });
     }

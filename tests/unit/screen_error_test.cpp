@@ -185,21 +185,59 @@ TEST_P(Views, TheFurtherBehindTheSmaller) {
   }
 }
 
-TEST_P(Views, CentralIsTheMiddleHalfOfThePictureEachWay) {
-  std::size_t central = 0;
+TEST_P(Views, TheShareOfWhatIsAllSeenIsTheMeanOverItsParts) {
+  std::size_t seen = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     const Camera camera = testing::random_camera(kGrid, random_);
     const NaiveCamera naive(camera);
+    const ScreenError view(camera, kGrid);
     const ScreenError::Region region = random_region(kGrid, random_);
-    const Vector p = world(kGrid, region.middle);
-    const auto [x, y] = naive.project(p);
-    const double across = std::abs(x) / (camera.viewport[0] / 4.0), up = std::abs(y) / (camera.viewport[1] / 4.0);
-    if (std::abs(across - 1) < 1e-9 || std::abs(up - 1) < 1e-9) continue;
-    const bool expected = naive.depth(p) > 0 && across < 1 && up < 1;
-    EXPECT_EQ(ScreenError(camera, kGrid).is_central(region), expected) << "trial " << trial;
-    central += expected;
+    const auto at = [&](const Vector& from_middle) {
+      Vector sample;
+      for (int k = 0; k < 3; ++k) sample[k] = region.middle[k] + region.reach[k] * from_middle[k];
+      return world(kGrid, sample);
+    };
+    bool is_all_seen = true;
+    double sum = 0, nearest = 1e300;
+    for (int x = -1; x <= 1; ++x) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int z = -1; z <= 1; ++z) {
+          is_all_seen = is_all_seen && naive.shows(at({double(x), double(y), double(z)}));
+          const Vector middle = at({x / 1.5, y / 1.5, z / 1.5});
+          sum += std::pow(naive.pixels_per_unit(middle) / view.pixels_per_unit(region), 4);
+          nearest = std::min(nearest, naive.depth(middle));
+        }
+      }
+    }
+    const double radius = testing::length(testing::minus(at({1.0 / 3, 1.0 / 3, 1.0 / 3}), at({})));
+    if (!is_all_seen || nearest <= radius) continue;
+    EXPECT_NEAR(view.seen_share(region), sum / 27, 1e-9) << "trial " << trial;
+    ++seen;
   }
-  EXPECT_GT(central, 50u);
+  EXPECT_GT(seen, 20u);
+}
+
+TEST_P(Views, TheShareOfWhatIsBesideThePictureIsTheLeast) {
+  std::size_t beside = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Camera camera = testing::random_camera(kGrid, random_);
+    const NaiveCamera naive(camera);
+    const ScreenError view(camera, kGrid);
+    const ScreenError::Region region = random_region(kGrid, random_);
+    const double share = view.seen_share(region);
+    ASSERT_GE(share, 1e-6);
+    ASSERT_LE(share, 1);
+    bool is_behind = true;
+    for (int corner = 0; corner < 8; ++corner) {
+      Vector sample;
+      for (int k = 0; k < 3; ++k) sample[k] = region.middle[k] + ((corner >> k & 1) != 0 ? 1 : -1) * region.reach[k];
+      is_behind = is_behind && naive.depth(world(kGrid, sample)) < 0;
+    }
+    if (!is_behind) continue;
+    EXPECT_EQ(share, 1e-6) << "trial " << trial;
+    ++beside;
+  }
+  EXPECT_GT(beside, 20u);
 }
 
 // World units are no more than a choice: the same picture of the same samples.
