@@ -87,6 +87,9 @@ function rayLength(box, { eye, lookAt, up, fov }, x, y) {
   return Math.max(0, far - near);
 }
 
+// Waits until the status line says so: it shows what the page knows ten times a second at most.
+const statusIs = (page, text) => page.waitForFunction((text) => document.querySelector('#progress-text').textContent === text, text);
+
 // Runs a test on a refined page of the buckyball. Fails also if the page has errors.
 async function withPage(hash, options, body) {
   const { page, errors, close } = await open(browser, `${server.url}#data=buckyball&${hash}`, options);
@@ -107,7 +110,7 @@ describe('The page', () => {
     assert.doesNotMatch(policy, /'unsafe-eval'|'unsafe-inline'/);
     const { page, errors, downloaded, close } = await open(browser, server.url);
     await settled(page);
-    assert.equal(await page.textContent('#progress-text'), 'Done for this view');
+    await statusIs(page, 'Done for this view');
     const size = downloaded();
     assert.ok(size > 200_000 && size <= 400_000, `${size} bytes are downloaded before data`);
     assert.deepEqual(errors, []);
@@ -318,7 +321,7 @@ describe('Controls', () => {
       const progress = await progressOf(page);
       assert.ok(progress.full);
       assert.ok(progress.updates <= 1e6 / 30, `${progress.updates}`);
-      assert.equal(await page.textContent('#progress-text'), 'Done: memory limit reached');
+      await statusIs(page, 'Done: memory limit reached');
     }));
 
   test('full screen, the theme and copying the link work', () =>
