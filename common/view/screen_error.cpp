@@ -89,13 +89,20 @@ double ScreenError::seen_share(const Region& region) const {
   };
   const std::array<Distance, 5> planes{from_plane(ahead_), from_plane(sides_[0].inward), from_plane(sides_[1].inward), from_plane(sides_[2].inward),
                                        from_plane(sides_[3].inward)};
+  bool is_inside = true;  // the whole region
+  for (const Distance& d : planes) {
+    if (d.of_middle + 3 * d.reach < 0) return kLeast;
+    is_inside &= d.of_middle - 3 * d.reach >= 0;
+  }
   const double least_depth = least_depth_of(at, whole_reach), radius = length(reach);
   double sum = 0;
   for (int z = -1; z <= 1; ++z) {
     for (int y = -1; y <= 1; ++y) {
       for (int x = -1; x <= 1; ++x) {
         bool is_beside = false;
-        for (const Distance& d : planes) is_beside |= d.of_part(x, y, z) + d.reach < 0;
+        if (!is_inside) {
+          for (const Distance& d : planes) is_beside |= d.of_part(x, y, z) + d.reach < 0;
+        }
         const double ratio = least_depth / std::max({planes[0].of_part(x, y, z), radius, least_depth});
         sum += is_beside ? 0 : ratio * ratio * ratio * ratio;
       }
