@@ -19,6 +19,7 @@
 #include "tests/support/analytic_fields.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/naive_volume.h"
+#include "tests/support/seeds.h"
 #include "tests/support/special_values.h"
 
 namespace intervale {
@@ -104,12 +105,12 @@ TEST(VolumeTable, IsTheSumOverTheMeshRefinedEverywhere) {
     const VolumeTable table = make_volume_table(v);
     expect_order(table);
     std::mt19937 random(seed);
-    for (int trial = 0; trial < 12; ++trial) {
+    for (unsigned trial = 0; trial < testing::cases(12); ++trial) {
       const double a = any_value(v, table, random), b = trial % 4 == 0 ? a : any_value(v, table, random);
       const Range range{std::min(a, b), std::max(a, b)};
       EXPECT_NEAR(table.share_of(range), naive_share(v, range), kVolumeTolerance) << a << " to " << b;
     }
-    for (int trial = 0; trial < 6; ++trial) {
+    for (unsigned trial = 0; trial < testing::cases(6); ++trial) {
       const std::size_t i = random() % table.position.size(), j = random() % table.position.size();
       const Range range{table.position[std::min(i, j)], table.position[std::max(i, j)]};
       EXPECT_NEAR(table.share_of(range), naive_share(v, range), 2e-6) << "between positions";
@@ -174,7 +175,7 @@ void expect_tolerance(const Dims& dims, unsigned kind, std::size_t count) {
 
 // Where not every tetrahedron is in the sample by which positions are chosen.
 TEST(VolumeTable, HoldsItsToleranceInLargerVolumes) {
-  for (unsigned kind = 0; kind < kKinds; ++kind) expect_tolerance({80, 64, 50}, kind, 8);
+  for (unsigned kind = 0; kind < testing::cases(kKinds); ++kind) expect_tolerance({80, 64, 50}, kind, 8);
 }
 
 // Where not every cell is summed either.

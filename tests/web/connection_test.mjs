@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 
-import { digestOf, fetched, kBuckyball, kGyroid, killServers, launch, makeData, open, progressOf, refusingProxy, serve, settled, throttledProxy } from './support.mjs';
+import { digestOf, eventually, fetched, kBuckyball, kGyroid, killServers, launch, makeData, open, progressOf, refusingProxy, serve, settled, throttledProxy } from './support.mjs';
 
 let data;
 let browser;
@@ -25,7 +25,7 @@ describe('After the server is lost', () => {
     await page.waitForFunction(() => window.intervale.progress?.updates > 3000);
     await first.kill();
     await page.waitForFunction(() => window.intervale.live.connection.state === 'waiting');
-    assert.ok(await page.isVisible('#banner'));
+    await eventually(async () => assert.ok(await page.isVisible('#banner')));
     const before = await progressOf(page);
     assert.ok(!before.done);
     const second = await serve(data, first.port);
@@ -46,7 +46,7 @@ describe('After the server is lost', () => {
     await settled(page);
     await first.kill();
     await page.waitForFunction(() => window.intervale.live.connection.state === 'waiting' && window.intervale.live.connection.attempt > 1);
-    assert.match(await page.textContent('#banner-text'), /\w+ \w+/);
+    await eventually(async () => assert.match(await page.textContent('#banner-text'), /\w+ \w+/));
     const second = await serve(data, first.port);
     await settled(page);
     await page.waitForSelector('#banner', { state: 'hidden' });
@@ -76,11 +76,11 @@ test('A token that the server requires is requested from the user, and is never 
   const guarded = await serve(data, 0, '--tokens', file);
   const { page, close } = await open(browser, guarded.url);
   await page.waitForSelector('#token-form');
-  assert.equal(await page.isVisible('#token-error'), false);
+  await eventually(async () => assert.equal(await page.isVisible('#token-error'), false));
   await page.fill('#token', 'open-simsim');
   await page.click('#token-form button[type=submit]');
   await page.waitForSelector('#token-error');
-  assert.match(await page.textContent('#token-error'), /does not accept/);
+  await eventually(async () => assert.match(await page.textContent('#token-error'), /does not accept/));
   const selected = () => {
     const { activeElement: field } = document;
     return field.id === 'token' && field.selectionStart === 0 && field.selectionEnd === field.value.length;

@@ -4,7 +4,7 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 
-import { difference, digestOf, fetched, kBuckyball, killServers, launch, makeData, open, pixels, program, serve, settled } from './support.mjs';
+import { difference, digestOf, eventually, fetched, kBuckyball, killServers, launch, makeData, open, pixels, program, serve, settled } from './support.mjs';
 
 let server;
 let browser;
@@ -46,8 +46,8 @@ test('a mirrored grid of mirrored samples is the same picture', async () => {
       const { page, errors, close } = await open(browser, `${server.url}#data=${name}&${kCamera}${more}`);
       await settled(page);
       pictures.push(await pixels(page));
-      if (name === 'mirrored') assert.match(await page.textContent('#status-values'), /mm³/);
-      if (name === 'mirrored') assert.equal(await page.textContent('#alpha-value'), 'density = 128');
+      if (name === 'mirrored') await eventually(async () => assert.match(await page.textContent('#status-values'), /mm³/));
+      if (name === 'mirrored') await eventually(async () => assert.equal(await page.textContent('#alpha-value'), 'density = 128'));
       assert.deepEqual(errors, []);
       await close();
     }

@@ -21,7 +21,7 @@ const out = need('INTERVALE_WEB_OUT');
 const references = fileURLToPath(new URL('references', import.meta.url));
 mkdirSync(out, { recursive: true });
 const browser = await import(join(need('INTERVALE_VIEWER_PAGE'), 'tests/browser.mjs'));
-export const { decode, difference, launch, photograph, pixels } = browser;
+export const { decode, difference, eventually, launch, photograph, pixels } = browser;
 
 export const program = (name, ...args) => execFileSync(join(bin, name), args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] });
 

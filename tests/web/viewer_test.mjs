@@ -7,6 +7,7 @@ import {
   difference,
   digestOf,
   drawn,
+  eventually,
   fetched,
   kBlock,
   kBuckyball,
@@ -243,8 +244,8 @@ describe('Controls', () => {
       const first = await pixels(page);
       const { mean } = difference(first, await colorBy('value'));
       assert.ok(mean > 0.5, `${mean}`);
-      assert.deepEqual(await page.$$eval('#palette option', (options) => options.map(({ value }) => value)), ['viridis', 'cividis', 'inferno', 'ice', 'grey']);
-      assert.deepEqual(await page.$$eval('#legend .ends span', (spans) => spans.map(({ textContent }) => textContent)), ['128', '158', '188']);
+      await eventually(async () => assert.deepEqual(await page.$$eval('#palette option', (options) => options.map(({ value }) => value)), ['viridis', 'cividis', 'inferno', 'ice', 'grey']));
+      await eventually(async () => assert.deepEqual(await page.$$eval('#legend .ends span', (spans) => spans.map(({ textContent }) => textContent)), ['128', '158', '188']));
       const back = difference(first, await colorBy('surface'));
       assert.ok(back.mean < 0.5, `${back.mean}`);
     }));
@@ -270,7 +271,7 @@ describe('Controls', () => {
       await page.waitForTimeout(200);
       assert.notEqual(await pose(), first);
       await page.keyboard.press('h');
-      assert.ok(await page.isVisible('#help-dialog'));
+      await eventually(async () => assert.ok(await page.isVisible('#help-dialog')));
       await page.keyboard.press('Escape');
     }));
 

@@ -24,7 +24,7 @@ export async function decode(page, png) {
   const { width, height, data } = await page.evaluate(async (base64) => {
     const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
     const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d', { willReadFrequently: true }); // in memory
     context.drawImage(bitmap, 0, 0);
     const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
     let text = '';
@@ -56,4 +56,15 @@ export function share(picture, predicate) {
   let n = 0;
   for (let i = 0; i < picture.data.length; i += 4) if (predicate(picture.data[i], picture.data[i + 1], picture.data[i + 2])) ++n;
   return (4 * n) / picture.data.length;
+}
+
+// Until an assertion holds, for up to 15 s: texts and controls follow with the next frame, which may take long.
+export async function eventually(assertion) {
+  for (const end = Date.now() + 15_000; ; await new Promise((resolve) => setTimeout(resolve, 50))) {
+    try {
+      return await assertion();
+    } catch (error) {
+      if (Date.now() > end) throw error;
+    }
+  }
 }

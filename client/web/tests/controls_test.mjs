@@ -2,7 +2,7 @@
 // on the requests to the worker.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { difference, pixels, share } from './browser.mjs';
+import { difference, eventually, pixels, share } from './browser.mjs';
 import { changesPicture, openPage, recordRequests, refined, settled, sharedPages, startFakeServer, state } from './fake_server.mjs';
 
 const shared = sharedPages();
@@ -90,8 +90,8 @@ onPage('the clip plane shows a cap, and handles, keys, buttons and the slider mo
   await page.fill('#clip-offset', '0.25');
   await moved('by the slider');
   for (let k = 0; k < 2; ++k) {
-    assert.equal(await page.textContent('#clip-offset-out'), '−12', 'the coordinate, whichever way the plane faces');
-    assert.equal(Number(await page.inputValue('#clip-offset')), 0.25);
+    await eventually(async () => assert.equal(await page.textContent('#clip-offset-out'), '−12', 'the coordinate, whichever way the plane faces'));
+    await eventually(async () => assert.equal(Number(await page.inputValue('#clip-offset')), 0.25));
     await page.click('#clip-flip');
   }
   await settled(page);
@@ -129,7 +129,7 @@ onPage('shrunken tetrahedra replace the boundary surface in the region', async (
   await settled(page);
   assert.ok(difference(shown, await pixels(page)).share < 0.001, 'the surfaces around do not hide them');
   for (const name of ['alpha', 'beta', 'box']) await page.fill(`#${name}-opacity`, '1');
-  assert.match(await page.textContent('#tets-note'), /tetrahedra in the region/);
+  await eventually(async () => assert.match(await page.textContent('#tets-note'), /tetrahedra in the region/));
   await changesPicture(page, () => page.fill('#shrink', '0.4'), 0.002);
   await changesPicture(page, () => page.click('#tets'), 0.002);
   await page.waitForFunction(() => window.intervale.stats.tets === 0);
@@ -139,11 +139,11 @@ onPage('thickness has a legend in world units', async (page) => {
   await page.keyboard.press('t');
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
   await page.waitForSelector('#legend:not([hidden])');
-  assert.ok(Number.parseFloat(await page.textContent('#legend-high')) > 20, 'with the first picture');
+  await eventually(async () => assert.ok(Number.parseFloat(await page.textContent('#legend-high')) > 20, 'with the first picture'));
   await changesPicture(page, () => page.click('#thickness'), 0.1);
   await changesPicture(page, () => page.click('#thickness'), 0.1);
   await changesPicture(page, () => page.click('#thickness'), 0.1);
-  assert.ok(!(await page.isVisible('#legend')));
+  await eventually(async () => assert.ok(!(await page.isVisible('#legend'))));
 });
 
 onPage('colours, opacities, wireframe and levels of detail change the picture', async (page) => {
@@ -236,10 +236,10 @@ onPage('Tab reaches every control, and the help lists the keys', async (page) =>
   }
   assert.ok(seen.size >= expected, `${seen.size} of ${expected}`);
   await page.keyboard.press('h');
-  assert.ok(await page.isVisible('#help-dialog'));
+  await eventually(async () => assert.ok(await page.isVisible('#help-dialog')));
   assert.equal(await page.locator('#keys dt').count(), 16);
   await page.keyboard.press('Escape');
-  assert.ok(!(await page.isVisible('#help-dialog')));
+  await eventually(async () => assert.ok(!(await page.isVisible('#help-dialog'))));
 });
 
 for (const [width, height] of [[360, 740], [3840, 2160]]) {
@@ -292,6 +292,6 @@ test('a required token is requested, and is not part of the address', async () =
 test('without WebGL 2 the banner says so', async () => {
   const page = await openPage(shared.browser, shared.server.address, { script: () => (HTMLCanvasElement.prototype.getContext = () => null) });
   await page.waitForFunction(() => document.querySelector('#banner-text').textContent.includes('WebGL 2'));
-  assert.ok(await page.isVisible('#banner'));
+  await eventually(async () => assert.ok(await page.isVisible('#banner')));
   await page.context().close();
 });

@@ -1,6 +1,6 @@
 // The controls of the ranges, of one and of several, in a real browser with a fake worker.
 import assert from 'node:assert/strict';
-import { decode, difference, pixels, share } from './browser.mjs';
+import { decode, difference, eventually, pixels, share } from './browser.mjs';
 import { changesPicture, openPage, recordRequests, refined, settled, sharedPages, state } from './fake_server.mjs';
 
 const shared = sharedPages();
@@ -22,15 +22,15 @@ const isOrange = (r, g, b) => r > b + 60 && g > b + 30 && r > g;
 const isGreen = (r, g, b) => g > r + 60 && g > b;
 
 onPage('of every range, the range is chosen by two numbers, and stands in the address', async (page) => {
-  assert.equal(await page.isVisible('#range-section'), false, 'this one has one range');
+  await eventually(async () => assert.equal(await page.isVisible('#range-section'), false, 'this one has one range'));
   await recordRequests(page);
   await page.getByRole('radio', { name: 'any' }).check();
   await shows(page, [0, 1.5]);
-  assert.equal(await page.inputValue('#range-high'), '1.5');
+  await eventually(async () => assert.equal(await page.inputValue('#range-high'), '1.5'));
   await page.fill('#range-low', '-0.25');
   await page.press('#range-low', 'Enter');
   await shows(page, [-0.25, 1.5]);
-  assert.equal(await page.textContent('#alpha-value'), 'field = −0.25');
+  await eventually(async () => assert.equal(await page.textContent('#alpha-value'), 'field = −0.25'));
   await page.fill('#range-high', '');
   await page.press('#range-high', 'Enter');
   await shows(page, [-0.25, Infinity]);
@@ -40,14 +40,14 @@ onPage('of every range, the range is chosen by two numbers, and stands in the ad
 onPage('of every range, handles on the histogram show what is there, and ask for the rest when they rest', async (page) => {
   await page.getByRole('radio', { name: 'any' }).check();
   await page.waitForSelector('#histogram:not([hidden])');
-  assert.equal(await page.textContent('#range-volume'), 'encloses 55,296 units³, 50.0 % of the box');
+  await eventually(async () => assert.equal(await page.textContent('#range-volume'), 'encloses 55,296 units³, 50.0 % of the box'));
   await recordRequests(page);
   const [handle, chart] = [page.locator('#range-handle-low'), await chartOf(page)];
   const at = async (share) => page.mouse.move(chart.x + share * chart.width, chart.y + chart.height / 2);
   await at(0.5);
   await page.mouse.down();
   for (const share of [0.6, 0.7, 0.77]) await at(share);
-  assert.equal(await page.inputValue('#range-low'), '0.8');
+  await eventually(async () => assert.equal(await page.inputValue('#range-low'), '0.8'));
   await page.mouse.up();
   await shows(page, [0.8, 1.5]);
   const sent = (await page.evaluate(() => window.requests)).flatMap(({ type, ranges, view }) => (ranges || view ? [[type, ...(ranges ?? view.ranges)]] : []));
@@ -63,14 +63,14 @@ onPage('of every range, handles on the histogram show what is there, and ask for
 onPage('ranges are added, each with a place and a colour of its own, and removed', async (page) => {
   await page.waitForSelector('#histogram:not([hidden])');
   await recordRequests(page);
-  assert.equal(await page.isVisible('#range-color'), false, 'one range has its surfaces\' colours');
+  await eventually(async () => assert.equal(await page.isVisible('#range-color'), false, 'one range has its surfaces\' colours'));
   assert.equal(await page.locator('#histogram .bound:visible').count(), 2);
   await page.click('#range-add');
   await shows(page, [0, 1.5], [-1, -0.5]);
-  assert.ok(await page.isHidden('#surface-styles'));
+  await eventually(async () => assert.ok(await page.isHidden('#surface-styles')));
   assert.deepEqual((await state(page)).ranges.map(({ style }) => style), [{ color: '#3d7fd6', opacity: 1 }, { color: '#e69f00', opacity: 1 }]);
   for (let k = 0; k < 2; ++k) await page.click('#range-add');
-  assert.equal(await page.isVisible('#range-add'), false, 'no more than four');
+  await eventually(async () => assert.equal(await page.isVisible('#range-add'), false, 'no more than four'));
   assert.equal(await page.locator('#histogram .bound:visible').count(), 8);
   assert.equal(new Set((await state(page)).ranges.map(({ style }) => style.color)).size, 4);
   const disjoint = (await rangesOf(page)).sort((a, b) => a[0] - b[0]);
@@ -81,14 +81,14 @@ onPage('ranges are added, each with a place and a colour of its own, and removed
   await page.click('#range2-remove');
   await shows(page, [-1, -0.5]);
   assert.deepEqual((await state(page)).ranges, []);
-  assert.ok((await page.isVisible('#surface-styles')) && (await page.isVisible('#range-add')));
-  assert.equal(await page.inputValue('#range-low'), '-1');
+  await eventually(async () => assert.ok((await page.isVisible('#surface-styles')) && (await page.isVisible('#range-add'))));
+  await eventually(async () => assert.equal(await page.inputValue('#range-low'), '-1'));
 }, kAny);
 
 onPage('a handle and the fields of one range leave the others as they are', async (page) => {
   await page.waitForSelector('#histogram:not([hidden])');
   await recordRequests(page);
-  assert.equal(await page.textContent('#range2-volume'), 'encloses 29,491 units³, 26.7 % of the box');
+  await eventually(async () => assert.equal(await page.textContent('#range2-volume'), 'encloses 29,491 units³, 26.7 % of the box'));
   const chart = await chartOf(page);
   const at = async (value) => page.mouse.move(chart.x + ((value + 1.5) / 3) * chart.width, chart.y + chart.height / 2);
   await at(0.4);
@@ -144,7 +144,7 @@ onPage('the address restores ranges with their colours; values span all of them'
   await page.selectOption('#color-by', 'value');
   await page.waitForFunction(() => location.hash.includes('range=-1.2,-0.6,336699,1&range=0.4,1.2,009e73,0.25&color=value'));
   await settled(page);
-  assert.deepEqual(await page.$$eval('#legend .ends span', (spans) => spans.map((span) => span.textContent)), ['−1.2', '0', '1.2']);
+  await eventually(async () => assert.deepEqual(await page.$$eval('#legend .ends span', (spans) => spans.map((span) => span.textContent)), ['−1.2', '0', '1.2']));
   const other = await openPage(shared.browser, page.url(), kSmall);
   await refined(other);
   assert.deepEqual((await state(other)).ranges, (await state(page)).ranges);

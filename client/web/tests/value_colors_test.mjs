@@ -1,7 +1,7 @@
 // Colours of the field's values, in a real browser with a fake worker, whose palettes go from blue to red (warm), and
 // from black to green.
 import assert from 'node:assert/strict';
-import { difference, pixels, share } from './browser.mjs';
+import { difference, eventually, pixels, share } from './browser.mjs';
 import { recordRequests, settled, sharedPages, state } from './fake_server.mjs';
 
 const { onPage } = sharedPages();
@@ -28,18 +28,18 @@ async function fill(page, field, text) {
 onPage('colours show values, with a bar; the surfaces have theirs again', async (page) => {
   await settled(page);
   const plain = await pixels(page);
-  assert.ok(!(await page.isVisible('#value-controls')) && !(await page.isVisible('#legend')));
+  await eventually(async () => assert.ok(!(await page.isVisible('#value-controls')) && !(await page.isVisible('#legend'))));
   await page.selectOption('#color-by', 'value');
   await becomes(page, 0.02, isBlue, 'blue: the lower surface');
   await becomes(page, 0.02, isRed, 'red: the upper surface');
-  assert.deepEqual(await labels(page), ['−0.45', '0.15', '0.75']);
-  assert.equal(await page.textContent('#legend-title'), 'Field');
+  await eventually(async () => assert.deepEqual(await labels(page), ['−0.45', '0.15', '0.75']));
+  await eventually(async () => assert.equal(await page.textContent('#legend-title'), 'Field'));
   await page.selectOption('#palette', 'green');
   await becomes(page, 0.02, isGreen, 'green');
   await page.selectOption('#color-by', 'surface');
   await settled(page);
   assert.ok(difference(plain, await pixels(page)).share < 0.001);
-  assert.ok(!(await page.isVisible('#legend')));
+  await eventually(async () => assert.ok(!(await page.isVisible('#legend'))));
 });
 
 const kInvisible = ['alpha', 'beta', 'box'].map((name) => `&${name}=000000,0`).join('');
@@ -61,23 +61,23 @@ onPage('values beyond the span have the colours of its ends; reset restores the 
   assert.deepEqual((await state(page)).span, [1, 1], 'the other end follows');
   await fill(page, '#span-high', '-2');
   await becomes(page, 0.1, isRed, 'red: all is above');
-  assert.deepEqual(await labels(page), ['−2', '−2', '−2']);
+  await eventually(async () => assert.deepEqual(await labels(page), ['−2', '−2', '−2']));
   await page.waitForFunction(() => location.hash.includes('color=value') && location.hash.includes('span=-2,-2'));
   await page.click('#span-reset');
-  assert.deepEqual(await labels(page), ['−0.45', '0.15', '0.75']);
+  await eventually(async () => assert.deepEqual(await labels(page), ['−0.45', '0.15', '0.75']));
   assert.equal((await state(page)).span, null);
 }, { hash: '#data=gyroid&color=value' });
 
 onPage('the address restores colours, palette and span', async (page) => {
   await becomes(page, 0.1, isGreen, 'green');
-  assert.equal(await page.inputValue('#palette'), 'green');
-  assert.equal(await page.inputValue('#span-low'), '-9');
-  assert.deepEqual(await labels(page), ['−9', '−4.5', '0']);
+  await eventually(async () => assert.equal(await page.inputValue('#palette'), 'green'));
+  await eventually(async () => assert.equal(await page.inputValue('#span-low'), '-9'));
+  await eventually(async () => assert.deepEqual(await labels(page), ['−9', '−4.5', '0']));
 }, { hash: '#data=gyroid&color=value&palette=green&span=-9,0' });
 
 onPage('the span follows the range, also while a handle moves', async (page) => {
   await page.waitForSelector('#histogram:not([hidden])');
-  assert.equal(await page.inputValue('#span-low'), '0');
+  await eventually(async () => assert.equal(await page.inputValue('#span-low'), '0'));
   const { x, y, width } = await page.locator('#histogram').boundingBox();
   await page.evaluate(() => {
     const [handle, low] = ['range-handle-low', 'span-low'].map((id) => document.getElementById(id));
@@ -89,19 +89,19 @@ onPage('the span follows the range, also while a handle moves', async (page) => 
   assert.deepEqual(await page.evaluate(() => window.seen), ['0.8', null]);
   await page.mouse.up();
   await page.waitForFunction(() => window.intervale.state.range?.[0] === 0.8);
-  assert.equal(await page.inputValue('#span-low'), '0.8');
+  await eventually(async () => assert.equal(await page.inputValue('#span-low'), '0.8'));
 }, { hash: '#data=any&color=value' });
 
 onPage('a channel has colours, too, and is asked for', async (page) => {
   await recordRequests(page);
   const requested = (channel) => page.waitForFunction((name) => window.requests.some((r) => r.type === 'view' && r.view.channel === name), channel);
   const titled = (title) => page.waitForFunction((text) => document.getElementById('legend-title').textContent === text, title);
-  assert.deepEqual(await page.$$eval('#color-by option', (options) => options.map(({ value }) => value)), ['surface', 'value', 'channel:heat']);
+  await eventually(async () => assert.deepEqual(await page.$$eval('#color-by option', (options) => options.map(({ value }) => value)), ['surface', 'value', 'channel:heat']));
   await fill(page, '#span-low', '1');
   await page.selectOption('#color-by', 'channel:heat');
   await requested('heat');
   await titled('heat, K');
-  assert.deepEqual(await labels(page), ['−1', '1', '3']);
+  await eventually(async () => assert.deepEqual(await labels(page), ['−1', '1', '3']));
   await page.waitForFunction(() => location.hash.includes('color=value') && location.hash.includes('channel=heat'));
   await page.evaluate(() => (window.requests.length = 0));
   await page.selectOption('#color-by', 'value');
@@ -113,7 +113,7 @@ onPage('thickness and levels of detail take the place of values, and values thei
   for (const [key, name] of [['t', 'thickness'], ['l', 'levels']]) {
     await page.keyboard.press(key);
     assert.equal((await state(page)).colorBy, 'surface');
-    assert.equal(await page.inputValue('#color-by'), 'surface');
+    await eventually(async () => assert.equal(await page.inputValue('#color-by'), 'surface'));
     await page.keyboard.press('v');
     assert.equal((await state(page)).colorBy, 'value');
     assert.equal((await state(page))[name], false);

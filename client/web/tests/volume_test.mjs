@@ -1,6 +1,6 @@
 // Volume rendering and its controls, in a real browser with a fake worker, whose first palette goes from blue to red.
 import assert from 'node:assert/strict';
-import { difference, pixels, share } from './browser.mjs';
+import { difference, eventually, pixels, share } from './browser.mjs';
 import { changesPicture, recordRequests, settled, sharedPages, state } from './fake_server.mjs';
 
 const { onPage } = sharedPages();
@@ -21,10 +21,10 @@ onPage('a switch and a key turn it on and off; it asks for the inside, and of co
     const view = window.requests.findLast(({ type }) => type === 'view')?.view;
     return view && JSON.stringify([view.uniform, view.maxTets]) === wanted;
   }, JSON.stringify([uniform, maxTets]));
-  assert.ok((await page.isVisible('#legend')) && (await page.isVisible('#palette')) && (await page.isVisible('#opacity')));
+  await eventually(async () => assert.ok((await page.isVisible('#legend')) && (await page.isVisible('#palette')) && (await page.isVisible('#opacity'))));
   await changesPicture(page, () => page.keyboard.press('o'), 0.05);
   await asks(false, null);
-  assert.ok(!(await page.isVisible('#legend')) && !(await page.isVisible('#palette')) && !(await page.isVisible('#opacity')));
+  await eventually(async () => assert.ok(!(await page.isVisible('#legend')) && !(await page.isVisible('#palette')) && !(await page.isVisible('#opacity'))));
   await page.keyboard.press('t');
   await page.click('#volume');
   assert.deepEqual([(await state(page)).render, (await state(page)).thickness], ['volume', false]);
@@ -109,5 +109,5 @@ onPage('the address restores it', async (page) => {
   assert.deepEqual(await curve(page), [[-1, 0.125], [0.5, 1]]);
   assert.equal((await state(page)).render, 'volume');
   assert.ok(await page.isChecked('#volume'));
-  assert.equal(await page.inputValue('#palette'), 'green');
+  await eventually(async () => assert.equal(await page.inputValue('#palette'), 'green'));
 }, { ...kSmall, hash: '#data=gyroid&render=volume&opacity=-1:0.125,0.5:1&palette=green' });
