@@ -40,7 +40,7 @@ TEST(AllDiamonds, AreThoseThatAnyRangeNeeds) {
 }
 
 TEST(ValueFile, GivesBackAllValues) {
-  for (unsigned seed = 0; seed < testing::cases(15); ++seed) {
+  for (unsigned seed = 0; seed < 15; seed += 15 / testing::cases(15)) {  // the large box in any case
     const Dims boxes[] = {{9, 9, 9}, {9, 7, 5}, {17, 12, 33}, {2, 2, 2}, {70, 67, 66}};
     const testing::ValueField field = testing::random_value_field(boxes[seed / 5 == 2 ? 4 : seed % 4], seed);
     const ValueVolume volume = build(field);
