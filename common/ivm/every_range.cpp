@@ -84,7 +84,7 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   to.content_hash = d.content_hash;
   for (int level = 0; level < kErrorLevels; ++level) parts.error_steps.push_back(round_up(volume.error(ErrorLevel(level))));
   parts.steps = std::move(levels);
-  parts.error_to_distance.resize(volume.set().supercubes());
+  parts.surface.to_distance.resize(volume.set().supercubes());
   values = std::move(volume).take();
   parts.statistics = std::make_shared<const FieldStatistics>(std::move(values.description.statistics));
   parts.set = std::move(values.set);

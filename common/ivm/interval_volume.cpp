@@ -24,15 +24,18 @@ IntervalVolume::IntervalVolume(Parts parts)
       keys_(std::move(parts.keys)),
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
-      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, {}, std::move(parts.error_to_distance)),
+      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, {}, std::move(parts.surface)),
       bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
 
 Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
-  if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.error_to_distance.size() != parts.set.supercubes())
+  if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.surface.to_distance.size() != parts.set.supercubes() ||
+      (!parts.surface.slopes.empty() && parts.surface.slopes.size() != parts.set.size()))
     return fail("the numbers of values, errors or supercubes do not match the set");
+  if (std::any_of(parts.surface.slopes.begin(), parts.surface.slopes.end(), [](std::uint8_t slope) { return slope > kMaxSlope; }))
+    return fail("a slope is out of range");
   if (parts.error_steps.size() > kMaxErrorSteps || (parts.error_steps.empty() && !parts.steps.empty()))
     return fail("the number of errors is out of range");
   for (std::size_t i = 0; i < parts.error_steps.size(); ++i) {

@@ -36,10 +36,10 @@ class IntervalVolume {
   struct Parts {
     Description description;  // updates are computed
     SupercubeSet set;
-    ValueKeys keys;                                  // by number of the update: of the value at the diamond's centre
-    std::vector<std::uint8_t> steps;                 // by number of the update: which of error_steps its error is
-    std::vector<float> error_steps;                  // ascending, at most kMaxErrorSteps
-    std::vector<ErrorToDistance> error_to_distance;  // by supercube
+    ValueKeys keys;                   // by number of the update: of the value at the diamond's centre
+    std::vector<std::uint8_t> steps;  // by number of the update: which of error_steps its error is
+    std::vector<float> error_steps;   // ascending, at most kMaxErrorSteps
+    SurfaceErrors surface;            // by supercube, and by number of the update
     std::shared_ptr<const FieldStatistics> statistics = {};
   };
   // Fails where sizes or ranges of the parts do not match; validate() checks the meaning.

@@ -1,9 +1,10 @@
-// Range coding of the error steps of a data set of one range. FORMAT.md is the specification.
+// Range coding of the error steps and the slopes of a data set of one range. FORMAT.md is the specification.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -42,6 +43,39 @@ bool code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint
       for (BrickIndex brick = begin; brick < end; ++brick) {
         may_stop(parallel);
         set.for_each_in_brick(brick, kSlotsOfClass[std::size_t(cls)], visit);
+        if (is_overdrawn(coder)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+// Slopes, by update, from coarse to fine: each is mostly near its parents' and the one before. As code_error_steps(), of
+// slopes that are at most kMaxSlope.
+template <class Coder>
+bool code_update_slopes(Coder& coder, const SupercubeSet& set, std::span<std::uint8_t> slopes, const ParallelFor& parallel) {
+  static_assert(kMaxSlope == 15);
+  struct OfClass {
+    std::array<std::array<NumberModel<4>, 4>, 16> model;  // by the mean of the parents, and a quarter of the one before
+  };
+  const auto models = std::make_unique<std::array<std::array<OfClass, 2>, 3>>();  // by class, and whether it is the finest
+  for (int scale = kMaxLevels - 1; scale >= 0; --scale) {
+    const auto [begin, end] = set.of_scale(scale);
+    for (int cls = 0; cls <= 2; ++cls) {
+      OfClass& here = (*models)[std::size_t(cls)][scale == 0];
+      for (BrickIndex brick = begin; brick < end; ++brick) {
+        may_stop(parallel);
+        unsigned before = 0;
+        set.for_each_in_brick(brick, kSlotsOfClass[std::size_t(cls)], [&](const Place& p) {
+          unsigned sum = 0, parents = 0;
+          for_each_parent(set, p, [&](UpdateIndex parent) {
+            sum += slopes[parent];
+            ++parents;
+          });
+          const unsigned mean = parents == 0 ? kMaxSlope : sum / parents;
+          before = here.model[mean][before / 4].code(coder, slopes[p.index]);
+          slopes[p.index] = std::uint8_t(before);
+        });
         if (is_overdrawn(coder)) return false;
       }
     }

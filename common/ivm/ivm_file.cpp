@@ -72,6 +72,14 @@ std::vector<std::uint8_t> coded_error_steps(const IntervalVolume& volume) {
   return coder.finish();
 }
 
+std::vector<std::uint8_t> coded_update_slopes(const IntervalVolume& volume) {
+  std::vector<std::uint8_t> slopes(volume.size());
+  for (UpdateIndex i{0}; i < volume.size(); ++i) slopes[i] = std::uint8_t(volume.relevant().slope(i));
+  RangeEncoder coder;
+  (void)code_update_slopes(coder, volume.set(), slopes, serial);
+  return coder.finish();
+}
+
 std::string name_of(StreamType type) { return "stream " + std::to_string(std::uint32_t(type)); }
 
 tl::unexpected<Error> does_not_decompress(StreamType type) { return fail(name_of(type) + " does not decompress"); }
@@ -107,8 +115,8 @@ Result<RangeRecord> read_range(const Container& file, Description& d) {
   if (r.updates > std::numeric_limits<std::uint32_t>::max()) return fail("more updates than this program can read");
   if (r.bricks > r.supercubes || r.supercubes > r.updates || r.updates > r.supercubes * kSlots || r.coefficients > r.updates * kMostCuts)
     return fail("the counts contradict each other");
-  // An update's key, its bounds, its error step and what that is decoded with; what makes the set, and its supercubes.
-  file.claim(r.updates * (3 * ValueKeys(0, d.format.last).width() + 3) + r.supercubes * 56 + r.bricks * 128);
+  // An update's key, its bounds, its error step and what that is decoded with, its slope; what makes the set, and its supercubes.
+  file.claim(r.updates * (3 * ValueKeys(0, d.format.last).width() + 5) + r.supercubes * 56 + r.bricks * 128);
   d.refine = Refine(r.refine);
   d.range = {r.alpha, r.beta};
   d.coefficients = r.coefficients;
@@ -167,11 +175,18 @@ Result<void> read_errors(const Container& file, const RangeRecord& r, IntervalVo
   if (!errors->empty()) std::memcpy(parts.error_steps.data(), errors->data(), errors->size());
   const auto codes = read_exactly(file, StreamType::error_to_distance, r.supercubes);
   if (!codes) return tl::unexpected(codes.error());
-  parts.error_to_distance.reserve(codes->size());
-  for (const std::uint8_t code : *codes) parts.error_to_distance.emplace_back(code);
+  parts.surface.to_distance.reserve(codes->size());
+  for (const std::uint8_t code : *codes) parts.surface.to_distance.emplace_back(code);
   parts.steps.resize(r.updates);
   RangeDecoder coder(octets(file[StreamType::error_steps]));
   if (!code_error_steps(coder, parts.set, parts.steps, parallel) || !coder.is_spent()) return does_not_decompress(StreamType::error_steps);
+  const auto slopes = octets(file[StreamType::update_slopes]);
+  if (slopes.empty()) return {};
+  if (r.updates > most_coded_bits(slopes.size())) return does_not_decompress(StreamType::update_slopes);
+  parts.surface.slopes.resize(r.updates);
+  RangeDecoder of_slopes(slopes);
+  if (!code_update_slopes(of_slopes, parts.set, parts.surface.slopes, parallel) || !of_slopes.is_spent())
+    return does_not_decompress(StreamType::update_slopes);
   return {};
 }
 
@@ -183,9 +198,13 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
   append_labels(streams, volume.description().labels);
   const RangeRecord record = record_of(volume);
   append(streams[StreamType::range], std::span(&record, 1));
-  parallel(kCompressed.size() + 1, [&](std::size_t i) {
+  parallel(kCompressed.size() + 2, [&](std::size_t i) {
     if (i == kCompressed.size()) {
       append<std::uint8_t>(streams[StreamType::error_steps], coded_error_steps(volume));
+      return;
+    }
+    if (i > kCompressed.size()) {
+      if (volume.relevant().has_slopes()) append<std::uint8_t>(streams[StreamType::update_slopes], coded_update_slopes(volume));
       return;
     }
     std::vector<std::uint8_t> stored;

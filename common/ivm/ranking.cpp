@@ -18,11 +18,12 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
     screen_.emplace(*lod.camera, g);
     pixel_error_ = float(lod.camera->pixel_error);
     const Vec3 spacing = g.affine.spacing();
+    for (unsigned slope = 0; slope <= kMaxSlope; ++slope) removed_[slope] = removed_of(slope);
     spacing_ = std::cbrt(spacing[0]) * std::cbrt(spacing[1]) * std::cbrt(spacing[2]);
   }
 }
 
-Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_error) const {
+Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_error, unsigned slope) const {
   Brick b;
   b.ranking_ = this;
   const SupercubeKey key = volume_.set().bricks()[brick].key;
@@ -40,9 +41,9 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
   }
   b.pixels_ = pixels_per_unit(region);
   b.near_ = screen_->is_near(region);
-  b.area_ = area_of(region, b.scale_, b.pixels_, !b.near_);
+  b.weight_ = weight_of(region, b.scale_, b.pixels_, !b.near_);
   const float pixels = object_error * b.pixels_;
-  if (pixels > pixel_error_) b.bound_ = rank_of(importance_of(pixels, b.area_));
+  if (pixels > pixel_error_) b.bound_ = rank_of(importance_of(pixels, slope, b.weight_));
   return b;
 }
 
@@ -50,10 +51,11 @@ float Ranking::pixels_per_unit(const ScreenError::Region& region) const {
   return float(std::min(screen_->pixels_per_unit(region), double(kMostImportance)));
 }
 
-// Of the surfaces of a diamond in the region; if not exact, at most. pixels: of one world unit there.
-float Ranking::area_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const {
-  const double h = std::ldexp(spacing_, scale) * double(pixels);
-  return float(std::clamp(h * h * (is_exact ? screen_->seen_share(region) : 1), 1e-30, 1e30));
+// If not exact, at most. pixels: of one world unit there.
+float Ranking::weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const {
+  const double spacing = spacing_ * double(pixels);
+  const double weight = relevant_.has_slopes() ? spacing * spacing * spacing : std::ldexp(spacing * spacing, 2 * scale);
+  return float(std::clamp(weight * (is_exact ? screen_->seen_share(region) : 1), 1e-30, 1e30));
 }
 
 Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, SupercubeKey key) const {
@@ -63,11 +65,11 @@ Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, Supercube
   s.key_ = key;
   s.scale_ = scale_;
   s.pixels_ = pixels_;
-  s.area_ = area_;
+  s.weight_ = weight_;
   if (near_) {
     const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
     s.pixels_ = ranking_->pixels_per_unit(region);
-    s.area_ = ranking_->area_of(region, scale_, s.pixels_, true);
+    s.weight_ = ranking_->weight_of(region, scale_, s.pixels_, true);
   }
   return s;
 }

@@ -2,11 +2,13 @@
 // function of the data set and the level of detail.
 //
 // Without a camera, updates are ranked by their field error. With one, those are wanted that move surfaces by more than
-// its pixel error; they are ranked by the squared deviation on the screen that they remove, summed up over the picture:
-// by the square of the deviation in pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2,
-// as far as they are in the picture. So what is large in the picture comes before what is far off in one place. Pixels
-// a world unit, for the nearest visible point, and the share that is seen are computed once a supercube, or once a
-// brick that is far away.
+// its pixel error; they are ranked by the squared deviation on the screen that they remove, summed up over the picture.
+// Where slopes are known (relevant_updates.h), that is what they say, times the cube of the spacing of samples in pixels:
+// its square, as deviations are seen so large; and its square once more, if all pixels should count alike, but not, if
+// all of the surface should. Otherwise it is estimated: the square of the deviation in pixels, times the pixels that the
+// diamond's surfaces cover, about (h in pixels)^2. Both as far as the surfaces are in the picture. So what is large in
+// the picture comes before what is far off in one place. Pixels a world unit, for the nearest visible point, and the
+// share that is seen are computed once a supercube, or once a brick that is far away.
 #pragma once
 
 #include <algorithm>
@@ -35,13 +37,14 @@ class Ranking {
   // Ranks the updates of one supercube.
   class Supercube {
    public:
-    // The importance of an update with this error step, with which it grows: 0 if it is not wanted for its own sake.
+    // The importance of an update with this error step and slope, with which it grows: 0 if it is not wanted for its own
+    // sake.
     // The region of interest is not considered.
-    [[nodiscard]] float importance(unsigned step) const {
+    [[nodiscard]] float importance(unsigned step, unsigned slope) const {
       if (step < ranking_->least_step_) return 0;
       if (!ranking_->screen_) return float(step + 1);
       const float pixels = ranking_->relevant_.object_error(supercube_, scale_, step) * pixels_;
-      return pixels > ranking_->pixel_error_ ? importance_of(pixels, area_) : 0;
+      return pixels > ranking_->pixel_error_ ? ranking_->importance_of(pixels, slope, weight_) : 0;
     }
     // The least importance of this rank, 1 or more; and the rank of an importance.
     [[nodiscard]] float least(Rank rank) const {
@@ -52,15 +55,15 @@ class Ranking {
       if (importance == 0) return 0;
       return ranking_->screen_ ? rank_of(importance) : Rank(importance);
     }
-    // No lower than the rank of any update here whose error step is no higher.
-    [[nodiscard]] Rank bound(unsigned step) const { return rank(importance(step)); }
+    // No lower than the rank of any update here whose error step and slope are no higher.
+    [[nodiscard]] Rank bound(unsigned step, unsigned slope) const { return rank(importance(step, slope)); }
     // Whether the diamond in a slot meets the region of interest.
     [[nodiscard]] bool meets_roi(Slot slot) const {
       return !ranking_->roi_ || ranking_->roi_->meets(centre_of(key_, slot), std::int32_t(1) << scale_);
     }
     // The rank of update i, in this slot.
     [[nodiscard]] Rank operator()(UpdateIndex i, Slot slot) const {
-      return meets_roi(slot) ? rank(importance(ranking_->volume_.error_step(i))) : Rank(0);
+      return meets_roi(slot) ? rank(importance(ranking_->volume_.error_step(i), ranking_->relevant_.slope(i))) : Rank(0);
     }
 
    private:
@@ -70,7 +73,7 @@ class Ranking {
     SupercubeKey key_ = 0;
     int scale_ = 0;
     float pixels_ = 0;  // of one world unit
-    float area_ = 0;    // that the surfaces of a diamond cover in the picture, in pixels
+    float weight_ = 0;  // of what is removed
   };
 
   // Ranks the supercubes of one brick.
@@ -88,14 +91,14 @@ class Ranking {
     const Ranking* ranking_ = nullptr;
     int scale_ = 0;
     bool near_ = false;  // distances from the camera to its supercubes differ much
-    float pixels_ = 0, area_ = 0;
+    float pixels_ = 0, weight_ = 0;
     Rank bound_ = 0;
   };
   [[nodiscard]] Brick of_brick(BrickIndex brick) const {
-    return of_brick(brick, relevant_.brick_error_step(brick), relevant_.brick_object_error(brick));
+    return of_brick(brick, relevant_.brick_error_step(brick), relevant_.brick_object_error(brick), relevant_.brick_slope(brick));
   }
-  // The same, if only updates with no higher error step and no larger object error remain.
-  [[nodiscard]] Brick of_brick(BrickIndex brick, unsigned step, float object_error) const;
+  // The same, if only updates with no higher error step or slope and no larger object error remain.
+  [[nodiscard]] Brick of_brick(BrickIndex brick, unsigned step, float object_error, unsigned slope) const;
 
   // Without a camera: the largest field error that remains once all updates of higher ranks are applied.
   [[nodiscard]] double error(Rank rank) const;
@@ -107,8 +110,10 @@ class Ranking {
 
  private:
   static constexpr float kLeastImportance = std::numeric_limits<float>::min(), kMostImportance = 0x1p100f;
-  // Squared deviation times area, in pixels to the fourth. Above 0.
-  [[nodiscard]] static float importance_of(float pixels, float area) { return std::max(pixels * pixels * area, kLeastImportance); }
+  // Above 0.
+  [[nodiscard]] float importance_of(float pixels, unsigned slope, float weight) const {
+    return std::max((relevant_.has_slopes() ? removed_[slope] : pixels * pixels) * weight, kLeastImportance);
+  }
   // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1.
   static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 32;
   [[nodiscard]] static Rank rank_of(float importance) {
@@ -116,7 +121,7 @@ class Ranking {
     return Rank(std::max(rank, 1));
   }
   [[nodiscard]] float pixels_per_unit(const ScreenError::Region& region) const;
-  [[nodiscard]] float area_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const;
+  [[nodiscard]] float weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const;
 
   const IntervalVolume& volume_;
   const RelevantUpdates& relevant_;
@@ -124,7 +129,8 @@ class Ranking {
   std::optional<SeenBox> roi_;
   std::optional<ScreenError> screen_;
   float pixel_error_ = 0;
-  double spacing_ = 0;  // between samples, the geometric mean over the axes
+  double spacing_ = 0;                          // between samples, the geometric mean over the axes
+  std::array<float, kMaxSlope + 1> removed_{};  // by slope
 };
 
 }  // namespace intervale

@@ -1,5 +1,6 @@
 #include "common/ivm/relevant_updates.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -15,6 +16,16 @@ namespace {
 // 2^20.
 constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
 constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
+
+constexpr double kSlopeStep = 1.5;  // octaves
+constexpr int kSlopeOfOne = 7;
+
+// Numbers of four bits, two a byte.
+std::vector<std::uint8_t> in_halves(std::span<const std::uint8_t> numbers) {
+  std::vector<std::uint8_t> result((numbers.size() + 1) / 2);
+  for (std::size_t i = 0; i < numbers.size(); ++i) result[i / 2] = std::uint8_t(result[i / 2] | numbers[i] << (i % 2 * 4));
+  return result;
+}
 
 }  // namespace
 
@@ -60,12 +71,22 @@ double diamond_width(const Grid& grid) {
   return 2 * longest;
 }
 
+unsigned slope_of(double removed) {
+  if (!(removed > 0)) return 0;
+  return unsigned(std::clamp(std::lround(std::log2(removed) / kSlopeStep) + kSlopeOfOne, 1L, long(kMaxSlope) - 1));
+}
+
+float removed_of(unsigned slope) { return slope == 0 ? 0 : float(std::exp2((int(slope) - kSlopeOfOne) * kSlopeStep)); }
+
 RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown,
-                                 std::vector<std::uint64_t> slots, std::vector<ErrorToDistance> error_to_distance)
+                                 std::vector<std::uint64_t> slots, SurfaceErrors surface)
     : shown_(std::move(shown)),
       slots_(std::move(slots)),
-      error_to_distance_(std::move(error_to_distance)),
+      error_to_distance_(std::move(surface.to_distance)),
       supercube_step_(set.supercubes()),
+      slopes_(in_halves(surface.slopes)),
+      supercube_slope_(set.supercubes()),
+      brick_slope_(set.bricks().size()),
       brick_updates_(set.bricks().size()),
       brick_step_(set.bricks().size()),
       brick_object_error_(set.bricks().size()),
@@ -87,29 +108,41 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
       }
       supercube_step_[s] = most;
       brick_step_[b] = std::max(brick_step_[b], most);
+      if (has_slopes()) {
+        for (const Slot slot : set_bits<Slot>(relevant))
+          supercube_slope_[s] = std::max(supercube_slope_[s], std::uint8_t(slope(first + count_below(occupancy, slot))));
+        brick_slope_[b] = std::max(brick_slope_[b], supercube_slope_[s]);
+      }
       brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
     });
   }
 }
 
 std::size_t RelevantUpdates::memory_bytes() const {
-  return slots_.size() * sizeof(std::uint64_t) + error_to_distance_.size() + supercube_step_.size() + brick_step_.size() +
-         brick_updates_.size() * sizeof(std::uint16_t) + brick_object_error_.size() * sizeof(float) + error_.size() * sizeof(float);
+  return slots_.size() * sizeof(std::uint64_t) + error_to_distance_.size() + supercube_step_.size() + brick_step_.size() + slopes_.size() +
+         supercube_slope_.size() + brick_slope_.size() + brick_updates_.size() * sizeof(std::uint16_t) + brick_object_error_.size() * sizeof(float) +
+         error_.size() * sizeof(float);
 }
 
 RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown) {
   const SupercubeSet& set = volume.set();
   std::vector<std::uint64_t> slots(set.supercubes());
-  std::vector<ErrorToDistance> to_distance(set.supercubes());
+  SurfaceErrors surface{std::vector<ErrorToDistance>(set.supercubes())};
+  if (std::all_of(each.begin(), each.end(), [](const auto& one) { return one->has_slopes(); })) {
+    surface.slopes.resize(volume.size());
+    for (const auto& one : each) {
+      for (UpdateIndex i{0}; i < volume.size(); ++i) surface.slopes[i] = std::max(surface.slopes[i], std::uint8_t(one->slope(i)));
+    }
+  }
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       for (const auto& one : each) {
         slots[s] |= one->slots(s, set.occupancy()[s]);
-        to_distance[s] = ErrorToDistance::farther(to_distance[s], one->error_to_distance()[s], scale_of_key(key));
+        surface.to_distance[s] = ErrorToDistance::farther(surface.to_distance[s], one->error_to_distance()[s], scale_of_key(key));
       }
     });
   }
-  return {volume.description().grid, set, {volume.steps(), volume.error_steps()}, std::move(shown), std::move(slots), std::move(to_distance)};
+  return {volume.description().grid, set, {volume.steps(), volume.error_steps()}, std::move(shown), std::move(slots), std::move(surface)};
 }
 
 }  // namespace intervale

@@ -48,6 +48,20 @@ inline constexpr float kMaxFarDeviation = 64;
 // The width of a diamond with h = 1, the longest diagonal of its two cells a side, in world units.
 [[nodiscard]] double diamond_width(const Grid& grid);
 
+// Slopes: how much squared deviation an update takes away from the surface, together with the descendants that it makes
+// way for, for each of these updates (server/builder/update_slopes.h). In squares of the least spacing of samples, on a
+// scale of logarithms: 1 to 14 are 2^(1.5 (slope - 7)), the nearest of them; 0 is nothing, and kMaxSlope is not measured
+// and comes before all others.
+inline constexpr unsigned kMaxSlope = 15;
+[[nodiscard]] unsigned slope_of(double removed);
+[[nodiscard]] float removed_of(unsigned slope);
+
+// What is known of how far surfaces move.
+struct SurfaceErrors {
+  std::vector<ErrorToDistance> to_distance;  // by supercube
+  std::vector<std::uint8_t> slopes = {};     // by number of the update, at most kMaxSlope; empty: not known
+};
+
 // The errors of an interval volume, by number of the update.
 struct UpdateErrors {
   std::span<const std::uint8_t> steps;  // which of `values` its error is
@@ -56,10 +70,10 @@ struct UpdateErrors {
 
 class RelevantUpdates {
  public:
-  // Of all updates of the set, if slots is empty. slots: by supercube, closed under parents; error_to_distance: by
-  // supercube. shown: what they are relevant to, one range at least.
+  // Of all updates of the set, if slots is empty. slots: by supercube, closed under parents. shown: what they are relevant
+  // to, one range at least.
   RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown, std::vector<std::uint64_t> slots,
-                  std::vector<ErrorToDistance> error_to_distance);
+                  SurfaceErrors surface);
 
   [[nodiscard]] const ShownRanges& shown() const { return shown_; }
   // Of a supercube with this occupancy.
@@ -82,6 +96,11 @@ class RelevantUpdates {
   }
   [[nodiscard]] float brick_object_error(BrickIndex brick) const { return brick_object_error_[brick]; }  // the largest of its relevant updates
   [[nodiscard]] std::span<const ErrorToDistance> error_to_distance() const { return error_to_distance_; }
+  // The slope of an update, and the highest of a brick's or a supercube's relevant updates; 0 where they are not known.
+  [[nodiscard]] bool has_slopes() const { return !slopes_.empty(); }
+  [[nodiscard]] unsigned slope(UpdateIndex i) const { return slopes_.empty() ? 0 : unsigned(slopes_[i / 2] >> (i % 2 * 4)) & 15U; }
+  [[nodiscard]] unsigned brick_slope(BrickIndex brick) const { return brick_slope_[brick]; }
+  [[nodiscard]] std::span<const std::uint8_t> supercube_slopes() const { return supercube_slope_; }
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -89,6 +108,9 @@ class RelevantUpdates {
   std::vector<std::uint64_t> slots_;                // by supercube; empty: all
   std::vector<ErrorToDistance> error_to_distance_;  // by supercube
   std::vector<std::uint8_t> supercube_step_;        // by supercube
+  std::vector<std::uint8_t> slopes_;                // by two updates, the first in the lower half; empty: not known
+  std::vector<std::uint8_t> supercube_slope_;       // by supercube
+  std::vector<std::uint8_t> brick_slope_;           // by brick
   std::vector<std::uint16_t> brick_updates_;        // by brick
   std::vector<std::uint8_t> brick_step_;            // by brick
   std::vector<float> brick_object_error_;           // by brick

@@ -76,28 +76,32 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
         pending.unsent = std::uint16_t(pending.unsent - std::popcount(relevant_->slots(s, occupancy) & sent_.slots(set.first(b, s), occupancy)));
       });
     }
-    pending.error_step = std::uint16_t(relevant_->brick_error_step(b));
+    pending.error_step = std::uint8_t(relevant_->brick_error_step(b));
+    pending.slope = std::uint8_t(relevant_->brick_slope(b));
     pending.object_error = Up16(relevant_->brick_object_error(b));
   }
   steps_page_.assign(set.supercubes() / kStepsPage + 1, 0);
-  steps_.assign(kStepsPage, 0);
+  steps_.assign(kStepsPage, {});
 }
 
-unsigned StreamPlan::error_step(SupercubeIndex s) const {
+StreamPlan::Highest StreamPlan::highest(SupercubeIndex s) const {
   const std::uint32_t page = steps_page_[s / kStepsPage];
-  return page == 0 ? relevant_->supercube_error_steps()[s] : steps_[std::size_t(page) * kStepsPage + s % kStepsPage];
+  return page == 0 ? Highest{relevant_->supercube_error_steps()[s], relevant_->supercube_slopes()[s]}
+                   : steps_[std::size_t(page) * kStepsPage + s % kStepsPage];
 }
 
-void StreamPlan::set_error_step(SupercubeIndex s, unsigned step) {
-  if (step == error_step(s)) return;
+void StreamPlan::set_highest(SupercubeIndex s, Highest to) {
+  if (to == highest(s)) return;
   std::uint32_t& page = steps_page_[s / kStepsPage];
   if (page == 0) {
     page = std::uint32_t(steps_.size() / kStepsPage);
-    const auto all = relevant_->supercube_error_steps().subspan(s - s % kStepsPage);
-    steps_.insert(steps_.end(), all.begin(), all.begin() + std::ptrdiff_t(std::min<std::size_t>(all.size(), kStepsPage)));
+    const std::size_t first = std::size_t(s) - s % kStepsPage;
+    const auto end = std::min<std::size_t>(relevant_->supercube_error_steps().size(), first + kStepsPage);
     steps_.resize((page + 1) * std::size_t(kStepsPage));
+    for (std::size_t i = first; i < end; ++i)
+      steps_[page * std::size_t(kStepsPage) + i - first] = {relevant_->supercube_error_steps()[i], relevant_->supercube_slopes()[i]};
   }
-  steps_[std::size_t(page) * kStepsPage + s % kStepsPage] = std::uint8_t(step);
+  steps_[std::size_t(page) * kStepsPage + s % kStepsPage] = to;
 }
 
 bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
@@ -137,9 +141,13 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     Pending& pending = pending_[here.brick];
     ++pending.unsent;
     const unsigned error_step = volume_->error_step(i);
-    pending.error_step = std::max(pending.error_step, std::uint16_t(error_step));
+    const unsigned slope = relevant_->slope(i);
+    pending.error_step = std::max(pending.error_step, std::uint8_t(error_step));
+    pending.slope = std::max(pending.slope, std::uint8_t(slope));
     pending.object_error = Up16(std::max(float(pending.object_error), relevant_->object_error(here.supercube, scale_of_key(g.key), error_step)));
-    set_error_step(here.supercube, std::max(this->error_step(here.supercube), error_step));
+    Highest highest = this->highest(here.supercube);
+    highest.raise(error_step, slope);
+    set_highest(here.supercube, highest);
   });
   return true;
 }
@@ -156,7 +164,7 @@ void StreamPlan::rank_bricks() {
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     const Pending& w = pending_[b];
     if (w.unsent == 0) continue;
-    const Ranking::Brick ranking = ranking_->of_brick(b, w.error_step, float(w.object_error));
+    const Ranking::Brick ranking = ranking_->of_brick(b, w.error_step, float(w.object_error), w.slope);
     pending_[b].pixels = Up16(ranking_->has_camera() ? ranking.pixels(float(w.object_error)) : 0);
     set_pending(b, std::max(ranking.bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
   }
@@ -277,12 +285,13 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
     if (full) return;
     rest.rank = std::max(rest.rank, here->rank);
     rest.wanted += here->wanted;
-    rest.error_step = std::max(rest.error_step, here->error_step);
-    object_error = std::max(object_error, relevant_->object_error(s, scale_of_key(key), here->error_step));
+    rest.highest.raise(here->highest.error_step, here->highest.slope);
+    object_error = std::max(object_error, relevant_->object_error(s, scale_of_key(key), here->highest.error_step));
   });
   if (full) return false;
   set_pending(brick, rest.rank, rest.wanted);
-  pending_[brick].error_step = std::uint16_t(rest.error_step);
+  pending_[brick].error_step = rest.highest.error_step;
+  pending_[brick].slope = rest.highest.slope;
   pending_[brick].object_error = Up16(object_error);
   if (ranking_->has_camera()) pending_[brick].pixels = Up16(ranking.pixels(object_error));
   return true;
@@ -295,11 +304,11 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const SupercubeIndex s = first.supercube;
   const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
-  Unsent rest{.error_step = error_step(s)};
+  Unsent rest{.highest = highest(s)};
   if (candidates == 0) return rest;
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
-  const Rank bound = std::max(ranking.bound(rest.error_step), budget_ ? Rank(1) : Rank(0));
+  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.slope), budget_ ? Rank(1) : Rank(0));
   if (bound < band_) {
     rest.rank = bound;
     rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
@@ -309,9 +318,10 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   rest = {};
   if (!add_band(ranking, first, candidates, builder, rest)) return {};
   for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
-    rest.error_step = std::max(rest.error_step, volume_->error_step(first.index + std::countr_zero(others)));
+    const UpdateIndex i = first.index + std::countr_zero(others);
+    rest.highest.raise(volume_->error_step(i), relevant_->slope(i));
   }
-  set_error_step(s, rest.error_step);
+  set_highest(s, rest.highest);
   return rest;
 }
 
@@ -324,13 +334,14 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const Place& place,
   float greatest = 0;
   // Without branches on what is in the band: that is hard to foresee.
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
-    const unsigned error_step = volume_->error_step(first + count_below(occupancy, slot));
-    float importance = ranking.importance(error_step);
+    const UpdateIndex i = first + count_below(occupancy, slot);
+    const unsigned error_step = volume_->error_step(i), slope = relevant_->slope(i);
+    float importance = ranking.importance(error_step, slope);
     if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;
     importance = std::max(importance, least);
     const bool is_in_it = importance > 0 && importance >= in_band;
     in_it.slots |= std::uint64_t(is_in_it) << slot;
-    rest.error_step = std::max(rest.error_step, is_in_it ? 0 : error_step);
+    rest.highest.raise(is_in_it ? 0 : error_step, is_in_it ? 0 : slope);
     rest.wanted += unsigned(importance > 0) & unsigned(!is_in_it);
     greatest = std::max(greatest, is_in_it ? 0 : importance);
   }
@@ -376,7 +387,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
 
 std::size_t StreamPlan::memory_bytes() const {
   std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
-  bytes += pending_.capacity() * sizeof(Pending) + steps_page_.capacity() * sizeof steps_page_[0] + steps_.capacity();
+  bytes += pending_.capacity() * sizeof(Pending) + steps_page_.capacity() * sizeof steps_page_[0] + steps_.capacity() * sizeof steps_[0];
   for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
   return bytes;
 }

@@ -7,6 +7,7 @@
 // only if its bound is in the band: a new view costs O(bricks), and then the work for what it sends.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -36,8 +37,8 @@ struct Batch {
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
-// brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and a byte
-// for each supercube.
+// brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and two
+// bytes for each supercube.
 class StreamPlan {
  public:
   // At first everything that the range of the data set needs is relevant.
@@ -121,19 +122,29 @@ class StreamPlan {
     Rank rank = 0;             // of those that are wanted; 0: there are none
     std::uint16_t unsent = 0;  // their number
     std::uint16_t wanted = 0;  // bound on the number of those that are wanted
-    std::uint16_t error_step = 0;
+    std::uint8_t error_step = 0, slope = 0;
     Up16 object_error;
     Up16 pixels;  // on the camera's screen; 0 without one
   };
   void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
-  [[nodiscard]] unsigned error_step(SupercubeIndex s) const;
-  void set_error_step(SupercubeIndex s, unsigned step);
+  // Upper bounds on the error steps and slopes of unsent updates.
+  struct Highest {
+    std::uint8_t error_step = 0, slope = 0;
+    void raise(unsigned step, unsigned its_slope) {
+      error_step = std::max(error_step, std::uint8_t(step));
+      slope = std::max(slope, std::uint8_t(its_slope));
+    }
+    friend bool operator==(const Highest&, const Highest&) = default;
+  };
+  [[nodiscard]] Highest highest(SupercubeIndex s) const;
+  void set_highest(SupercubeIndex s, Highest to);
   void rank_bricks();
   void begin_band();
   // Upper bounds over updates that were visited and not sent.
   struct Unsent {
     Rank rank = 0;
-    unsigned wanted = 0, error_step = 0;
+    unsigned wanted = 0;
+    Highest highest;
   };
   bool visit_brick(BrickIndex brick, BatchBuilder& builder);
   std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent, BatchBuilder& builder);
@@ -149,10 +160,10 @@ class StreamPlan {
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
   std::vector<Pending> pending_;  // by brick
-  // By supercube: bound on the error step of the unsent updates, in pages of 64 supercubes. Page 0: as if none were sent.
+  // By supercube: bounds on its unsent updates, in pages of 64 supercubes. Page 0: as if none were sent.
   static constexpr std::uint32_t kStepsPage = 64;
   std::vector<std::uint32_t> steps_page_;
-  std::vector<std::uint8_t> steps_;
+  std::vector<Highest> steps_;
   std::vector<SentChannel> channels_;         // of the data set
   std::vector<std::size_t> wanted_channels_;  // ascending
   std::uint32_t next_lacking_ = 0;            // bricks before this one lack no value that is wanted

@@ -5,18 +5,19 @@
 
 #include "common/ivm/saturate.h"
 #include "server/builder/surface_deviation.h"
+#include "server/builder/update_slopes.h"
 
 namespace intervale {
 
 // An object error is half of the deviation, but no less than twice the mean deviation of surface points, so that 99 % of
 // them are within it also where all of a surface moves alike, as with labels.
-std::vector<ErrorToDistance> measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
-                                                       const std::function<double(UpdateIndex)>& error_of, double max_error,
-                                                       const ParallelFor& parallel) {
+SurfaceErrors measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
+                                        const std::function<double(UpdateIndex)>& error_of, double max_error, const ParallelFor& parallel) {
   SurfaceDeviation deviation = surface_deviation(volume, range, domain, set, parallel);
   saturate(set, deviation.largest, domain.levels(), parallel);
   const double unit = error_to_distance_unit(volume.grid, max_error);
-  std::vector<ErrorToDistance> result(set.supercubes());
+  SurfaceErrors result{std::vector<ErrorToDistance>(set.supercubes()),
+                       update_slopes(set, deviation.removed, domain.levels(), deviation.top_scale, parallel)};
   parallel(set.bricks().size(), [&](std::size_t b) {
     const BrickIndex brick{std::uint32_t(b)};
     set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
@@ -31,7 +32,7 @@ std::vector<ErrorToDistance> measure_error_to_distance(const Volume& volume, con
       }
       const double share = furthest > 0 ? std::clamp(2 * double(deviation.mean[s]) / furthest, 0.5, 1.0) : 1;
       constexpr double kRounding = 1e-6;
-      result[s] = ErrorToDistance::at_least(share * ratio, unit, furthest > width * (1 + kRounding));
+      result.to_distance[s] = ErrorToDistance::at_least(share * ratio, unit, furthest > width * (1 + kRounding));
     });
   });
   return result;

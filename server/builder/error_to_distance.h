@@ -11,10 +11,9 @@
 
 namespace intervale {
 
-// By supercube of the set, the relevant diamonds. Samples are finite. error: of an update, saturated; max_error: the
+// Of the set, the relevant diamonds; with slopes. Samples are finite. error: of an update, saturated; max_error: the
 // largest of the data set. range: as of surface_deviation(). Throws what `parallel` throws.
-[[nodiscard]] std::vector<ErrorToDistance> measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain,
-                                                                     const SupercubeSet& set, const std::function<double(UpdateIndex)>& error,
-                                                                     double max_error, const ParallelFor& parallel);
+[[nodiscard]] SurfaceErrors measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
+                                                      const std::function<double(UpdateIndex)>& error, double max_error, const ParallelFor& parallel);
 
 }  // namespace intervale

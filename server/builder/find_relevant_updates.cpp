@@ -47,11 +47,12 @@ std::vector<RangePart> parts_of(const ValueFormat& format, const ShownRange& sho
   return parts;
 }
 
-std::vector<ErrorToDistance> PartFinder::measure(const Range& range, const std::vector<std::uint64_t>& slots) {
+SurfaceErrors PartFinder::measure(const Range& range, const std::vector<std::uint64_t>& slots) {
   const SupercubeSet& all = volume_.set();
   std::vector<SupercubeKey> keys;
   std::vector<std::uint64_t> occupancy;
   std::vector<std::uint8_t> steps;  // of those that are relevant
+  std::vector<UpdateIndex> update;
   std::vector<SupercubeIndex> number;
   for (BrickIndex brick{0}; brick < all.bricks().size(); ++brick) {
     all.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
@@ -60,28 +61,30 @@ std::vector<ErrorToDistance> PartFinder::measure(const Range& range, const std::
       occupancy.push_back(slots[s]);
       number.push_back(s);
       for (const Slot slot : set_bits<Slot>(slots[s])) {
-        steps.push_back(std::uint8_t(volume_.error_step(all.first(brick, s) + count_below(all.occupancy()[s], slot))));
+        update.push_back(all.first(brick, s) + count_below(all.occupancy()[s], slot));
+        steps.push_back(std::uint8_t(volume_.error_step(update.back())));
       }
     });
   }
-  std::vector<ErrorToDistance> result(all.supercubes());
+  SurfaceErrors result{std::vector<ErrorToDistance>(all.supercubes()), std::vector<std::uint8_t>(all.size())};
   if (keys.empty()) return result;
   const SupercubeSet relevant(keys, std::move(occupancy));
   if (!field_) field_.emplace(volume_, parallel_);
   const auto found = measure_error_to_distance(
       field_->samples(), field_->surface_of(range), volume_.domain(), relevant,
       [&](UpdateIndex i) { return double(volume_.error_steps()[steps[i]]); }, volume_.description().max_error, parallel_);
-  for (std::size_t i = 0; i < number.size(); ++i) result[number[i]] = found[i];
+  for (std::size_t i = 0; i < number.size(); ++i) result.to_distance[number[i]] = found.to_distance[i];
+  for (std::size_t i = 0; i < update.size(); ++i) result.slopes[update[i]] = found.slopes[i];
   return result;
 }
 
 std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
   std::vector<std::uint64_t> slots = relevant_slots(volume_, part.shown, parallel_);
-  std::vector<ErrorToDistance> to_distance(volume_.set().supercubes());
-  if (part.distances == Distances::estimated) to_distance = estimate_distances(volume_, part.shown.range, slots, parallel_);
-  if (part.distances == Distances::measured) to_distance = measure(part.shown.range, slots);
+  SurfaceErrors surface{std::vector<ErrorToDistance>(volume_.set().supercubes())};
+  if (part.distances == Distances::estimated) surface.to_distance = estimate_distances(volume_, part.shown.range, slots, parallel_);
+  if (part.distances == Distances::measured) surface = measure(part.shown.range, slots);
   return std::make_shared<const RelevantUpdates>(volume_.description().grid, volume_.set(), UpdateErrors{volume_.steps(), volume_.error_steps()},
-                                                 ShownRanges{part.shown}, std::move(slots), std::move(to_distance));
+                                                 ShownRanges{part.shown}, std::move(slots), std::move(surface));
 }
 
 std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,

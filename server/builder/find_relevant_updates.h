@@ -46,7 +46,7 @@ class PartFinder {
   [[nodiscard]] const IntervalVolume& volume() const { return volume_; }
 
  private:
-  [[nodiscard]] std::vector<ErrorToDistance> measure(const Range& range, const std::vector<std::uint64_t>& slots);
+  [[nodiscard]] SurfaceErrors measure(const Range& range, const std::vector<std::uint64_t>& slots);
 
   const IntervalVolume& volume_;
   ParallelFor parallel_;

@@ -26,6 +26,9 @@ constexpr double kFarWidths = 2.01;             // a patch further away than so 
 constexpr double kLeastDeviation = 1e-4;        // of the finest diamonds' width: smaller deviations count as 0
 constexpr double kInsideBox = 1.0 / (1 << 16);  // of a sample: points in the far sides of the box are moved so far into it
 
+// Sums of squared deviations are whole numbers, so that their order does not matter.
+constexpr double kRemovedOne = 1 << 20;
+
 using Tet = BisectionTet;
 
 // Where a value lies between two others, 0 at `from` and 1 at `to`. Halved if their difference is more than a double holds.
@@ -97,7 +100,7 @@ template <class T>
 class Descent {
  public:
   Descent(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& largest,
-          std::vector<Mean>& means)
+          std::vector<Mean>& means, std::vector<std::int64_t>& removed)
       : field_(field),
         affine_(grid.affine),
         inverse_(grid.affine.inverse()),
@@ -105,6 +108,7 @@ class Descent {
         set_(set),
         largest_(largest),
         means_(means),
+        removed_(removed),
         width_(diamond_width(grid)) {
     if (std::isfinite(range.alpha)) surface_[surfaces_++] = {range.alpha, false};
     if (std::isfinite(range.beta)) surface_[surfaces_++] = {range.beta, true};
@@ -277,11 +281,14 @@ class Descent {
   // By surface: how far the next patch is, at most, from any point here, as far as coarser diamonds know.
   using Nearest = std::array<double, 2>;
 
-  // Records what the crossings in a tetrahedron say of its diamond, and narrows `nearest` where there is a patch.
-  void record(const Tet& tet, Vertex centre, UpdateIndex update, std::span<const Crossing> crossings, Nearest& nearest,
-              const NearByScale& near) const {
+  // Records what the crossings in a tetrahedron say of its diamond, and narrows `nearest` where there is a patch. Returns
+  // the sum of the squares of their deviations, in squares of width_.
+  double record(const Tet& tet, Vertex centre, UpdateIndex update, std::span<const Crossing> crossings, Nearest& nearest,
+                const NearByScale& near) const {
     const std::array<float, 4> values{tet.corner[0].value, tet.corner[1].value, tet.corner[2].value, tet.corner[3].value};
     double alpha_off = -1, beta_off = -1, sum = 0;  // the largest differences of the interpolant from each surface's value; -1: no crossing
+    std::array<double, 2> squares{};                // of the differences, their sum; by surface
+    std::array<int, 2> count{};
     for (const Crossing& c : crossings) {
       float at = 0;
       for (int i = 0; i < 4; ++i) at += c.at[i] * values[i];
@@ -289,44 +296,60 @@ class Descent {
       alpha_off = std::max(alpha_off, c.surface == 0 ? here : -1.0);
       beta_off = std::max(beta_off, c.surface == 0 ? -1.0 : here);
       sum += here;
+      squares[std::size_t(c.surface)] += here * here;
+      ++count[std::size_t(c.surface)];
     }
     const double width = width_ * double(1 << tet.scale);
     const bool is_moved =
         !near.inside && !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Tet::Corner& c) { return domain_.contains(c.at); });
     const double slope = is_moved ? 0 : std::sqrt(dot(tet.gradient, tet.gradient));
     const std::array<double, 2> off{alpha_off, beta_off};
-    double largest = 0;
+    double largest = 0, sum_of_squares = 0;
     for (int k = 0; k < surfaces_; ++k) {
       if (off[k] < 0) continue;
       if (is_moved || has_patch(tet, centre, surface_[k])) {
         nearest[k] = width;
         largest = std::max(largest, off[k] < width * slope ? off[k] / slope : width);
+        const double most = count[k] * width * width;
+        sum_of_squares += squares[k] < most * slope * slope ? squares[k] / (slope * slope) : most;
       } else {
-        largest = std::max(largest, nearest[k] > kFarWidths * width ? nearest[k] : width);
+        const double far = nearest[k] > kFarWidths * width ? nearest[k] : width;
+        largest = std::max(largest, far);
+        sum_of_squares += count[k] * far * far;
       }
     }
     if (largest > kLeastDeviation * width_) raise(largest_[update], round_up(largest));
     if (!is_moved) means_[near[std::size_t(tet.scale)].supercube].add(sum / double(crossings.size()) / (width * slope));
+    return sum_of_squares / (width_ * width_);
   }
 
-  void descend(const Tet& tet, std::span<Crossing> crossings, Nearest nearest, NearByScale& near) const {
+  // Returns what record() does.
+  double descend(const Tet& tet, std::span<Crossing> crossings, Nearest nearest, NearByScale& near) const {
     const int tail = tet.tail();
     const Vertex a = tet.corner[0].at, b = tet.corner[tail].at;
     const Vertex centre{(a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2};
     const auto update = find(centre, tet.scale, near);
-    if (!update) return;
-    record(tet, centre, *update, crossings, nearest, near);
-    if (tet.scale == 0 && tet.cls == 2) return;
+    if (!update) return 0;
+    const double before = record(tet, centre, *update, crossings, nearest, near);
+    double after = 0;
+    if (tet.scale > 0 || tet.cls < 2) after = descend_into_halves(tet, {centre, float(value(centre))}, crossings, nearest, near);
+    std::atomic_ref<std::int64_t>(removed_[*update]).fetch_add(std::llround((before - after) * kRemovedOne), std::memory_order_relaxed);
+    return before;
+  }
+
+  double descend_into_halves(const Tet& tet, const Tet::Corner& middle, std::span<Crossing> crossings, const Nearest& nearest,
+                             NearByScale& near) const {
+    const int tail = tet.tail();
+    double sum = 0;
     const auto end_of_first = std::partition(crossings.begin(), crossings.end(), [tail](const Crossing& c) { return c.at[0] >= c.at[tail]; });
     const auto split = std::size_t(end_of_first - crossings.begin());
     const std::span<Crossing> first = crossings.first(split), second = crossings.subspan(split);
-    const Tet::Corner middle{centre, float(value(centre))};
     if (!first.empty()) {
       for (Crossing& c : first) {
         c.at[0] -= c.at[tail];
         c.at[tail] *= 2;
       }
-      descend(half_at_start(tet, middle), first, nearest, near);
+      sum += descend(half_at_start(tet, middle), first, nearest, near);
     }
     if (!second.empty()) {
       for (Crossing& c : second) {
@@ -336,17 +359,19 @@ class Descent {
         c.at[tail - 1] = rest;
         c.at[tail] = 2 * head;
       }
-      descend(half_at_end(tet, middle), second, nearest, near);
+      sum += descend(half_at_end(tet, middle), second, nearest, near);
     }
+    return sum;
   }
 
   const Field<T>& field_;
   Affine affine_, inverse_;  // of the grid
   const Domain& domain_;
   const SupercubeSet& set_;
-  std::vector<float>& largest_;  // by update
-  std::vector<Mean>& means_;     // by supercube: deviations in its tetrahedra over the diamonds' width
-  double width_;                 // of a diamond with h = 1
+  std::vector<float>& largest_;         // by update
+  std::vector<Mean>& means_;            // by supercube: deviations in its tetrahedra over the diamonds' width
+  std::vector<std::int64_t>& removed_;  // by update, in squares of width_ / kRemovedOne
+  double width_;                        // of a diamond with h = 1
   std::array<Isovalue, 2> surface_{};
   std::array<float, 2> isovalue_{};  // counted from zero_
   int surfaces_ = 0;
@@ -357,14 +382,16 @@ class Descent {
 
 SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
                                    const ParallelFor& parallel) {
-  SurfaceDeviation result{std::vector<float>(set.size(), 0), std::vector<float>(set.supercubes())};
+  SurfaceDeviation result{std::vector<float>(set.size(), 0), std::vector<float>(set.supercubes()), std::vector<double>(set.size()), 0};
+  std::vector<std::int64_t> removed(set.size());
   std::vector<float>& largest = result.largest;
   std::vector<Mean> means(set.supercubes());
   const int top = std::min(kTopScale, domain.levels() - 1);
+  result.top_scale = top;
   const double width = diamond_width(volume.grid);
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain.last()};
-    const Descent<T> descent(field, range, volume.grid, domain, set, largest, means);
+    const Descent<T> descent(field, range, volume.grid, domain, set, largest, means, removed);
     std::vector<Diamond> cubes;  // shared out one by one: they are few, and bricks even fewer
     set.for_each(top, 0, [&](const Place& p) { cubes.emplace_back(set.centre(p)); });
     parallel(cubes.size(), [&](std::size_t i) { descent.measure(cubes[i]); });
@@ -375,6 +402,9 @@ SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, con
       });
     });
   });
+  const Vec3 spacing = volume.grid.affine.spacing();
+  const double unit = width / std::min({spacing[0], spacing[1], spacing[2]});
+  for (UpdateIndex i{0}; i < set.size(); ++i) result.removed[i] = double(removed[i]) / kRemovedOne * unit * unit;
   for (int scale = top + 1; scale < domain.levels(); ++scale) {
     const auto [begin, end] = set.of_scale(scale);
     for (BrickIndex b = begin; b < end; ++b)

@@ -30,6 +30,11 @@ struct SurfaceDeviation {
   std::vector<float> largest;
   // By supercube: the mean over the surface points in its tetrahedra; 0 if it was not measured.
   std::vector<float> mean;
+  // By update: the sum over the surface points in its tetrahedra of what its refinement takes off the square of their
+  // deviation, in squares of the least spacing; below 0 where it moves the surface away. Not measured for diamonds of
+  // scales coarser than top_scale: 0. The same whatever the number of threads.
+  std::vector<double> removed;
+  int top_scale = 0;
 };
 
 // Of the diamonds of `set`, the relevant ones. Samples are finite. Of `range` only the surfaces count: alpha may be

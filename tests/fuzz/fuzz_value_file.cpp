@@ -36,7 +36,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const intervale::ShownRange shown{{middle, middle}, {}};
   const intervale::RelevantUpdates relevant(volume->description().grid, volume->set(), {volume->steps(), volume->error_steps()},
                                             intervale::ShownRanges{shown}, relevant_slots(*volume, shown),
-                                            std::vector<intervale::ErrorToDistance>(volume->set().supercubes()));
+                                            {std::vector<intervale::ErrorToDistance>(volume->set().supercubes())});
   if (const auto mesh = extract(*volume, relevant, {}); !mesh || mesh->front.validate()) std::abort();
   if (!intervale::decode_values(intervale::encode_values(*decoded), "again")) std::abort();
   return 0;

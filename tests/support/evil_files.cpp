@@ -251,6 +251,8 @@ void lie_about_one_range(Liar& lie) {
   lie("error-to-distance-short", plane(Stream::error_to_distance, shorter_by(1)), "expected");
   lie("error-to-distance-bomb", bomb(Stream::error_to_distance, 1), "");
   lie("error-steps-long", longer(Stream::error_steps, 64), "does not decompress");
+  lie("slopes-long", longer(Stream::update_slopes, 64), "does not decompress");
+  lie("slopes-short", bytes_of(Stream::update_slopes, std::string(1, '\xff')), "does not decompress");
   lie(
       "sides-vast",
       [](Streams& s) {

@@ -177,7 +177,7 @@ TEST(IntervalVolumeSet, RefusesYieldsThatAreNotOneForEachSupercube) {
   ASSERT_TRUE(made);
   for (const std::size_t size : {std::size_t(0), made->relevant().error_to_distance().size() - 1, made->relevant().error_to_distance().size() + 1}) {
     auto parts = testing::parts_of(*made);
-    parts.error_to_distance.resize(size);
+    parts.surface.to_distance.resize(size);
     EXPECT_FALSE(IntervalVolume::assemble(std::move(parts)));
   }
 }
@@ -269,7 +269,8 @@ TEST_P(IntervalVolumeAssemble, AnotherPartIsAnotherContent) {
   const std::uint64_t hash = hash_of(made_);
   EXPECT_EQ(hash_after([](Parts& p) { p.description.name += "'"; }), hash);
   EXPECT_EQ(hash_after([](Parts& p) { p.description.labels.field = "density"; }), hash);
-  EXPECT_NE(hash_after([](Parts& p) { p.error_to_distance.back() = ErrorToDistance(std::uint8_t(p.error_to_distance.back().code() ^ 1)); }), hash);
+  EXPECT_NE(hash_after([](Parts& p) { p.surface.to_distance.back() = ErrorToDistance(std::uint8_t(p.surface.to_distance.back().code() ^ 1)); }),
+            hash);
   EXPECT_NE(hash_after([](Parts& p) { p.keys.set(0, p.keys[0] == 0 ? 1 : p.keys[0] - 1); }), hash);
   EXPECT_NE(hash_after([](Parts& p) { p.steps.back() = std::uint8_t(p.steps.back() == 0 ? 1 : 0); }), hash);
   EXPECT_NE(hash_after([](Parts& p) { p.description.is_exact = false; }), hash);

@@ -57,12 +57,14 @@ void expect_equal(const IntervalVolume& a, const IntervalVolume& b) {
   EXPECT_TRUE(std::ranges::equal(a.set().occupancy(), b.set().occupancy()));
   EXPECT_TRUE(std::ranges::equal(a.error_steps(), b.error_steps()));
   EXPECT_TRUE(std::ranges::equal(codes_of(a), codes_of(b)));
+  EXPECT_EQ(a.relevant().has_slopes(), b.relevant().has_slopes());
   ASSERT_EQ(a.size(), b.size());
   a.set().for_each_down([&](const Place& p) {
     const auto q = b.set().find(a.set().centre(p));
     ASSERT_TRUE(q);
     EXPECT_EQ(a.key(p.index), b.key(q->index));
     EXPECT_EQ(a.error(p.index), b.error(q->index));
+    EXPECT_EQ(a.relevant().slope(p.index), b.relevant().slope(q->index));
   });
 }
 
@@ -92,6 +94,19 @@ TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
     const auto valid = validate(**loaded);
     EXPECT_TRUE(valid) << valid.error().message;
   }
+}
+
+TEST(IvmFile, SlopesMayBeMissing) {
+  const IntervalVolume sigma = testing::build(testing::gyroid({9, 9, 9}), {.range = {-0.3, 0.2}});
+  auto parts = testing::parts_of(sigma);
+  ASSERT_FALSE(parts.surface.slopes.empty());
+  parts.surface.slopes.clear();
+  const auto without = IntervalVolume::assemble(std::move(parts));
+  ASSERT_TRUE(without);
+  const auto decoded = decode_ivm(encode_ivm(*without), "without");
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  expect_equal(*without, *decoded);
+  EXPECT_EQ(decoded->description().content_hash, decode_ivm(encode_ivm(sigma), "with")->description().content_hash) << "the mesh is the same";
 }
 
 TEST(IvmFile, EqualVolumesGiveEqualBytesWhateverTheirNames) {
@@ -250,7 +265,8 @@ TEST(IvmFile, ASetWithoutAncestorsIsRefused) {
   parts.set = SupercubeSet(names, std::move(occupancy));
   parts.keys = ValueKeys(parts.set.size(), parts.description.format.last);
   parts.steps.resize(parts.set.size());
-  parts.error_to_distance.resize(parts.set.supercubes());
+  parts.surface.to_distance.resize(parts.set.supercubes());
+  parts.surface.slopes.resize(parts.set.size());
   const auto assembled = IntervalVolume::assemble(std::move(parts));
   ASSERT_TRUE(assembled);
   const auto decoded = decode_exact(encode_ivm(*assembled));
@@ -324,7 +340,9 @@ TEST(Assemble, PartsThatDoNotFitAreRefused) {
     void (*spoil)(Parts&);
   } cases[] = {
       {"too few steps", [](Parts& p) { p.steps.pop_back(); }},
-      {"too few error_to_distance codes", [](Parts& p) { p.error_to_distance.pop_back(); }},
+      {"too few error_to_distance codes", [](Parts& p) { p.surface.to_distance.pop_back(); }},
+      {"too few slopes", [](Parts& p) { p.surface.slopes.pop_back(); }},
+      {"a slope out of range", [](Parts& p) { p.surface.slopes.back() = kMaxSlope + 1; }},
       {"too many steps", [](Parts& p) { p.steps.push_back(0); }},
       {"no steps", [](Parts& p) { p.steps.clear(); }},
       {"no values", [](Parts& p) { p.keys = {}; }},

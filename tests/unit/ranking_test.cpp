@@ -15,6 +15,7 @@
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/parts.h"
 
 namespace intervale {
 namespace {
@@ -106,7 +107,8 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
     const Ranking ranking(volume_, testing::random_lod(volume_.description().grid, random_));
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
       const unsigned level = volume_.relevant().supercube_error_steps()[p.supercube];
-      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level), rank) << "trial " << trial;
+      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, volume_.relevant().supercube_slopes()[p.supercube]), rank)
+          << "trial " << trial;
     });
   }
 }
@@ -159,22 +161,29 @@ TEST_P(Ranks, WhatIsNotWantedDoesNotShow) {
   }
 }
 
+// With slopes, and without.
 TEST_P(Ranks, GrowWithTheSquaredDeviationInThePicture) {
   const Grid& g = volume_.description().grid;
+  auto parts = testing::parts_of(volume_);
+  parts.surface.slopes.clear();
+  const IntervalVolume without = IntervalVolume::assemble(std::move(parts)).value();
   const double spacing = std::cbrt(g.affine.spacing()[0] * g.affine.spacing()[1] * g.affine.spacing()[2]);
-  for (int trial = 0; trial < 20; ++trial) {
+  for (int trial = 0; trial < 40; ++trial) {
     Lod lod;
     lod.camera = testing::random_camera(g, random_);
     lod.camera->pixel_error = std::pow(2.0, testing::uniform(random_, -8, 3));
+    const IntervalVolume& volume = trial % 2 == 0 ? volume_ : without;
     const ScreenError view(*lod.camera, g);
-    const Ranking ranking(volume_, lod);
+    const Ranking ranking(volume, lod);
     std::vector<std::pair<Ranking::Rank, double>> all;  // with what they stand for
-    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+    for_each_rank(volume, ranking, [&](const Place& p, Ranking::Rank rank) {
       if (rank == 0) return;
       const double a_unit = pixels_per_unit(volume_, view, p), pixels = object_error(volume_, p) * a_unit;
       ASSERT_LE(pixels, ranking.of_brick(p.brick).pixels(volume_.relevant().brick_object_error(p.brick)) * (1 + 1e-5)) << "trial " << trial;
-      const double h = std::exp2(scale_of_key(p.key)) * spacing * a_unit;
-      all.emplace_back(rank, pixels * pixels * h * h * view.seen_share(region_around(volume_, view, p)));
+      const double a_step = spacing * a_unit, h = std::exp2(scale_of_key(p.key)) * a_step;
+      const double removed =
+          volume.relevant().has_slopes() ? removed_of(volume.relevant().slope(p.index)) * std::pow(a_step, 3) : pixels * pixels * h * h;
+      all.emplace_back(rank, removed * view.seen_share(region_around(volume_, view, p)));
     });
     std::sort(all.begin(), all.end());
     for (std::size_t i = 1; i < all.size(); ++i) {

@@ -51,6 +51,8 @@ TEST_P(United, IsWhatEachRangeNeeds) {
   for (int trial = 0; trial < 4; ++trial) {
     const Each each = random_ranges();
     const RelevantUpdates all = united(*volume_, each, shown_by(each));
+    const bool has_slopes = std::all_of(each.begin(), each.end(), [](const auto& one) { return one->has_slopes(); });
+    ASSERT_EQ(all.has_slopes(), has_slopes);
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
       unsigned brick_step = 0;
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
@@ -61,6 +63,16 @@ TEST_P(United, IsWhatEachRangeNeeds) {
         unsigned most = 0;
         for (const Slot slot : set_bits<Slot>(slots)) most = std::max(most, volume_->error_step(set.first(b, s) + count_below(occupancy, slot)));
         ASSERT_EQ(all.supercube_error_steps()[s], most);
+        unsigned steepest = 0;
+        for (const Slot slot : set_bits<Slot>(slots)) {
+          const UpdateIndex i = set.first(b, s) + count_below(occupancy, slot);
+          unsigned slope = 0;
+          for (const auto& one : each) slope = std::max(slope, one->slope(i));
+          ASSERT_EQ(all.slope(i), has_slopes ? slope : 0);
+          steepest = std::max(steepest, all.slope(i));
+        }
+        ASSERT_EQ(all.supercube_slopes()[s], steepest);
+        ASSERT_GE(all.brick_slope(b), steepest);
         brick_step = std::max(brick_step, most);
         for (unsigned step = 0; step < volume_->error_steps().size(); step += 7) {
           float farthest = 0;

@@ -1,0 +1,81 @@
+#include "server/builder/update_slopes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/relevant_updates.h"
+#include "common/util/bits.h"
+
+namespace intervale {
+namespace {
+
+struct Cluster {
+  float removed = 0, updates = 1;
+  [[nodiscard]] float slope() const { return removed / updates; }
+};
+
+// Calls visit(update, slot, scale, neighbours) for each diamond of one class of a scale.
+template <class Visit>
+void for_each_of_class(const SupercubeSet& set, int scale, int cls, const ParallelFor& parallel, const Visit& visit) {
+  const auto [begin, end] = set.of_scale(scale);
+  parallel(end - begin, [&, begin = begin](std::size_t piece) {
+    const BrickIndex brick(begin + std::uint32_t(piece));
+    SetNeighbours around(set);
+    set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+      const std::uint64_t occupancy = set.occupancy()[s];
+      const UpdateIndex first = set.first(brick, s);
+      around.move_to(key);
+      for (const Slot slot : set_bits<Slot>(occupancy & kSlotsOfClass[std::size_t(cls)]))
+        visit(first + count_below(occupancy, slot), slot, scale, around);
+    });
+  });
+}
+
+// How many of its parents are in the set.
+int parents_of(SetNeighbours& around, Slot slot) {
+  const Links& links = around.links(slot);
+  int count = 0;
+  for (int k = 0; k < diamond_type(kTypeOfSlot[std::size_t(slot)]).parents; ++k) {
+    const auto parent = around.at(links.vertex[links.parent[std::size_t(k)]]);
+    count += int(parent.supercube.has(parent.slot));
+  }
+  return count;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> update_slopes(const SupercubeSet& set, std::span<const double> removed, int scales, int top_scale,
+                                        const ParallelFor& parallel) {
+  std::vector<Cluster> part(set.size());  // of a diamond's cluster: what each of its parents gets
+  std::vector<std::uint8_t> slopes(set.size());
+  const auto visit = [&](UpdateIndex i, Slot slot, int scale, SetNeighbours& around) {
+    std::array<Cluster, kMaxChildren> children;
+    std::size_t count = 0;
+    if (scale > 0 || class_of_slot(slot) < 2) {
+      for (const Link link : around.children(slot)) {
+        const auto child = around.at(link);
+        if (child.supercube.has(child.slot)) children[count++] = part[child.supercube.index(child.slot)];
+      }
+    }
+    Cluster own{.removed = float(std::max(removed[i], 0.0))};
+    for (; count > 0; --count) {
+      const auto steeper = [](const Cluster& a, const Cluster& b) { return a.slope() < b.slope(); };
+      Cluster& best = *std::max_element(children.begin(), children.begin() + std::ptrdiff_t(count), steeper);
+      if (best.slope() <= own.slope()) break;
+      own.removed += best.removed;
+      own.updates += best.updates;
+      best = children[count - 1];
+    }
+    slopes[i] = std::uint8_t(scale > top_scale ? kMaxSlope : slope_of(own.slope()));
+    const auto parents = float(std::max(parents_of(around, slot), 1));
+    part[i] = {own.removed / parents, own.updates / parents};
+  };
+  for (int scale = 0; scale < scales; ++scale) {
+    for (int cls = 2; cls >= 0; --cls) for_each_of_class(set, scale, cls, parallel, visit);
+  }
+  return slopes;
+}
+
+}  // namespace intervale
