@@ -41,6 +41,7 @@ struct BuildCommand {
   std::vector<std::string> channels, channel_steps;  // NAME=FILE, NAME=S
   bool big_endian = false, json = false;
   std::uint64_t skip = 0;
+  std::optional<std::uint64_t> time_point;
 };
 
 // A channel to be built.
@@ -140,7 +141,9 @@ Result<std::pair<std::vector<Channel>, std::vector<ChannelKeys>>> build_channels
   std::pair<std::vector<Channel>, std::vector<ChannelKeys>> built;
   for (const ChannelInput& input : inputs) {
     Progress progress("channel " + printable(input.name));
-    auto volume = read_volume(input.file, {});
+    const auto header = read_volume_header(input.file);
+    const bool has_several = header && *header && (*header)->time_points > 1;
+    auto volume = read_volume(input.file, {}, has_several ? options.time_point : std::nullopt);
     if (!volume) return tl::unexpected(volume.error());
     if (volume->grid.dims != grid.dims)
       return fail(
@@ -158,7 +161,8 @@ Result<std::pair<std::vector<Channel>, std::vector<ChannelKeys>>> build_channels
 Result<void> check_output(const std::filesystem::path& input, const std::filesystem::path& output) {
   std::error_code none;
   if (std::filesystem::equivalent(input, output, none)) return misuse("the output '" + output.string() + "' is the input file: choose another name");
-  for (const char* ending : {".nrrd", ".nhdr", ".raw", ".gz", ".vtu", ".vtp", ".ply", ".stl", ".obj", ".glb", ".png"}) {
+  for (const char* ending : {".nrrd", ".nhdr", ".raw", ".zraw", ".gz",  ".nii", ".hdr", ".img", ".mha", ".mhd", ".mrc",
+                             ".map",  ".npy",  ".vtk", ".vtu",  ".vtp", ".ply", ".stl", ".obj", ".glb", ".png"}) {
     if (output.extension() == ending) return misuse("the output '" + output.string() + "' has the extension of another format: use .ivm");
   }
   return {};
@@ -238,7 +242,7 @@ Result<void> run(const BuildCommand& options) {
     if (auto output = check_output(channel.file, options.output); !output) return output;
   }
 
-  auto volume = read_volume(options.input, *layout);
+  auto volume = read_volume(options.input, *layout, options.time_point);
   if (!volume) return tl::unexpected(volume.error());
   if (volume->components != 1) return misuse("'" + options.input + "' has vectors: a field has one number a sample; vectors are read by --channel");
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
@@ -264,7 +268,8 @@ void add_build_command(Program& program) {
   const auto o = std::make_shared<BuildCommand>();
   CLI::App& command =
       program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
-  command.add_option("INPUT", o->input, "Volume: .nrrd, .nhdr, or raw samples (with --dims and --type)")->required();
+  command.add_option("INPUT", o->input, "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy or legacy VTK, or raw samples (with --dims and --type)")
+      ->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
   add_range_option(command, o->range,
                    "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range");
@@ -286,6 +291,7 @@ void add_build_command(Program& program) {
       ->check(CLI::IsMember({"boundary", "uniform"}))
       ->capture_default_str();
   command.add_option("--nan", o->nan, "Value that replaces NaN and infinite samples; without it they are an error")->type_name("VALUE");
+  command.add_option("--time-point", o->time_point, "Which volume of a file with several, one for each time point; the first is 0")->type_name("N");
   command.add_option("--threads", o->threads, "Number of threads; 0: one for each core")->capture_default_str();
   command.add_option("--dims", o->dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
   command.add_option("--type", o->type, "Raw input: type of a sample: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");

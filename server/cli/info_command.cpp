@@ -17,6 +17,7 @@
 #include "server/builder/find_relevant_updates.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
+#include "server/volume/read_volume.h"
 
 namespace intervale {
 namespace {
@@ -82,15 +83,79 @@ struct Verify {
   }
 };
 
+const char* name_of(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::raw:
+      return "raw";
+    case Encoding::deflate:
+      return "gzip";
+    case Encoding::bzip2:
+      return "bzip2";
+    case Encoding::text:
+      return "text";
+  }
+  return "";
+}
+
+// Of a volume that a data set can be built from.
+Result<void> print_input(const InfoCommand& options, const VolumeHeader& header) {
+  if (!options.range.empty()) return misuse("--range belongs to a data set (.ivm), and " + in_quotes(options.file) + " is an input of build");
+  const auto& [dims, affine] = header.grid;
+  const Vec3 spacing = affine.spacing(), origin = affine.origin();
+  if (options.json) {
+    return print_json({{"file", options.file},
+                       {"format", header.format},
+                       {"encoding", name_of(header.encoding)},
+                       {"dims", dims},
+                       {"type", name_of(header.type)},
+                       {"components", header.components},
+                       {"time_points", header.time_points},
+                       {"slope", header.slope},
+                       {"intercept", header.intercept},
+                       {"spacing", spacing},
+                       {"origin", origin},
+                       {"affine", affine.rows},
+                       {"space", header.space},
+                       {"unit", header.labels.unit},
+                       {"field", header.labels.field},
+                       {"field_unit", header.labels.field_unit}});
+  }
+  std::string text = fmt::format("{}: {}, {}\n", printable(options.file), header.format, name_of(header.encoding));
+  text += fmt::format("samples   {} x {} x {}, {}{}\n", dims[0], dims[1], dims[2], name_of(header.type),
+                      header.components == 1 ? "" : fmt::format(", vectors of {}", header.components));
+  if (header.time_points > 1)
+    text += fmt::format("times     {}: choose one with build --time-point, 0 to {}\n", header.time_points, header.time_points - 1);
+  if (header.slope != 1 || header.intercept != 0)
+    text += fmt::format("values    {:g} times the stored number, plus {:g}\n", header.slope, header.intercept);
+  if (!header.labels.field.empty() || !header.labels.field_unit.empty())
+    text += fmt::format("field     {}{}\n", header.labels.field, header.labels.field_unit.empty() ? "" : " in " + header.labels.field_unit);
+  text += fmt::format("spacing   {:g} {:g} {:g}{}\n", spacing[0], spacing[1], spacing[2], header.labels.unit.empty() ? "" : " " + header.labels.unit);
+  text += fmt::format("origin    {:g} {:g} {:g}\n", origin[0], origin[1], origin[2]);
+  if (!affine.is_axis_parallel()) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      text += fmt::format("{}{:12g} {:12g} {:12g} {:12g}\n", k == 0 ? "affine    " : "          ", affine.rows[4 * k], affine.rows[4 * k + 1],
+                          affine.rows[4 * k + 2], affine.rows[4 * k + 3]);
+    }
+  }
+  if (!header.space.empty()) text += "space     " + header.space + "\n";
+  return print(text);
+}
+
 template <class Command>
 void add(Program& program, const char* name, const char* description) {
   const auto options = std::make_shared<InfoCommand>();
   const auto run = [options](const auto& set) { return Command()(*options, set); };
-  CLI::App& command = program.add_command(name, description, [options, run] {
+  CLI::App& command = program.add_command(name, description, [options, run]() -> Result<void> {
+    if constexpr (std::is_same_v<Command, Info>) {
+      const auto header = read_volume_header(options->file);
+      if (header && *header) return print_input(*options, **header);
+      if (!header) return tl::unexpected(header.error());
+    }
     return is_value_file(options->file) ? load_values(options->file, on_all_cores).and_then(run) : load_ivm(options->file).and_then(run);
   });
-  command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
-  if constexpr (std::is_same_v<Command, Info>) {
+  constexpr bool is_info = std::is_same_v<Command, Info>;
+  command.add_option("FILE", options->file, is_info ? "Interval volume (.ivm), or a volume that build reads" : "Interval volume (.ivm)")->required();
+  if constexpr (is_info) {
     add_range_option(command, options->range, "Print the volume that this closed range of values encloses, too: numbers, -inf or inf");
   }
   add_json_flag(command, options->json);
@@ -98,7 +163,9 @@ void add(Program& program, const char* name, const char* description) {
 
 }  // namespace
 
-void add_info_command(Program& program) { add<Info>(program, "info", "Print dimensions, values or range, counts and sizes of a data set"); }
+void add_info_command(Program& program) {
+  add<Info>(program, "info", "Print dimensions, values or range, counts and sizes of a data set, or what is in a volume");
+}
 
 void add_verify_command(Program& program) { add<Verify>(program, "verify", "Check every checksum and every invariant of a data set"); }
 

@@ -1,7 +1,7 @@
 // teem parses the grammar of fields, their aliases and types, but is not safe with hostile input. It overflows buffers
 // on long lines (its messages) and long words (its text reader), takes the header's file name for a printf format, and
 // leaves gzip's checksum unread. So the header is cut out and screened here, teem parses what is left, from memory and
-// without touching any file, and the data is read in nrrd_reader.cpp.
+// without touching any file, and the data is read in volume_data.cpp.
 #include "server/volume/nrrd_header.h"
 
 #include <teem/biff.h>
@@ -14,6 +14,8 @@
 #include <memory>
 #include <mutex>
 #include <string_view>
+
+#include "server/volume/header_bytes.h"
 
 namespace intervale {
 namespace {
@@ -28,12 +30,6 @@ struct Screened {
   Labels labels;
   std::uint64_t end = 0;  // where the data begins, if attached
 };
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
-  const auto begin = text.find_first_not_of(kBlank);
-  return begin == text.npos ? std::string_view{} : text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
-}
 
 // A field's name without case and blanks: a superset of the spellings that teem takes for one field.
 std::string canonical(std::string_view name) {
@@ -150,17 +146,17 @@ Result<SampleType> sample_type(int type, const std::string& name) {
   return fail(name + ": samples of type 'block' are not numbers");
 }
 
-Result<NrrdHeader::Encoding> encoding_of(const NrrdEncoding* encoding, const std::string& name) {
-  if (encoding == nrrdEncodingRaw) return NrrdHeader::Encoding::raw;
-  if (encoding == nrrdEncodingGzip) return NrrdHeader::Encoding::gzip;
-  if (encoding == nrrdEncodingAscii) return NrrdHeader::Encoding::ascii;
+Result<Encoding> encoding_of(const NrrdEncoding* encoding, const std::string& name) {
+  if (encoding == nrrdEncodingRaw) return Encoding::raw;
+  if (encoding == nrrdEncodingGzip) return Encoding::deflate;
+  if (encoding == nrrdEncodingBzip2) return Encoding::bzip2;
+  if (encoding == nrrdEncodingAscii) return Encoding::text;
   return fail(name + ": NRRD encoding '" + encoding->name + "' is not read; convert it first, e.g. unu save -f nrrd -e gzip");
 }
 
 double usable(double value, double otherwise) { return std::isfinite(value) && value != 0 ? std::abs(value) : otherwise; }
 
-// `space directions` if there are any, or else `spacings`, along the axes. The axes of the world are the header's own:
-// `space` is not looked at.
+// `space directions` if there are any, or else `spacings`, along the axes. The axes of the world are the header's own.
 // first_axis: the first one in space.
 Result<Affine> affine_of(const Nrrd& nrrd, unsigned first_axis, const std::string& name) {
   Vec3 spacing, origin;
@@ -187,13 +183,39 @@ bool has_vectors(const Nrrd& nrrd) {
   return nrrd.dim == 4 && first.size == 3 && !is_in_space;
 }
 
-Result<NrrdHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std::string& name) {
-  NrrdHeader header;
+// Whether the last of four axes has volumes, one after the other: it is not one in space.
+bool has_time_points(const Nrrd& nrrd) {
+  const auto& last = nrrd.axis[3];
+  const bool is_in_space = last.kind == nrrdKindDomain || last.kind == nrrdKindSpace || (nrrd.spaceDim > 0 && !std::isnan(last.spaceDirection[0]));
+  return nrrd.dim == 4 && last.kind <= nrrdKindList && !is_in_space;
+}
+
+const char* space_of(int space) {
+  switch (space) {
+    case nrrdSpaceRightAnteriorSuperior:
+      return "RAS";
+    case nrrdSpaceLeftAnteriorSuperior:
+      return "LAS";
+    case nrrdSpaceLeftPosteriorSuperior:
+      return "LPS";
+    default:
+      return "";
+  }
+}
+
+Result<VolumeHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std::string& name) {
+  VolumeHeader header;
+  header.format = "NRRD";
+  header.space = space_of(nrrd.space);
   for (const int field : {nrrdField_type, nrrdField_dimension, nrrdField_sizes, nrrdField_encoding})
     if (!state.seen[field]) return fail(name + ": the NRRD header has no '" + airEnumStr(nrrdField, field) + "' line");
   header.components = has_vectors(nrrd) ? 3 : 1;
   const unsigned first_axis = header.components == 1 ? 0 : 1;
-  if (nrrd.dim != 3 + first_axis) return fail(name + " has " + std::to_string(nrrd.dim) + (nrrd.dim == 1 ? " axis" : " axes") + "; a volume has 3");
+  if (first_axis == 0 && has_time_points(nrrd)) {
+    header.time_points = nrrd.axis[3].size;
+  } else if (nrrd.dim != 3 + first_axis) {
+    return fail(name + " has " + std::to_string(nrrd.dim) + (nrrd.dim == 1 ? " axis" : " axes") + "; a volume has 3");
+  }
   std::array<std::int64_t, 3> dims{};
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto& info = nrrd.axis[first_axis + axis];
@@ -215,21 +237,19 @@ Result<NrrdHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std:
   if (!affine) return tl::unexpected<Error>(affine.error());
   const auto grid = make_grid(dims, *affine, name);
   if (!grid) return tl::unexpected<Error>(grid.error());
-  constexpr std::uint64_t kMostNumbers = std::uint64_t(1) << 60;  // so that their bytes have a number
-  if (grid->sample_count() > kMostNumbers / header.components) return fail(name + " has too many samples");
   header.grid = *grid;
+  if (auto size = check_size(header, name); !size) return tl::unexpected<Error>(size.error());
   return header;
 }
 
 }  // namespace
 
-Result<NrrdHeader> read_nrrd_header(const InputFile& file) {
+Result<VolumeHeader> read_nrrd_header(const InputFile& file) {
   static std::mutex teem;
   const auto name = in_quotes(file.path());
-  std::string bytes(std::min<std::uint64_t>(file.size(), kMaxHeaderBytes), '\0');
-  const auto got = file.read_some(0, std::as_writable_bytes(std::span(bytes)));
-  if (!got) return tl::unexpected<Error>(got.error());
-  const auto screened = screen(std::string_view(bytes).substr(0, *got), name);
+  const auto bytes = read_start(file, kMaxHeaderBytes);
+  if (!bytes) return tl::unexpected<Error>(bytes.error());
+  const auto screened = screen(*bytes, name);
   if (!screened) return tl::unexpected<Error>(screened.error());
 
   const std::lock_guard one_at_a_time(teem);
@@ -242,7 +262,7 @@ Result<NrrdHeader> read_nrrd_header(const InputFile& file) {
   if (header) {
     header->data_file = screened->data_file;
     header->labels = screened->labels;
-    header->data_offset = screened->end;
+    header->data_offset = screened->data_file ? 0 : screened->end;
   }
   return header;
 }

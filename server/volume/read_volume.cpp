@@ -1,21 +1,66 @@
 #include "server/volume/read_volume.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 
+#include "server/volume/decoder.h"
+#include "server/volume/header_bytes.h"
 #include "server/volume/input_file.h"
-#include "server/volume/nrrd.h"
+#include "server/volume/metaimage_header.h"
+#include "server/volume/mrc_header.h"
+#include "server/volume/nifti_header.h"
+#include "server/volume/npy_header.h"
+#include "server/volume/nrrd_header.h"
+#include "server/volume/vtk_header.h"
 
 namespace intervale {
 namespace {
 
-bool is_nrrd(const std::filesystem::path& path) {
-  auto extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return extension == ".nrrd" || extension == ".nhdr";
+// A format of files that describe themselves.
+struct FileFormat {
+  std::array<std::string_view, 3> endings;  // of their names; empty: none
+  bool (*begins)(std::string_view start);   // whether one may begin like this
+  Result<VolumeHeader> (*read_header)(const InputFile& file);
+};
+
+bool is_nrrd(std::string_view start) { return start.starts_with("NRRD000"); }
+
+constexpr std::size_t kStart = 1024;  // bytes, enough for all of these
+constexpr std::array<FileFormat, 6> kFormats{{{{".nrrd", ".nhdr"}, is_nrrd, read_nrrd_header},
+                                              {{".npy"}, is_npy, read_npy_header},
+                                              {{".vtk"}, is_legacy_vtk, read_vtk_header},
+                                              {{".nii", ".nii.gz", ".hdr"}, is_nifti, read_nifti_header},
+                                              {{".mrc", ".map"}, is_mrc, read_mrc_header},
+                                              {{".mha", ".mhd"}, is_metaimage, read_metaimage_header}}};
+
+// Of a file that begins like this.
+const FileFormat* find_format(std::string_view start) {
+  const auto* const found = std::find_if(kFormats.begin(), kFormats.end(), [start](const FileFormat& format) { return format.begins(start); });
+  return found == kFormats.end() ? nullptr : found;
+}
+
+// Of a file with this name.
+const FileFormat* find_format_by_name(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
+  const auto has = [&name](std::string_view ending) { return !ending.empty() && name.ends_with(ending); };
+  const auto* const found = std::find_if(kFormats.begin(), kFormats.end(),
+                                         [&](const FileFormat& format) { return std::any_of(format.endings.begin(), format.endings.end(), has); });
+  return found == kFormats.end() ? nullptr : found;
+}
+
+// What a file that is compressed as a whole begins with; nothing if it is not, or damaged.
+std::string decoded_start(const InputFile& file) {
+  std::string start(kStart, '\0');
+  const auto got = decode(file, Encoding::deflate, 0, 0, std::as_writable_bytes(std::span(start)));
+  start.resize(got.value_or(0));
+  return start;
 }
 
 std::string position_of(std::size_t index, const Grid& grid) {
@@ -40,13 +85,35 @@ Result<void> check_floats(std::span<Float> samples, std::optional<double> replac
 
 }  // namespace
 
-Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout) {
-  if (is_nrrd(path)) {
-    if (layout) return misuse(in_quotes(path) + " describes itself: leave out --dims and --type, or rename the file if its samples are raw");
-    return read_nrrd(path);
+Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path) {
+  const auto file = InputFile::open(path);
+  if (!file) return tl::unexpected<Error>(file.error());
+  const auto start = read_start(*file, kStart);
+  if (!start) return tl::unexpected<Error>(start.error());
+  const bool is_gzip = start->starts_with("\x1f\x8b");
+  const FileFormat* format = find_format(is_gzip ? decoded_start(*file) : *start);
+  if (is_gzip && format != nullptr && format->begins != is_nifti)
+    return fail(in_quotes(path) + " is compressed as a whole, which only NIfTI files may be: unpack it with gunzip first");
+  if (format == nullptr) format = find_format_by_name(path);
+  if (format == nullptr) return std::optional<VolumeHeader>();
+  return format->read_header(*file).map([](VolumeHeader header) { return std::optional(std::move(header)); });
+}
+
+Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point) {
+  const auto header = read_volume_header(path);
+  if (layout && header && !*header) {
+    if (time_point.value_or(0) != 0) return misuse("raw samples have one time point: leave out --time-point, and --skip what is before them");
+    return read_raw(path, *layout);
   }
-  if (!layout) return misuse(in_quotes(path) + " is not .nrrd or .nhdr: say what its raw samples are with --dims X Y Z and --type TYPE");
-  return read_raw(path, *layout);
+  if (layout && (header || find_format_by_name(path) != nullptr))
+    return misuse(in_quotes(path) + " describes itself: leave out --dims and --type, or rename the file if its samples are raw");
+  if (!header) return tl::unexpected<Error>(header.error());
+  if (!*header)
+    return misuse(in_quotes(path) +
+                  " is not NRRD, NIfTI, MetaImage, MRC, NumPy or VTK: say what its raw samples are with --dims X Y Z and --type TYPE");
+  const auto file = InputFile::open(path);
+  if (!file) return tl::unexpected<Error>(file.error());
+  return read_data(*file, **header, time_point);
 }
 
 Volume component_of(const Volume& volume, unsigned component) {

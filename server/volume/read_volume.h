@@ -7,11 +7,17 @@
 #include "common/util/result.h"
 #include "server/volume/raw_reader.h"
 #include "server/volume/volume.h"
+#include "server/volume/volume_header.h"
 
 namespace intervale {
 
-// .nrrd and .nhdr files describe themselves: a layout is misuse. Any other file is raw: no layout is misuse.
-Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout);
+// What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy or legacy VTK, as it begins, whatever its
+// name; without that the name decides. None: the file's samples are raw.
+[[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path);
+
+// A layout for a file that describes itself is misuse, and so is none for any other, whose samples are raw. time_point:
+// see read_data.
+Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point = {});
 
 // The samples of one component of a volume, as a volume: component < volume.components.
 [[nodiscard]] Volume component_of(const Volume& volume, unsigned component);

@@ -1,6 +1,4 @@
 // Writes the seeds of every fuzz target into FOLDER/NAME/: fuzz_corpus FOLDER.
-#include <zlib.h>
-
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -14,6 +12,7 @@
 #include "protocol/codec.h"
 #include "tests/fuzz/small_volumes.h"
 #include "tests/support/batches.h"
+#include "tests/support/volume_files.h"
 
 using namespace intervale;
 
@@ -66,31 +65,23 @@ void add_channels(const Corpus& corpus) {
   }
 }
 
-void add_nrrds(const Corpus& corpus) {
+void add_volume_files(const Corpus& corpus) {
   const std::string sizes = "dimension: 3\nsizes: 2 3 4\n", samples(24, 'x');
-  corpus.add("nrrd", "raw", "NRRD0004\n# made\ntype: uchar\n" + sizes + "encoding: raw\n\n", samples);
-  corpus.add("nrrd", "big", "NRRD0004\ntype: unsigned short\nendian: big\nspacings: 1 2 0.5\n" + sizes + "encoding: raw\n\n", samples + samples);
-  corpus.add("nrrd", "directions",
+  corpus.add("volume_file", "raw", "NRRD0004\n# made\ntype: uchar\n" + sizes + "encoding: raw\n\n", samples);
+  corpus.add("volume_file", "big", "NRRD0004\ntype: unsigned short\nendian: big\nspacings: 1 2 0.5\n" + sizes + "encoding: raw\n\n",
+             samples + samples);
+  corpus.add("volume_file", "directions",
              "NRRD0005\ntype: int8\nspace: left-posterior-superior\nspace directions: (1,0.5,0) (0,-2,0) (0,0,3)\nspace origin: (1,2,3)\n"
              "space units: \"mm\" \"mm\" \"mm\"\nsample units: HU\ncontent: head\nbyte skip: -1\n" +
                  sizes + "encoding: raw\n\n",
              "head" + samples);
-  corpus.add("nrrd", "vectors", "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 2 2 2\nkinds: vector domain domain domain\nencoding: raw\n\n",
+  corpus.add("volume_file", "vectors", "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 2 2 2\nkinds: vector domain domain domain\nencoding: raw\n\n",
              samples);
-  corpus.add("nrrd", "text", "NRRD0002\ntype: float\n" + sizes + "line skip: 1\nencoding: ascii\n\nskipped\n",
+  corpus.add("volume_file", "text", "NRRD0002\ntype: float\n" + sizes + "line skip: 1\nencoding: ascii\n\nskipped\n",
              "1 2 3 4 5 6 7 8 9 10 11 12 1e3 -2 0.5 4 5 6 7 8 9 10 11 12\n");
-  corpus.add("nrrd", "detached", "NRRD0004\ntype: uchar\n" + sizes + "encoding: raw\ndata file: elsewhere.raw\n", "");
-  std::string gzipped(200, '\0');
-  z_stream stream{};
-  deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(samples.data()));
-  stream.avail_in = uInt(samples.size());
-  stream.next_out = reinterpret_cast<Bytef*>(gzipped.data());
-  stream.avail_out = uInt(gzipped.size());
-  deflate(&stream, Z_FINISH);
-  gzipped.resize(stream.total_out);
-  deflateEnd(&stream);
-  corpus.add("nrrd", "gzip", "NRRD0004\ntype: uchar\n" + sizes + "encoding: gzip\n\n", gzipped);
+  corpus.add("volume_file", "detached", "NRRD0004\ntype: uchar\n" + sizes + "encoding: raw\ndata file: elsewhere.raw\n", "");
+  corpus.add("volume_file", "gzip", "NRRD0004\ntype: uchar\n" + sizes + "encoding: gzip\n\n", testing::deflated(samples, testing::Wrapping::gzip));
+  for (const testing::VolumeFile& file : testing::volume_files()) corpus.add("volume_file", file.name, "", file.bytes);
 }
 
 void add_messages(const Corpus& corpus) {
@@ -172,7 +163,7 @@ int main(int argc, char** argv) {
   }
   add_batches(corpus);
   add_channels(corpus);
-  add_nrrds(corpus);
+  add_volume_files(corpus);
   add_messages(corpus);
   add_requests(corpus);
   add_accesses(corpus);

@@ -1,0 +1,49 @@
+// The beginning of a file, and numbers in it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "server/volume/input_file.h"
+
+namespace intervale {
+
+inline constexpr std::size_t kMaxTextHeader = 1 << 16;  // bytes, of formats that set no limit
+
+// The first bytes of a file: `most`, or fewer if it is shorter.
+[[nodiscard]] Result<std::string> read_start(const InputFile& file, std::size_t most);
+
+// A binary header, in either byte order.
+class HeaderBytes {
+ public:
+  HeaderBytes(std::string_view bytes, bool big_endian) : bytes_(bytes), big_endian_(big_endian) {}
+
+  template <class T>
+  [[nodiscard]] T number(std::size_t at) const {  // at + sizeof(T) <= size
+    assert(at + sizeof(T) <= bytes_.size());
+    std::array<char, sizeof(T)> copy;
+    std::copy_n(bytes_.begin() + std::ptrdiff_t(at), sizeof(T), copy.begin());
+    if (big_endian_) std::reverse(copy.begin(), copy.end());
+    T value;
+    std::memcpy(&value, copy.data(), sizeof(T));
+    return value;
+  }
+  // A text in a field of this length: up to its first zero byte.
+  [[nodiscard]] std::string_view text(std::size_t at, std::size_t length) const {
+    const std::string_view field = bytes_.substr(at, length);
+    return field.substr(0, field.find('\0'));
+  }
+
+ private:
+  std::string_view bytes_;
+  bool big_endian_;
+};
+
+// Without blanks at its ends.
+[[nodiscard]] std::string_view trimmed(std::string_view text);
+
+}  // namespace intervale

@@ -1,0 +1,231 @@
+// The samples of a volume whose header has been read, whatever format it is of.
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "server/volume/decoder.h"
+#include "server/volume/volume_header.h"
+
+namespace intervale {
+namespace {
+
+constexpr std::uint64_t kGreatestDeflateRatio = 1032;  // zlib's technical notes, "Maximum Compression Factor"
+constexpr std::size_t kLineChunk = 1 << 16;
+
+// The header that names the data file is untrusted: it must not reach other folders.
+Result<std::filesystem::path> detached_path(const std::filesystem::path& header, const std::string& named) {
+  const auto where = in_quotes(header) + ": data file '" + named + "'";
+  if (named.empty()) return fail(in_quotes(header) + ": the line of the data file names none");
+  if (named.starts_with("LIST") || named.starts_with("SKIPLIST") || named.find('%') != named.npos)
+    return fail(where + ": data in several files is not read; join them first");
+  const std::filesystem::path relative(named);
+  const auto escapes = [&] { return fail(where + " lies outside the header's folder; move it beside the header and name it alone"); };
+  if (relative.is_absolute() || std::find(relative.begin(), relative.end(), "..") != relative.end()) return escapes();
+  std::error_code error;
+  const auto folder = std::filesystem::canonical(header.has_parent_path() ? header.parent_path() : ".", error);
+  const auto target = error ? folder : std::filesystem::canonical(folder / relative, error);  // follows links, as opening would
+  if (error) return fail(where + ": " + error.message());
+  if (std::mismatch(folder.begin(), folder.end(), target.begin(), target.end()).first != folder.end()) return escapes();
+  return target;
+}
+
+Result<std::uint64_t> skip_lines(const InputFile& file, std::uint64_t offset, std::uint32_t lines) {
+  std::array<std::byte, kLineChunk> chunk;
+  while (lines > 0) {
+    const auto got = file.read_some(offset, chunk);
+    if (!got) return tl::unexpected<Error>(got.error());
+    if (*got == 0) return fail(in_quotes(file.path()) + " ends while lines before the data are skipped");
+    std::size_t used = 0;
+    for (; used < *got && lines > 0; ++used) lines -= chunk[used] == std::byte{'\n'};
+    offset += used;
+  }
+  return offset;
+}
+
+// Where the data is, and how it is asked for.
+struct Source {
+  const InputFile& file;
+  const VolumeHeader& header;
+  std::uint64_t start;   // bytes of the file before the data and what is skipped by byte_skip
+  std::uint64_t before;  // bytes of other time points before the one that is read
+  [[nodiscard]] std::uint64_t all() const { return header.data_bytes() * header.time_points; }
+  // byte_skip, or of -1 - n the n bytes that follow the data. Written so that the least std::int64_t does not overflow.
+  [[nodiscard]] std::uint64_t beside() const {
+    return header.byte_skip >= 0 ? std::uint64_t(header.byte_skip) : std::uint64_t(-(header.byte_skip + 1));
+  }
+  [[nodiscard]] tl::unexpected<Error> too_short(const std::string& got) const {
+    return fail(in_quotes(file.path()) + ": the header promises " + std::to_string(all()) + " bytes of samples, but " + got +
+                "; is the file cut short?");
+  }
+};
+
+Result<void> read_raw_data(const Source& source, std::vector<std::byte>& out) {
+  const std::uint64_t left = source.file.size() - source.start, all = source.all(), beside = source.beside();
+  if (left < all || left - all < beside)
+    return source.too_short(std::to_string(left) + " are there" + (beside > 0 ? ", " + std::to_string(beside) + " of them to skip" : ""));
+  out.resize(source.header.data_bytes());
+  const std::uint64_t first = source.header.byte_skip >= 0 ? source.start + beside : source.file.size() - beside - all;
+  return source.file.read(first + source.before, out);
+}
+
+// Bytes to skip of the decoded data.
+Result<std::uint64_t> decoded_skip(const Source& source) {
+  const VolumeHeader& header = source.header;
+  if (header.byte_skip >= 0) return source.beside();
+  // Counted from the end, which only decoding finds. It decodes twice rather than keep the bytes before the samples
+  // in memory.
+  const auto length = decoded_length(source.file, header.encoding, source.start);
+  if (!length) return length;
+  if (*length < source.all() || *length - source.all() < source.beside()) return source.too_short(std::to_string(*length) + " are there");
+  return *length - source.all() - source.beside();
+}
+
+Result<void> read_compressed_data(const Source& source, std::vector<std::byte>& out) {
+  const VolumeHeader& header = source.header;
+  const std::uint64_t needed = header.data_bytes(), packed = source.file.size() - source.start;
+  const bool has_bound = header.encoding == Encoding::deflate;
+  if (has_bound && source.all() / kGreatestDeflateRatio > packed)
+    return source.too_short(std::to_string(packed) + " bytes of gzip cannot hold as many");
+  const auto skip = decoded_skip(source);
+  if (!skip) return tl::unexpected<Error>(skip.error());
+  if (*skip > UINT64_MAX - source.before) return fail(in_quotes(source.file.path()) + ": more bytes are to be skipped than a file can have");
+  if (has_bound) {
+    out.resize(needed);
+    const auto got = decode(source.file, header.encoding, source.start, *skip + source.before, out);
+    if (!got) return tl::unexpected<Error>(got.error());
+    out.resize(*got);
+  } else if (auto got = decode_growing(source.file, header.encoding, source.start, *skip + source.before, needed, out); !got) {
+    return got;
+  }
+  if (out.size() < needed) return source.too_short(std::to_string(source.before + out.size()) + " are there");
+  return {};
+}
+
+bool is_separator(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == ','; }
+
+// Parses one number of a text into the bytes of a sample. Integers that do not fit their type fail instead of wrapping.
+template <class T>
+bool parse_sample(std::string_view text, std::byte* sample) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return false;
+  std::memcpy(sample, &value, sizeof value);
+  return true;
+}
+
+Result<void> read_text_data(const Source& source, std::vector<std::byte>& out) {
+  const VolumeHeader& header = source.header;
+  const std::string name = in_quotes(source.file.path());
+  const std::uint64_t before = source.before / size_of(header.type), samples = header.grid.sample_count() * header.components;
+  const std::uint64_t all = samples * header.time_points, left = source.file.size() - source.start;
+  if (header.byte_skip < 0) return fail(name + ": a negative 'byte skip' makes no sense with text");
+  const std::uint64_t skipped = source.beside();
+  if (left < skipped || (left - skipped) / 2 + 1 < all) return source.too_short(std::to_string(left) + " characters of text cannot hold as many");
+  out.resize(header.data_bytes());
+  std::string text(left - skipped, '\0');
+  if (auto read = source.file.read(source.start + skipped, std::as_writable_bytes(std::span(text))); !read) return read;
+  Volume shape{{}, header.grid, header.type, {}};
+  return visit_samples(shape, [&]<class T>(std::span<const T>) -> Result<void> {
+    std::size_t position = 0;
+    std::array<std::byte, sizeof(T)> other;
+    for (std::uint64_t i = 0; i < before + samples; ++i) {
+      while (position < text.size() && is_separator(text[position])) ++position;
+      std::size_t end = position;
+      while (end < text.size() && !is_separator(text[end])) ++end;
+      if (!parse_sample<T>(std::string_view(text).substr(position, end - position),
+                           i < before ? other.data() : out.data() + (i - before) * sizeof(T)))
+        return fail(name + ": sample " + std::to_string(i + 1) + " of " + std::to_string(all) +
+                    (position == end ? " is missing" : std::string(" is no ") + name_of(header.type)));
+      position = end;
+    }
+    return {};
+  });
+}
+
+// The numbers of a volume in another type. They fit.
+template <class To, class From>
+std::vector<std::byte> converted(std::span<const From> from, double slope, double intercept) {
+  std::vector<std::byte> bytes(from.size() * sizeof(To));
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const auto value = To(slope * double(from[i]) + intercept);
+    std::memcpy(&bytes[i * sizeof(To)], &value, sizeof value);
+  }
+  return bytes;
+}
+
+bool is_whole(double value) { return std::abs(value) <= 1e9 && value == std::floor(value); }
+
+// Of the types that hold all integers from `least` to `greatest` the first: `type` itself, then from narrow to wide.
+std::optional<SampleType> integer_type(SampleType type, double least, double greatest) {
+  for (const SampleType candidate : {type, SampleType::u8, SampleType::i8, SampleType::u16, SampleType::i16, SampleType::u32, SampleType::i32}) {
+    const Volume shape{{}, {}, candidate, {}};
+    const bool fits = visit_samples(shape, [&]<class T>(std::span<const T>) {
+      return least >= double(std::numeric_limits<T>::lowest()) && greatest <= double(std::numeric_limits<T>::max());
+    });
+    if (fits) return candidate;
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> check_size(const VolumeHeader& header, const std::string& where) {
+  constexpr std::uint64_t kMostNumbers = std::uint64_t(1) << 60;  // so that their bytes have a number
+  if (header.time_points == 0) return fail(where + " has no time point");
+  const std::uint64_t numbers = kMostNumbers / header.components / header.time_points;
+  if (header.grid.sample_count() > numbers) return fail(where + " has too many samples");
+  return {};
+}
+
+void rescale(Volume& volume, double slope, double intercept) {
+  if (slope == 1 && intercept == 0) return;
+  visit_samples(volume, [&]<class T>(std::span<const T> samples) {
+    std::optional<SampleType> type;
+    if constexpr (std::is_integral_v<T>) {
+      if (is_whole(slope) && is_whole(intercept) && !samples.empty()) {
+        const auto [least, greatest] = std::minmax_element(samples.begin(), samples.end());
+        const auto [low, high] = std::minmax({slope * double(*least) + intercept, slope * double(*greatest) + intercept});
+        type = integer_type(volume.type, low, high);
+      }
+    }
+    if (!type) type = sizeof(T) <= 2 || std::is_same_v<T, float> ? SampleType::f32 : SampleType::f64;
+    const Volume shape{{}, {}, *type, {}};
+    auto bytes = visit_samples(shape, [&]<class To>(std::span<const To>) { return converted<To>(samples, slope, intercept); });
+    volume.type = *type;
+    volume.bytes = std::move(bytes);
+  });
+}
+
+Result<Volume> read_data(const InputFile& file, const VolumeHeader& header, std::optional<std::uint64_t> time_point) {
+  const std::string last = std::to_string(header.time_points - 1);
+  if (!time_point && header.time_points > 1)
+    return misuse(in_quotes(file.path()) + " has " + std::to_string(header.time_points) + " time points: choose one, 0 to " + last +
+                  ", with --time-point");
+  const std::uint64_t chosen = time_point.value_or(0);
+  if (chosen >= header.time_points)
+    return misuse(in_quotes(file.path()) + " has no time point " + std::to_string(chosen) + ": the last one is " + last);
+  Volume volume{file.path().stem().string(), header.grid, header.type, {}, header.labels, header.components};
+  const auto data = !header.data_file ? InputFile::open(file.path()) : detached_path(file.path(), *header.data_file).and_then(InputFile::open);
+  if (!data) return tl::unexpected<Error>(data.error());
+  const auto start = skip_lines(*data, header.data_offset, header.line_skip);
+  if (!start) return tl::unexpected<Error>(start.error());
+  if (*start > data->size())
+    return fail(in_quotes(data->path()) + " has " + std::to_string(data->size()) + " bytes, and its samples begin after " + std::to_string(*start) +
+                "; is the file cut short?");
+  const auto read = header.encoding == Encoding::raw ? read_raw_data : header.encoding == Encoding::text ? read_text_data : read_compressed_data;
+  if (auto done = read({*data, header, *start, chosen * header.data_bytes()}, volume.bytes); !done) return tl::unexpected<Error>(done.error());
+  if (header.big_endian) swap_bytes(volume.bytes, volume.type);
+  rescale(volume, header.slope, header.intercept);
+  return volume;
+}
+
+}  // namespace intervale

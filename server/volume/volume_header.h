@@ -1,0 +1,49 @@
+// What the header of a volume's file says: what the samples are, where they lie in the world, and how they are stored.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "common/util/result.h"
+#include "server/volume/input_file.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+enum class Encoding : std::uint8_t { raw, deflate, bzip2, text };  // deflate: as gzip or zlib wraps it
+
+struct VolumeHeader {
+  const char* format = "";  // name of the file's format
+  Grid grid;
+  Labels labels;
+  std::string space;  // directions of the world's axes: "RAS" is right, anterior, superior; empty: not said
+  SampleType type = SampleType::u8;
+  unsigned components = 1;          // numbers a sample: 1, or 3 of a vector
+  std::uint64_t time_points = 1;    // volumes of this shape, one after the other
+  double slope = 1, intercept = 0;  // value = slope * stored number + intercept; both finite, slope not 0
+  Encoding encoding = Encoding::raw;
+  bool big_endian = false;
+  std::optional<std::string> data_file;  // as written, unchecked; none: the header's own file
+  std::uint64_t data_offset = 0;         // where an attached header ends, in bytes of the file
+  std::uint32_t line_skip = 0;           // lines to skip in the file that holds the data; after them
+  std::int64_t byte_skip = 0;            // bytes to skip, of the decoded data; -1 - n: the data ends n bytes before the end
+
+  [[nodiscard]] std::uint64_t data_bytes() const { return grid.sample_count() * components * size_of(type); }  // of one time point
+};
+
+// Fails if there is no time point, or if the bytes of all have no number. The message begins with `where`.
+[[nodiscard]] Result<void> check_size(const VolumeHeader& header, const std::string& where);
+
+// Reads the samples that the header of a file describes, with its slope and intercept applied. The data may be in
+// another file, in the header's own folder or below it. Nothing of the volume's size is allocated before the data is
+// long enough to fill it: for raw by its length, for deflate by its greatest ratio (1032), for bzip2 as it is decoded,
+// for text by two characters a sample. Bytes after the samples are ignored. time_point: from 0 on; to give none, or one
+// that is not there, is misuse unless there is just one.
+[[nodiscard]] Result<Volume> read_data(const InputFile& file, const VolumeHeader& header, std::optional<std::uint64_t> time_point = {});
+
+// Makes values of stored numbers: whole ones if slope and intercept are whole and all fit one of the integer types,
+// else f32 if they are at most 16 bits wide, else f64. A slope of 1 and an intercept of 0 change nothing.
+void rescale(Volume& volume, double slope, double intercept);
+
+}  // namespace intervale

@@ -1,0 +1,160 @@
+// Every format that volumes are read from, by the same laws.
+#include "tests/support/volume_files.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "common/patch/description.h"
+#include "server/volume/read_volume.h"
+#include "tests/support/temp_dir.h"
+
+namespace intervale {
+namespace {
+
+using testing::VolumeFile;
+
+class VolumeFiles : public ::testing::TestWithParam<std::size_t> {
+ protected:
+  [[nodiscard]] const VolumeFile& file() const { return testing::volume_files()[GetParam()]; }
+  [[nodiscard]] Result<Volume> read(const std::string& bytes, std::optional<std::uint64_t> time_point) const {
+    return read_volume(folder_.file(file().name, bytes), {}, time_point);
+  }
+  const TempDir folder_;
+};
+
+void expect_samples(const Volume& volume) {
+  EXPECT_EQ(volume.grid.dims, testing::kFileDims);
+  EXPECT_EQ(volume.components, 1u);
+  visit_samples(volume, [](auto samples) {
+    for (std::size_t i = 0; i < samples.size(); ++i) EXPECT_EQ(double(samples[i]), testing::sample_in_file(i)) << i;
+  });
+}
+
+// A failure has one line, and what is read is of one piece.
+void expect_sound(const Result<Volume>& volume) {
+  if (!volume) {
+    EXPECT_FALSE(volume.error().message.empty());
+    EXPECT_EQ(volume.error().message.find('\n'), std::string::npos) << volume.error().message;
+    return;
+  }
+  EXPECT_EQ(volume->bytes.size(), volume->grid.sample_count() * volume->components * size_of(volume->type));
+  EXPECT_TRUE(check_grid(volume->grid));
+}
+
+TEST_P(VolumeFiles, AreReadAsTheyWereMade) {
+  const auto path = folder_.file(file().name, file().bytes);
+  const auto header = read_volume_header(path);
+  ASSERT_TRUE(header) << header.error().message;
+  ASSERT_TRUE(*header);
+  EXPECT_EQ((*header)->space, file().space);
+  EXPECT_EQ((*header)->time_points, file().time_points);
+  const auto volume = read_volume(path, {}, file().time_point);
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->type, file().type);
+  for (std::size_t k = 0; k < 12; ++k) EXPECT_NEAR(volume->grid.affine.rows[k], file().affine.rows[k], 1e-12) << k;
+  expect_samples(*volume);
+}
+
+TEST_P(VolumeFiles, AreKnownByWhatTheyBeginWith) {
+  const auto volume = read_volume(folder_.file("something", file().bytes), {}, file().time_point);
+  ASSERT_TRUE(volume) << volume.error().message;
+  expect_samples(*volume);
+}
+
+TEST_P(VolumeFiles, TakeNoLayout) {
+  const auto volume = read_volume(folder_.file("something", file().bytes), RawLayout{{2, 2, 2}, SampleType::u8}, {});
+  ASSERT_FALSE(volume);
+  EXPECT_TRUE(volume.error().usage);
+}
+
+TEST_P(VolumeFiles, NeedATimePointIfTheyHaveSeveral) {
+  const auto volume = read(file().bytes, {});
+  ASSERT_EQ(volume.has_value(), file().time_points == 1);
+  EXPECT_TRUE(volume || volume.error().usage);
+  const auto beyond = read(file().bytes, file().time_points);
+  ASSERT_FALSE(beyond);
+  EXPECT_TRUE(beyond.error().usage);
+}
+
+TEST_P(VolumeFiles, AreRefusedIfTheyAreCutShort) {
+  for (std::size_t size = 0; size < file().bytes.size(); ++size) {
+    const auto volume = read(file().bytes.substr(0, size), file().time_point);
+    expect_sound(volume);
+    // The last number of a text may lose digits, and a compressed file's end is not looked for.
+    if (volume && size + 8 < file().bytes.size()) ADD_FAILURE() << file().name << " of " << size << " bytes is read";
+  }
+}
+
+TEST_P(VolumeFiles, CanHoldAnyBytes) {
+  std::mt19937 random(GetParam());
+  for (int run = 0; run < 250; ++run) {
+    std::string bytes = file().bytes;
+    for (unsigned k = 0; k <= random() % 3; ++k) bytes[random() % std::min<std::size_t>(bytes.size(), 600)] = char(random());
+    expect_sound(read(bytes, file().time_point));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, VolumeFiles, ::testing::Range<std::size_t>(0, testing::volume_files().size()), [](const auto& file) {
+  std::string name = testing::volume_files()[file.param].name;
+  std::replace(name.begin(), name.end(), '.', '_');
+  return name;
+});
+
+Volume numbers(std::vector<std::int16_t> stored) {
+  Volume volume{"v", {{int(stored.size()), 1, 1}, {}}, SampleType::i16, {}};
+  volume.bytes.resize(2 * stored.size());
+  std::copy(stored.begin(), stored.end(), reinterpret_cast<std::int16_t*>(volume.bytes.data()));
+  return volume;
+}
+
+TEST(Rescale, WholeNumbersStayWhole) {
+  Volume volume = numbers({0, 1000, 4095});
+  rescale(volume, 1, -1024);
+  EXPECT_EQ(volume.type, SampleType::i16);
+  visit_samples(volume, [](auto samples) {
+    EXPECT_EQ(samples[0], -1024);
+    EXPECT_EQ(samples[2], 3071);
+  });
+  rescale(volume, 1000, 0);
+  EXPECT_EQ(volume.type, SampleType::i32);
+  visit_samples(volume, [](auto samples) { EXPECT_EQ(samples[2], 3071000); });
+}
+
+TEST(Rescale, OthersBecomeFloats) {
+  Volume volume = numbers({-2, 0, 3});
+  rescale(volume, 0.5, 0.25);
+  EXPECT_EQ(volume.type, SampleType::f32);
+  visit_samples(volume, [](auto samples) {
+    EXPECT_EQ(samples[0], -0.75);
+    EXPECT_EQ(samples[2], 1.75);
+  });
+}
+
+TEST(VolumeFileNames, OfAKnownFormatNeedItsContents) {
+  const TempDir folder;
+  for (const char* name : {"v.nii", "v.hdr", "v.mha", "v.mhd", "v.mrc", "v.npy", "v.vtk", "v.NRRD"}) {
+    const auto volume = read_volume(folder.file(name, "x"), {});
+    ASSERT_FALSE(volume) << name;
+    EXPECT_FALSE(volume.error().usage) << name;
+    EXPECT_NE(volume.error().message.find(name), std::string::npos) << volume.error().message;
+  }
+}
+
+TEST(VolumeFileNames, DetachedDataIsFoundBesideItsHeader) {
+  const TempDir folder;
+  const auto& plain = testing::volume_files()[0].bytes;
+  std::string header = plain.substr(0, 348);
+  header.replace(344, 3, "ni1");
+  header.replace(108, 4, std::string(4, '\0'));
+  const auto path = folder.file("pair.hdr", header);
+  folder.file("pair.img", plain.substr(352));
+  const auto volume = read_volume(path, {});
+  ASSERT_TRUE(volume) << volume.error().message;
+  expect_samples(*volume);
+}
+
+}  // namespace
+}  // namespace intervale
