@@ -38,6 +38,7 @@ for (let run = 0; run < Number(runs); ++run) {
     const { page } = await open(browser, `${server.url}#data=${everyName}&range=128,188&roi=${everything}`, { width: 320, height: 240 });
     for (const range of [[128, 188], [140, 188]]) await set(page, { range }); // from here on the client has both
     const ms = await page.evaluate(async (range) => {
+      await window.intervale.photograph(); // all drawing has ended
       const start = performance.now();
       const surface = window.intervale.next('surface');
       window.intervale.set({ range });
