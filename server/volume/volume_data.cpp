@@ -83,7 +83,7 @@ Result<std::uint64_t> decoded_skip(const Source& source) {
   // Counted from the end, which only decoding finds. It decodes twice rather than keep the bytes before the samples
   // in memory.
   const auto length = decoded_length(source.file, header.encoding, source.start);
-  if (!length) return length;
+  if (!length) return tl::unexpected<Error>(length.error());
   if (*length < source.all() || *length - source.all() < source.beside()) return source.too_short(std::to_string(*length) + " are there");
   return *length - source.all() - source.beside();
 }
