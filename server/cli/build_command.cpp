@@ -162,7 +162,7 @@ Result<void> check_output(const std::filesystem::path& input, const std::filesys
   std::error_code none;
   if (std::filesystem::equivalent(input, output, none)) return misuse("the output '" + output.string() + "' is the input file: choose another name");
   for (const char* ending : {".nrrd", ".nhdr", ".raw", ".zraw", ".gz",  ".nii", ".hdr", ".img", ".mha", ".mhd", ".mrc",
-                             ".map",  ".npy",  ".vtk", ".vtu",  ".vtp", ".ply", ".stl", ".obj", ".glb", ".png"}) {
+                             ".map",  ".npy",  ".vtk", ".vti",  ".vtu", ".vtp", ".ply", ".stl", ".obj", ".glb", ".png"}) {
     if (output.extension() == ending) return misuse("the output '" + output.string() + "' has the extension of another format: use .ivm");
   }
   return {};
@@ -268,8 +268,7 @@ void add_build_command(Program& program) {
   const auto o = std::make_shared<BuildCommand>();
   CLI::App& command =
       program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
-  command.add_option("INPUT", o->input, "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy or legacy VTK, or raw samples (with --dims and --type)")
-      ->required();
+  command.add_option("INPUT", o->input, "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy or VTK, or raw samples (with --dims and --type)")->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
   add_range_option(command, o->range,
                    "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range");

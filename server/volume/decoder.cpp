@@ -26,9 +26,9 @@ class Codec {
 
   // Takes from the front of `in` and fills the front of `out`; both become what is left.
   virtual State decode(std::span<std::byte>& in, std::span<std::byte>& out) = 0;
-  virtual bool restart() = 0;                              // for the next member
-  [[nodiscard]] virtual std::byte first_byte() const = 0;  // of every member that may follow another one
-  [[nodiscard]] virtual std::string reason() const = 0;    // why the data is damaged
+  virtual bool restart() = 0;                                 // for the next member
+  [[nodiscard]] virtual bool may_begin(std::byte) const = 0;  // the next member, with this byte
+  [[nodiscard]] virtual std::string reason() const = 0;       // why the data is damaged
   [[nodiscard]] virtual const char* name() const = 0;
   [[nodiscard]] bool is_ready() const { return is_ready_; }
 
@@ -45,6 +45,7 @@ class Deflate : public Codec {
     if (is_ready_) inflateEnd(&stream_);
   }
   State decode(std::span<std::byte>& in, std::span<std::byte>& out) override {
+    if (stream_.total_in == 0 && !in.empty()) is_zlib_ = in[0] == kZlib;
     stream_.next_in = reinterpret_cast<Bytef*>(in.data());
     stream_.avail_in = uInt(std::min(in.size(), kMost));
     stream_.next_out = reinterpret_cast<Bytef*>(out.data());
@@ -57,13 +58,31 @@ class Deflate : public Codec {
     return code == Z_OK || code == Z_BUF_ERROR ? State::within : State::damaged;
   }
   bool restart() override { return inflateReset(&stream_) == Z_OK; }
-  [[nodiscard]] std::byte first_byte() const override { return std::byte{0x1f}; }
+  [[nodiscard]] bool may_begin(std::byte first) const override { return first == (is_zlib_ ? kZlib : std::byte{0x1f}); }
   [[nodiscard]] std::string reason() const override { return stream_.msg != nullptr ? stream_.msg : "not gzip"; }
   [[nodiscard]] const char* name() const override { return "gzip"; }
 
  private:
   static constexpr int kAnyWrapping = 15 + 32;  // zlib's windowBits: 32 KiB window, gzip or zlib
+  static constexpr std::byte kZlib{0x78};       // what zlib's own wrapping begins with, for that window
+  bool is_zlib_ = false;
   z_stream stream_{};
+};
+
+class Stored : public Codec {
+ public:
+  Stored() { is_ready_ = true; }
+  State decode(std::span<std::byte>& in, std::span<std::byte>& out) override {
+    const std::size_t count = std::min(in.size(), out.size());
+    std::copy_n(in.begin(), count, out.begin());
+    in = in.subspan(count);
+    out = out.subspan(count);
+    return State::ended;
+  }
+  bool restart() override { return true; }
+  [[nodiscard]] bool may_begin(std::byte) const override { return true; }
+  [[nodiscard]] std::string reason() const override { return ""; }
+  [[nodiscard]] const char* name() const override { return "raw"; }
 };
 
 class Bzip2 : public Codec {
@@ -88,7 +107,7 @@ class Bzip2 : public Codec {
     stream_ = {};
     return is_ready_ = BZ2_bzDecompressInit(&stream_, 0, 0) == BZ_OK;
   }
-  [[nodiscard]] std::byte first_byte() const override { return std::byte{'B'}; }
+  [[nodiscard]] bool may_begin(std::byte first) const override { return first == std::byte{'B'}; }
   [[nodiscard]] std::string reason() const override { return "not bzip2, or a checksum differs"; }
   [[nodiscard]] const char* name() const override { return "bzip2"; }
 
@@ -96,15 +115,69 @@ class Bzip2 : public Codec {
   bz_stream stream_{};
 };
 
+// The bytes of a file, or what base64 text in it stands for.
+class Source {
+ public:
+  explicit Source(const Coded& data) : file_(data.file), offset_(data.offset), is_base64_(data.base64_skip.has_value()) {}
+
+  // Fills the front of `out`, which has room for kChunk; 0 bytes only at the end.
+  Result<std::size_t> read(std::span<std::byte> out) {
+    if (!is_base64_) {
+      auto got = file_.read_some(offset_, out);
+      offset_ += got.value_or(0);
+      return got;
+    }
+    std::size_t filled = 0;
+    while (filled == 0 && !is_ended_) {
+      auto got = file_.read_some(offset_, text_);
+      if (!got || *got == 0) return got;
+      offset_ += *got;
+      for (std::size_t i = 0; i < *got && !is_ended_; ++i) filled += take(char(text_[i]), out.subspan(filled));
+    }
+    return filled;
+  }
+
+ private:
+  // Of four characters with 6 bits each; '=' stands for none. Returns how many bytes are complete: 0, or 1 to 3.
+  std::size_t take(char c, std::span<std::byte> out) {
+    if (c == ' ' || c == '\n' || c == '\r' || c == '\t') return 0;
+    const int value = c >= 'A' && c <= 'Z'   ? c - 'A'
+                      : c >= 'a' && c <= 'z' ? c - 'a' + 26
+                      : c >= '0' && c <= '9' ? c - '0' + 52
+                      : c == '+'             ? 62
+                      : c == '/'             ? 63
+                                             : -1;
+    if (value < 0 && c != '=') {
+      is_ended_ = true;
+      return 0;
+    }
+    bits_ = bits_ << 6 | std::uint32_t(std::max(value, 0));
+    unused_ += value < 0;
+    if (++characters_ < 4) return 0;
+    const std::size_t bytes = 3 - std::min<std::size_t>(unused_, 3);
+    for (std::size_t k = 0; k < bytes; ++k) out[k] = std::byte(bits_ >> (16 - 8 * k));
+    characters_ = bits_ = unused_ = 0;
+    return bytes;
+  }
+
+  const InputFile& file_;
+  std::uint64_t offset_;
+  const bool is_base64_;
+  bool is_ended_ = false;
+  std::uint32_t bits_ = 0, characters_ = 0, unused_ = 0;  // of the group of four
+  std::array<std::byte, kChunk> text_;
+};
+
+std::unique_ptr<Codec> codec_of(Encoding encoding) {
+  if (encoding == Encoding::raw) return std::make_unique<Stored>();
+  if (encoding == Encoding::bzip2) return std::make_unique<Bzip2>();
+  return std::make_unique<Deflate>();
+}
+
 class Decoder {
  public:
-  Decoder(const InputFile& file, Encoding encoding, std::uint64_t offset) : file_(file), offset_(offset) {
-    if (encoding == Encoding::bzip2) {
-      codec_ = std::make_unique<Bzip2>();
-    } else {
-      codec_ = std::make_unique<Deflate>();
-    }
-  }
+  explicit Decoder(const Coded& data)
+      : file_(data.file), source_(data), codec_(codec_of(data.encoding)), before_(data.base64_skip.value_or(0)), left_(data.coded_bytes) {}
 
   // Fills `out`; fewer bytes only at the end of the data.
   Result<std::uint64_t> next(std::span<std::byte> out) {
@@ -147,24 +220,29 @@ class Decoder {
 
  private:
   Result<void> refill() {
-    if (input_.empty()) {
-      const auto got = file_.read_some(offset_, buffer_);
+    while (input_.empty() && !is_ended_) {
+      const auto got = source_.read(buffer_);
       if (!got) return tl::unexpected<Error>(got.error());
-      offset_ += *got;
-      input_ = std::span(buffer_).first(*got);
-      if (*got == 0 && is_within_member_) return fail(where() + "the " + codec_->name() + " data ends too early; is the file cut short?");
-      is_ended_ = *got == 0;
+      const std::size_t skipped = std::min<std::uint64_t>(before_, *got);
+      before_ -= skipped;
+      const std::size_t taken = std::min<std::uint64_t>(*got - skipped, left_);
+      left_ -= taken;
+      input_ = std::span(buffer_).subspan(skipped, taken);
+      is_ended_ = *got == 0 || (taken == 0 && left_ == 0);
+      if (is_ended_ && is_within_member_) return fail(where() + "the " + codec_->name() + " data ends too early; is the file cut short?");
     }
     // Some tools pad gzip files, with zeros as a rule: whatever follows a whole member and is not another one is not
     // data.
-    if (!is_within_member_ && !is_ended_ && input_[0] != codec_->first_byte()) is_ended_ = true;
+    if (!is_within_member_ && !is_ended_ && !codec_->may_begin(input_[0])) is_ended_ = true;
     return {};
   }
   [[nodiscard]] std::string where() const { return in_quotes(file_.path()) + ": "; }
 
   const InputFile& file_;
-  std::uint64_t offset_;
+  Source source_;
   std::unique_ptr<Codec> codec_;
+  std::uint64_t before_;  // bytes that are still to be skipped before the coded data
+  std::uint64_t left_;    // ... and of the coded data
   bool is_ended_ = false;
   bool is_within_member_ = true;  // a file that holds nothing is cut short, too
   std::array<std::byte, kChunk> buffer_;
@@ -173,8 +251,8 @@ class Decoder {
 
 }  // namespace
 
-Result<std::uint64_t> decode(const InputFile& file, Encoding encoding, std::uint64_t offset, std::uint64_t skip, std::span<std::byte> out) {
-  Decoder decoder(file, encoding, offset);
+Result<std::uint64_t> decode(const Coded& data, std::uint64_t skip, std::span<std::byte> out) {
+  Decoder decoder(data);
   if (auto skipped = decoder.discard(skip); !skipped) return skipped;
   auto got = decoder.next(out);
   if (got && *got == out.size())
@@ -182,10 +260,9 @@ Result<std::uint64_t> decode(const InputFile& file, Encoding encoding, std::uint
   return got;
 }
 
-Result<void> decode_growing(const InputFile& file, Encoding encoding, std::uint64_t offset, std::uint64_t skip, std::uint64_t size,
-                            std::vector<std::byte>& out) {
+Result<void> decode_growing(const Coded& data, std::uint64_t skip, std::uint64_t size, std::vector<std::byte>& out) {
   constexpr std::uint64_t kFirst = 1 << 20;
-  Decoder decoder(file, encoding, offset);
+  Decoder decoder(data);
   out.clear();
   if (auto skipped = decoder.discard(skip); !skipped) return tl::unexpected<Error>(skipped.error());
   while (out.size() < size) {
@@ -200,8 +277,6 @@ Result<void> decode_growing(const InputFile& file, Encoding encoding, std::uint6
   return decoder.look_for_end();
 }
 
-Result<std::uint64_t> decoded_length(const InputFile& file, Encoding encoding, std::uint64_t offset) {
-  return Decoder(file, encoding, offset).discard(std::numeric_limits<std::uint64_t>::max());
-}
+Result<std::uint64_t> decoded_length(const Coded& data) { return Decoder(data).discard(std::numeric_limits<std::uint64_t>::max()); }
 
 }  // namespace intervale

@@ -1,8 +1,9 @@
-// Compressed data inside a file, from any offset: gzip (RFC 1952), zlib (RFC 1950) or bzip2.
+// Coded data inside a file: gzip (RFC 1952), zlib (RFC 1950) or bzip2, or any of it as base64 text (RFC 4648).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,17 +12,24 @@
 
 namespace intervale {
 
-// Decodes the data at `offset`, skips `skip` decoded bytes and fills `out`. Returns how many bytes were filled: fewer
-// than out.size() if the data ends before. Fails on damaged data. If the data ends within the next few kilobytes, its
-// checksum has been compared; concatenated members count as one. encoding: deflate or bzip2.
-[[nodiscard]] Result<std::uint64_t> decode(const InputFile& file, Encoding encoding, std::uint64_t offset, std::uint64_t skip,
-                                           std::span<std::byte> out);
+// Where coded data begins, and how it is coded; see VolumeHeader.
+struct Coded {
+  const InputFile& file;
+  Encoding encoding = Encoding::deflate;  // raw, deflate or bzip2
+  std::uint64_t offset = 0;               // bytes
+  std::optional<std::uint64_t> base64_skip{};
+  std::uint64_t coded_bytes = UINT64_MAX;
+};
+
+// Decodes the data, skips `skip` decoded bytes and fills `out`. Returns how many bytes were filled: fewer than out.size()
+// if the data ends before. Fails on damaged data. If the data ends within the next few kilobytes, its checksum has been
+// compared; concatenated members count as one.
+[[nodiscard]] Result<std::uint64_t> decode(const Coded& data, std::uint64_t skip, std::span<std::byte> out);
 
 // The same, but makes `out` as long as `size` or, if that is less, as what there is: as it is decoded.
-[[nodiscard]] Result<void> decode_growing(const InputFile& file, Encoding encoding, std::uint64_t offset, std::uint64_t skip, std::uint64_t size,
-                                          std::vector<std::byte>& out);
+[[nodiscard]] Result<void> decode_growing(const Coded& data, std::uint64_t skip, std::uint64_t size, std::vector<std::byte>& out);
 
 // The decoded size in bytes. Takes the time of a full decoding and the memory of one chunk.
-[[nodiscard]] Result<std::uint64_t> decoded_length(const InputFile& file, Encoding encoding, std::uint64_t offset);
+[[nodiscard]] Result<std::uint64_t> decoded_length(const Coded& data);
 
 }  // namespace intervale

@@ -165,7 +165,7 @@ Result<VolumeHeader> read_nifti_header(const InputFile& file) {
   if (is_gzip(*start)) {
     header.encoding = Encoding::deflate;
     start->assign(kNifti2Size, '\0');
-    const auto got = decode(file, Encoding::deflate, 0, 0, std::as_writable_bytes(std::span(*start)));
+    const auto got = decode({file}, 0, std::as_writable_bytes(std::span(*start)));
     if (!got) return tl::unexpected<Error>(got.error());
     start->resize(*got);
   }

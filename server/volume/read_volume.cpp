@@ -17,6 +17,7 @@
 #include "server/volume/nifti_header.h"
 #include "server/volume/npy_header.h"
 #include "server/volume/nrrd_header.h"
+#include "server/volume/vti_header.h"
 #include "server/volume/vtk_header.h"
 
 namespace intervale {
@@ -32,9 +33,10 @@ struct FileFormat {
 bool is_nrrd(std::string_view start) { return start.starts_with("NRRD000"); }
 
 constexpr std::size_t kStart = 1024;  // bytes, enough for all of these
-constexpr std::array<FileFormat, 6> kFormats{{{{".nrrd", ".nhdr"}, is_nrrd, read_nrrd_header},
+constexpr std::array<FileFormat, 7> kFormats{{{{".nrrd", ".nhdr"}, is_nrrd, read_nrrd_header},
                                               {{".npy"}, is_npy, read_npy_header},
                                               {{".vtk"}, is_legacy_vtk, read_vtk_header},
+                                              {{".vti"}, is_vti, read_vti_header},
                                               {{".nii", ".nii.gz", ".hdr"}, is_nifti, read_nifti_header},
                                               {{".mrc", ".map"}, is_mrc, read_mrc_header},
                                               {{".mha", ".mhd"}, is_metaimage, read_metaimage_header}}};
@@ -58,7 +60,7 @@ const FileFormat* find_format_by_name(const std::filesystem::path& path) {
 // What a file that is compressed as a whole begins with; nothing if it is not, or damaged.
 std::string decoded_start(const InputFile& file) {
   std::string start(kStart, '\0');
-  const auto got = decode(file, Encoding::deflate, 0, 0, std::as_writable_bytes(std::span(start)));
+  const auto got = decode({file}, 0, std::as_writable_bytes(std::span(start)));
   start.resize(got.value_or(0));
   return start;
 }

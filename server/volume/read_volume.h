@@ -11,7 +11,7 @@
 
 namespace intervale {
 
-// What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy or legacy VTK, as it begins, whatever its
+// What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy or VTK, as it begins, whatever its
 // name; without that the name decides. None: the file's samples are raw.
 [[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path);
 

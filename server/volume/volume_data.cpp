@@ -51,7 +51,7 @@ Result<std::uint64_t> skip_lines(const InputFile& file, std::uint64_t offset, st
 }
 
 // Where the data is, and how it is asked for.
-struct Source {
+struct Samples {
   const InputFile& file;
   const VolumeHeader& header;
   std::uint64_t start;   // bytes of the file before the data and what is skipped by byte_skip
@@ -61,13 +61,14 @@ struct Source {
   [[nodiscard]] std::uint64_t beside() const {
     return header.byte_skip >= 0 ? std::uint64_t(header.byte_skip) : std::uint64_t(-(header.byte_skip + 1));
   }
+  [[nodiscard]] Coded coded() const { return {file, header.encoding, start, header.base64_skip, header.coded_bytes}; }
   [[nodiscard]] tl::unexpected<Error> too_short(const std::string& got) const {
     return fail(in_quotes(file.path()) + ": the header promises " + std::to_string(all()) + " bytes of samples, but " + got +
                 "; is the file cut short?");
   }
 };
 
-Result<void> read_raw_data(const Source& source, std::vector<std::byte>& out) {
+Result<void> read_raw_data(const Samples& source, std::vector<std::byte>& out) {
   const std::uint64_t left = source.file.size() - source.start, all = source.all(), beside = source.beside();
   if (left < all || left - all < beside)
     return source.too_short(std::to_string(left) + " are there" + (beside > 0 ? ", " + std::to_string(beside) + " of them to skip" : ""));
@@ -77,32 +78,32 @@ Result<void> read_raw_data(const Source& source, std::vector<std::byte>& out) {
 }
 
 // Bytes to skip of the decoded data.
-Result<std::uint64_t> decoded_skip(const Source& source) {
+Result<std::uint64_t> decoded_skip(const Samples& source) {
   const VolumeHeader& header = source.header;
   if (header.byte_skip >= 0) return source.beside();
   // Counted from the end, which only decoding finds. It decodes twice rather than keep the bytes before the samples
   // in memory.
-  const auto length = decoded_length(source.file, header.encoding, source.start);
+  const auto length = decoded_length(source.coded());
   if (!length) return tl::unexpected<Error>(length.error());
   if (*length < source.all() || *length - source.all() < source.beside()) return source.too_short(std::to_string(*length) + " are there");
   return *length - source.all() - source.beside();
 }
 
-Result<void> read_compressed_data(const Source& source, std::vector<std::byte>& out) {
+Result<void> read_coded_data(const Samples& source, std::vector<std::byte>& out) {
   const VolumeHeader& header = source.header;
   const std::uint64_t needed = header.data_bytes(), packed = source.file.size() - source.start;
-  const bool has_bound = header.encoding == Encoding::deflate;
+  const bool has_bound = header.encoding != Encoding::bzip2;
   if (has_bound && source.all() / kGreatestDeflateRatio > packed)
-    return source.too_short(std::to_string(packed) + " bytes of gzip cannot hold as many");
+    return source.too_short(std::to_string(packed) + " bytes of " + (header.encoding == Encoding::raw ? "base64" : "gzip") + " cannot hold as many");
   const auto skip = decoded_skip(source);
   if (!skip) return tl::unexpected<Error>(skip.error());
   if (*skip > UINT64_MAX - source.before) return fail(in_quotes(source.file.path()) + ": more bytes are to be skipped than a file can have");
   if (has_bound) {
     out.resize(needed);
-    const auto got = decode(source.file, header.encoding, source.start, *skip + source.before, out);
+    const auto got = decode(source.coded(), *skip + source.before, out);
     if (!got) return tl::unexpected<Error>(got.error());
     out.resize(*got);
-  } else if (auto got = decode_growing(source.file, header.encoding, source.start, *skip + source.before, needed, out); !got) {
+  } else if (auto got = decode_growing(source.coded(), *skip + source.before, needed, out); !got) {
     return got;
   }
   if (out.size() < needed) return source.too_short(std::to_string(source.before + out.size()) + " are there");
@@ -122,7 +123,7 @@ bool parse_sample(std::string_view text, std::byte* sample) {
   return true;
 }
 
-Result<void> read_text_data(const Source& source, std::vector<std::byte>& out) {
+Result<void> read_text_data(const Samples& source, std::vector<std::byte>& out) {
   const VolumeHeader& header = source.header;
   const std::string name = in_quotes(source.file.path());
   const std::uint64_t before = source.before / size_of(header.type), samples = header.grid.sample_count() * header.components;
@@ -221,7 +222,8 @@ Result<Volume> read_data(const InputFile& file, const VolumeHeader& header, std:
   if (*start > data->size())
     return fail(in_quotes(data->path()) + " has " + std::to_string(data->size()) + " bytes, and its samples begin after " + std::to_string(*start) +
                 "; is the file cut short?");
-  const auto read = header.encoding == Encoding::raw ? read_raw_data : header.encoding == Encoding::text ? read_text_data : read_compressed_data;
+  const bool is_plain = header.encoding == Encoding::raw && !header.base64_skip;
+  const auto read = is_plain ? read_raw_data : header.encoding == Encoding::text ? read_text_data : read_coded_data;
   if (auto done = read({*data, header, *start, chosen * header.data_bytes()}, volume.bytes); !done) return tl::unexpected<Error>(done.error());
   if (header.big_endian) swap_bytes(volume.bytes, volume.type);
   rescale(volume, header.slope, header.intercept);

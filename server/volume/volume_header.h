@@ -26,8 +26,11 @@ struct VolumeHeader {
   bool big_endian = false;
   std::optional<std::string> data_file;  // as written, unchecked; none: the header's own file
   std::uint64_t data_offset = 0;         // where an attached header ends, in bytes of the file
-  std::uint32_t line_skip = 0;           // lines to skip in the file that holds the data; after them
-  std::int64_t byte_skip = 0;            // bytes to skip, of the decoded data; -1 - n: the data ends n bytes before the end
+  // The data is base64 text up to the first other character; before it there are so many bytes of what that stands for.
+  std::optional<std::uint64_t> base64_skip;
+  std::uint64_t coded_bytes = UINT64_MAX;  // of deflate, bzip2 and base64: bytes of the coded data, if they are known
+  std::uint32_t line_skip = 0;             // lines to skip in the file that holds the data; after them
+  std::int64_t byte_skip = 0;              // bytes to skip, of the decoded data; -1 - n: the data ends n bytes before the end
 
   [[nodiscard]] std::uint64_t data_bytes() const { return grid.sample_count() * components * size_of(type); }  // of one time point
 };

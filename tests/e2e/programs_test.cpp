@@ -14,6 +14,7 @@
 #include "tests/support/peers.h"
 #include "tests/support/programs.h"
 #include "tests/support/temp_dir.h"
+#include "tests/support/volume_files.h"
 
 namespace intervale {
 namespace {
@@ -285,6 +286,26 @@ TEST(Programs, BuildDoesNotWriteOverWhatItReads) {
     expect_complaint(run({program("intervale"), "build", volume, "-o", output, "--range", "0", "1"}), 2, output, "intervale: ");
   }
   EXPECT_EQ(contents_of(volume), before);
+}
+
+TEST(Programs, InfoSaysWhatIsInAVolumeAndBuildTakesIt) {
+  const TempDir folder;
+  for (const testing::VolumeFile& file : testing::volume_files()) {
+    const std::string path = folder.file(file.name, file.bytes);
+    const auto info = json_of(run({program("intervale"), "info", path, "--json"}));
+    EXPECT_EQ(info.at("dims"), nlohmann::json(testing::kFileDims)) << file.name;
+    EXPECT_EQ(info.at("space"), file.space) << file.name;
+    EXPECT_EQ(info.at("time_points"), file.time_points) << file.name;
+    EXPECT_THAT(run({program("intervale"), "info", path}).out, HasSubstr("3 x 2 x 4")) << file.name;
+    std::vector<std::string> build{program("intervale"), "build", path, "-o", folder / "v.ivm", "--json"};
+    if (file.time_points > 1) {
+      expect_complaint(run(build), 2, "choose one, 0 to 1, with --time-point", "intervale: ");
+      build.insert(build.end(), {"--time-point", std::to_string(file.time_point)});
+    }
+    const auto built = json_of(run(build));
+    EXPECT_EQ(built.at("values"), (nlohmann::json{{"least", -300}, {"greatest", 12}})) << file.name;
+  }
+  expect_complaint(run({program("intervale"), "info", folder.file("x.nii", "x")}), 1, "is not a NIfTI file", "intervale: ");
 }
 
 TEST(Programs, ARangeThatHoldsNothingIsSaid) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
 namespace intervale::testing {
 namespace {
@@ -114,6 +115,45 @@ std::string vtk(const std::string& coding, const std::string& array, const std::
          "\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 4\nORIGIN -1 2 3\nSPACING 0.5 1 2\nPOINT_DATA 24\n" + array + data;
 }
 
+std::string base64(const std::string& bytes) {
+  constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k) bits = bits << 8 | (k < count ? std::uint8_t(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[bits >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+// data: of the array's element; appended: of AppendedData. 1 is the first index of each axis.
+std::string vti(const std::string& root, const std::string& array, const std::string& data, const std::string& appended) {
+  return "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" " + root +
+         ">\n<ImageData WholeExtent=\"1 3 1 2 1 4\" Origin=\"6 4 10\" Spacing=\"2 1 3\" Direction=\"0 -1 0 1 0 0 0 0 -1\">\n"
+         "<Piece Extent=\"1 3 1 2 1 4\">\n<PointData Scalars=\"density\">\n<DataArray type=\"Float64\" Name=\"other\" format=\"appended\" "
+         "offset=\"0\"/>\n<DataArray Name=\"density\" " +
+         array + ">" + data + "</DataArray>\n</PointData>\n</Piece>\n</ImageData>\n" + appended + "</VTKFile>\n";
+}
+
+// Two blocks of 28 and 20 bytes, with the counts that precede them.
+template <class Count>
+std::pair<std::string, std::string> blocks(const std::string& data, bool big_endian) {
+  const std::string first = deflated(data.substr(0, 28), Wrapping::zlib), second = deflated(data.substr(28), Wrapping::zlib);
+  std::string counts;
+  for (const std::size_t count : {std::size_t(2), std::size_t(28), std::size_t(20), first.size(), second.size()})
+    counts += number(Count(count), big_endian);
+  return {counts, first + second};
+}
+
+std::string vti_of_blocks(bool is_base64) {
+  const auto [counts, data] = blocks<std::uint32_t>(samples<Short>(false), false);
+  const std::string root = "byte_order=\"LittleEndian\" compressor=\"vtkZLibDataCompressor\"";
+  if (is_base64) return vti(root, "type=\"Int16\" format=\"binary\"", "\n  " + base64(counts) + base64(data) + "\n", "");
+  return vti(root, "type=\"Int16\" format=\"appended\" offset=\"5\"", "",
+             "<AppendedData encoding=\"raw\">\n   _other" + counts + data + "xxxx\n</AppendedData>\n");
+}
+
 std::string nrrd(const std::string& more, const std::string& data) {
   return "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 4\nspace: left-posterior-superior\n"
          "space directions: (0,2,0) (-1,0,0) (0,0,-3)\nspace origin: (5,6,7)\n" +
@@ -169,6 +209,13 @@ const std::vector<VolumeFile>& volume_files() {
       {"text.vtk", vtk("ASCII", "SCALARS density float 1\nLOOKUP_TABLE default\n", text_of_samples()), SampleType::f32, kStraight, ""},
       {"binary.vtk", vtk("BINARY", "SCALARS density short\n", samples<Short>(true)), SampleType::i16, kStraight, ""},
       {"field.vtk", vtk("BINARY", "FIELD FieldData 1\ndensity 1 24 int\n", samples<Int>(true)), SampleType::i32, kStraight, ""},
+      {"text.vti", vti("", "type=\"Float32\" format=\"ascii\"", "\n" + text_of_samples(), ""), SampleType::f32, kTurned, "", 0, 1, "</DataArray>"},
+      {"base64.vti",
+       vti("byte_order=\"BigEndian\" header_type=\"UInt64\"", "type=\"Int16\" format=\"binary\"",
+           "\n" + base64(number(std::uint64_t(2 * kSamples), true) + samples<Short>(true)), ""),
+       SampleType::i16, kTurned, "", 0, 1, "</DataArray>"},
+      {"blocks.vti", vti_of_blocks(false), SampleType::i16, kTurned, "", 0, 1, "xxxx"},
+      {"base64_blocks.vti", vti_of_blocks(true), SampleType::i16, kTurned, "", 0, 1, "</DataArray>"},
       {"raw.nrrd", nrrd("endian: big\nencoding: raw\n", samples<Short>(true)), SampleType::i16, kTurned, "LPS"},
       {"packed.nrrd", nrrd("endian: little\nencoding: gzip\n", deflated(samples<Short>(false), Wrapping::gzip)), SampleType::i16, kTurned, "LPS"},
       {"bzip2.nrrd", nrrd("endian: little\nencoding: bzip2\n", bzip2(samples<Short>(false))), SampleType::i16, kTurned, "LPS"},

@@ -18,9 +18,10 @@ struct VolumeFile {
   Affine affine;
   std::string space;
   std::uint64_t time_point = 0, time_points = 1;  // of several, the one with those samples
+  std::string after{};                            // what follows the samples, from the last place on where it is found
 };
 
-// 3 x 2 x 4 samples; that at (i, j, k) is i + 10 j - 100 k, 33 at most.
+// 3 x 2 x 4 samples; that at (i, j, k) is i + 10 j - 100 k, -300 to 12.
 inline constexpr std::array<std::int32_t, 3> kFileDims{3, 2, 4};
 [[nodiscard]] int sample_in_file(std::size_t number);
 
