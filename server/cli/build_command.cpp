@@ -290,7 +290,9 @@ void add_build_command(Program& program) {
       ->check(CLI::IsMember({"boundary", "uniform"}))
       ->capture_default_str();
   command.add_option("--nan", o->nan, "Value that replaces NaN and infinite samples; without it they are an error")->type_name("VALUE");
-  command.add_option("--time-point", o->time_point, "Which volume of a file with several, one for each time point; the first is 0")->type_name("N");
+  command.add_option("--time-point", o->time_point, "Which volume of a file with several, one for each time point; the first is 0")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("N");
   command.add_option("--threads", o->threads, "Number of threads; 0: one for each core")->capture_default_str();
   command.add_option("--dims", o->dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
   command.add_option("--type", o->type, "Raw input: type of a sample: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");
