@@ -70,13 +70,10 @@ std::optional<Affine> vti_affine(const pugi::xml_node& image, const Extent& exte
   return Affine::of_columns(columns, first);
 }
 
-// The active scalars, else the first array.
+// The active scalars; without any the first array.
 pugi::xml_node find_array(const pugi::xml_node& data) {
-  const std::string_view wanted = data.attribute("Scalars").value();
-  for (const pugi::xml_node array : data.children("DataArray")) {
-    if (!wanted.empty() && array.attribute("Name").value() == wanted) return array;
-  }
-  return data.child("DataArray");
+  const pugi::xml_attribute scalars = data.attribute("Scalars");
+  return scalars ? data.find_child_by_attribute("DataArray", "Name", scalars.value()) : data.child("DataArray");
 }
 
 // Where an element's content begins in the text; its size if that is not to be found. No quoted attribute of a file that
@@ -146,7 +143,7 @@ Result<VolumeHeader> read_vti_header(const InputFile& file) {
   document.load_buffer(start->data(), start->size(), pugi::parse_default, pugi::encoding_utf8);
   const pugi::xml_node root = document.child("VTKFile"), image = root.child("ImageData"), piece = image.child("Piece");
   const pugi::xml_node array = find_array(piece.child("PointData"));
-  if (!array) return bad("it has no array of point data in its first MiB");
+  if (!array) return bad("it has no array of point data, or not the active scalars, in its first MiB");
   if (piece.next_sibling("Piece")) return fail(name + " has several pieces; write it as one");
 
   VolumeHeader header;
