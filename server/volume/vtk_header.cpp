@@ -77,7 +77,7 @@ struct Parsed {
   Vec3 origin{}, spacing{1, 1, 1};
   std::string_view array, type;
   std::uint64_t components = 1;
-  std::size_t end = 0;
+  bool is_color = false;  // in text they would be fractions of 255
 };
 
 // Sets the name, type and components of the array that a line begins; false if it begins none.
@@ -90,6 +90,13 @@ bool take_array(const std::string& keyword, const std::vector<std::string_view>&
     LineReader ahead = lines;  // a table of colours may be named, or not
     ahead.next_words(first);
     if (first == "LOOKUP_TABLE") lines = ahead;
+    return true;
+  }
+  if (keyword == "COLOR_SCALARS" && words.size() == 3) {  // VTK writes all scalars of this type so
+    parsed.array = words[1];
+    parsed.type = "unsigned_char";
+    parsed.is_color = true;
+    if (!parse(words[2], parsed.components)) parsed.components = 0;
     return true;
   }
   if ((keyword == "VECTORS" || keyword == "NORMALS") && words.size() >= 3) {
@@ -162,6 +169,7 @@ Result<VolumeHeader> read_vtk_header(const InputFile& file) {
   if (parsed.components != 1 && parsed.components != 3)
     return fail(name + ": the first array of the VTK file has another number of components than 1 or 3");
   header.components = unsigned(parsed.components);
+  if (parsed.is_color && header.encoding == Encoding::text) return fail(name + ": COLOR_SCALARS as text are not read; write the file as BINARY");
   const auto grid = make_grid(parsed.dims, Affine::of(parsed.spacing, parsed.origin), name);
   if (!grid) return tl::unexpected<Error>(grid.error());
   header.grid = *grid;

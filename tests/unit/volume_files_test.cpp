@@ -144,6 +144,22 @@ TEST(VolumeFileNames, OfAKnownFormatNeedItsContents) {
   }
 }
 
+// As VTK writes scalars of unsigned bytes.
+TEST(LegacyVtk, BytesAreColors) {
+  const TempDir folder;
+  const std::string before = "# vtk DataFile Version 5.1\nvtk output\n";
+  const std::string after = "\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 4\nSPACING 1 1 1\nORIGIN 0 0 0\nPOINT_DATA 24\nCOLOR_SCALARS density 1\n";
+  const std::string samples = "abcdefghijklmnopqrstuvwx";
+  const auto volume = read_volume(folder.file("v.vtk", before + "BINARY" + after + samples + "\n"), {});
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->type, SampleType::u8);
+  EXPECT_EQ(volume->labels.field, "density");
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(volume->bytes.data()), volume->bytes.size()), samples);
+  const auto text = read_volume(folder.file("t.vtk", before + "ASCII" + after + "0.1 0.2"), {});
+  ASSERT_FALSE(text);
+  EXPECT_NE(text.error().message.find("BINARY"), std::string::npos);
+}
+
 TEST(VolumeFileNames, DetachedDataIsFoundBesideItsHeader) {
   const TempDir folder;
   const auto& plain = testing::volume_files()[0].bytes;
