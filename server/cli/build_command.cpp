@@ -291,7 +291,7 @@ void add_build_command(Program& program) {
       ->capture_default_str();
   command.add_option("--nan", o->nan, "Value that replaces NaN and infinite samples; without it they are an error")->type_name("VALUE");
   command.add_option("--time-point", o->time_point, "Which volume of a file with several, one for each time point; the first is 0")
-      ->check(CLI::NonNegativeNumber)
+      ->check([](const std::string& text) { return text.starts_with('-') ? std::string("the first time point is 0") : std::string(); }, "", "")
       ->type_name("N");
   command.add_option("--threads", o->threads, "Number of threads; 0: one for each core")->capture_default_str();
   command.add_option("--dims", o->dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");

@@ -45,7 +45,7 @@ class Deflate : public Codec {
     if (is_ready_) inflateEnd(&stream_);
   }
   State decode(std::span<std::byte>& in, std::span<std::byte>& out) override {
-    if (stream_.total_in == 0 && !in.empty()) is_zlib_ = in[0] == kZlib;
+    if (stream_.total_in == 0 && !in.empty()) is_zlib_ = in[0] != kGzip;
     stream_.next_in = reinterpret_cast<Bytef*>(in.data());
     stream_.avail_in = uInt(std::min(in.size(), kMost));
     stream_.next_out = reinterpret_cast<Bytef*>(out.data());
@@ -58,13 +58,13 @@ class Deflate : public Codec {
     return code == Z_OK || code == Z_BUF_ERROR ? State::within : State::damaged;
   }
   bool restart() override { return inflateReset(&stream_) == Z_OK; }
-  [[nodiscard]] bool may_begin(std::byte first) const override { return first == (is_zlib_ ? kZlib : std::byte{0x1f}); }
+  [[nodiscard]] bool may_begin(std::byte first) const override { return is_zlib_ ? (first & std::byte{0x8f}) == std::byte{8} : first == kGzip; }
   [[nodiscard]] std::string reason() const override { return stream_.msg != nullptr ? stream_.msg : "not gzip"; }
-  [[nodiscard]] const char* name() const override { return "gzip"; }
+  [[nodiscard]] const char* name() const override { return is_zlib_ ? "zlib" : "gzip"; }
 
  private:
   static constexpr int kAnyWrapping = 15 + 32;  // zlib's windowBits: 32 KiB window, gzip or zlib
-  static constexpr std::byte kZlib{0x78};       // what zlib's own wrapping begins with, for that window
+  static constexpr std::byte kGzip{0x1f};       // what gzip begins with; zlib's own wrapping: 8, and in the high bits the window
   bool is_zlib_ = false;
   z_stream stream_{};
 };
@@ -118,7 +118,8 @@ class Bzip2 : public Codec {
 // The bytes of a file, or what base64 text in it stands for.
 class Source {
  public:
-  explicit Source(const Coded& data) : file_(data.file), offset_(data.offset), is_base64_(data.base64_skip.has_value()) {}
+  explicit Source(const Coded& data)
+      : file_(data.file), offset_(data.offset), is_base64_(data.base64_skip.has_value()), first_end_(data.base64_skip.value_or(0)) {}
 
   // Fills the front of `out`, which has room for kChunk; 0 bytes only at the end.
   Result<std::size_t> read(std::span<std::byte> out) {
@@ -138,7 +139,8 @@ class Source {
   }
 
  private:
-  // Of four characters with 6 bits each; '=' stands for none. Returns how many bytes are complete: 0, or 1 to 3.
+  // Of four characters with 6 bits each; '=' stands for none, and ends the text unless what is skipped ends there: that
+  // may be a text of its own. Returns how many bytes are complete: 0, or 1 to 3.
   std::size_t take(char c, std::span<std::byte> out) {
     if (c == ' ' || c == '\n' || c == '\r' || c == '\t') return 0;
     const int value = c >= 'A' && c <= 'Z'   ? c - 'A'
@@ -147,7 +149,8 @@ class Source {
                       : c == '+'             ? 62
                       : c == '/'             ? 63
                                              : -1;
-    if (value < 0 && c != '=') {
+    const bool is_misplaced = value >= 0 ? unused_ > 0 || (is_padded_ && done_ != first_end_) : c != '=' || characters_ < 2;
+    if (is_misplaced) {
       is_ended_ = true;
       return 0;
     }
@@ -156,6 +159,8 @@ class Source {
     if (++characters_ < 4) return 0;
     const std::size_t bytes = 3 - std::min<std::size_t>(unused_, 3);
     for (std::size_t k = 0; k < bytes; ++k) out[k] = std::byte(bits_ >> (16 - 8 * k));
+    is_padded_ = unused_ > 0;
+    done_ += bytes;
     characters_ = bits_ = unused_ = 0;
     return bytes;
   }
@@ -163,7 +168,9 @@ class Source {
   const InputFile& file_;
   std::uint64_t offset_;
   const bool is_base64_;
-  bool is_ended_ = false;
+  const std::uint64_t first_end_;  // bytes that may be a text of their own
+  bool is_ended_ = false, is_padded_ = false;
+  std::uint64_t done_ = 0;                                // bytes
   std::uint32_t bits_ = 0, characters_ = 0, unused_ = 0;  // of the group of four
   std::array<std::byte, kChunk> text_;
 };

@@ -1,12 +1,16 @@
-// The beginning of a file, and numbers in it.
+// The beginning of a file, and words and numbers in it.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <charconv>
 #include <cstring>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/volume/input_file.h"
 
@@ -45,5 +49,31 @@ class HeaderBytes {
 
 // Without blanks at its ends.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
+[[nodiscard]] std::string lower(std::string_view text);  // ASCII only
+
+// The number that all of a text is, perhaps after a plus sign; none if it is something else, or too large for T.
+template <class T>
+[[nodiscard]] std::optional<T> number_of(std::string_view text) {
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  T number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
+}
+
+// The words of a line, between blanks.
+[[nodiscard]] std::vector<std::string_view> words_of(std::string_view line);
+
+// The numbers that all words of a line are; none if one is something else, or if they are not as many as N.
+template <class T, std::size_t N>
+[[nodiscard]] std::optional<std::array<T, N>> numbers_of(std::span<const std::string_view> words) {
+  std::array<T, N> numbers{};
+  if (words.size() != N) return {};
+  for (std::size_t k = 0; k < N; ++k) {
+    const auto number = number_of<T>(words[k]);
+    if (!number) return {};
+    numbers[k] = *number;
+  }
+  return numbers;
+}
 
 }  // namespace intervale

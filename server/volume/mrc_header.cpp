@@ -15,7 +15,11 @@ constexpr std::size_t kMrcSize = 1024;  // bytes of the header
 constexpr std::size_t kDims = 0, kMode = 12, kFirstIndex = 16, kIntervals = 28, kCell = 40, kAngles = 52, kAxes = 64, kExtended = 92, kOrigin = 196,
                       kMap = 208, kStamp = 212;
 
-bool is_big_endian(std::string_view start) { return start[kStamp] == '\x11'; }
+// By the machine stamp; without one as its mode is a small number.
+bool is_big_endian(std::string_view start) {
+  if (start[kStamp] == '\0') return HeaderBytes(start, false).number<std::uint32_t>(kMode) > 0xffff;
+  return start[kStamp] == '\x11';
+}
 
 std::optional<SampleType> mrc_type(std::int32_t mode) {
   switch (mode) {
@@ -91,6 +95,7 @@ Result<VolumeHeader> read_mrc_header(const InputFile& file) {
   const auto grid = make_grid({dims[0], dims[1], dims[2]}, Affine::of_columns(columns, origin), name);
   if (!grid) return tl::unexpected<Error>(grid.error());
   header.grid = *grid;
+  if (auto size = check_size(header, name); !size) return tl::unexpected<Error>(size.error());
   const auto extended = bytes.number<std::int32_t>(kExtended);
   if (extended < 0) return fail(name + ": the MRC header has an extension of " + std::to_string(extended) + " bytes");
   header.data_offset = kMrcSize + std::uint64_t(extended);

@@ -195,7 +195,8 @@ Result<VolumeHeader> read_nifti_header(const InputFile& file) {
   if (!grid) return tl::unexpected<Error>(grid.error());
   header.grid = *grid;
   if (auto size = check_size(header, name); !size) return tl::unexpected<Error>(size.error());
-  if (const double slope = fields.slope(); slope != 0 && std::isfinite(slope) && std::isfinite(fields.intercept())) {
+  if (const double slope = fields.slope(); slope != 0 && std::isfinite(slope)) {  // others mean that there is none
+    if (!std::isfinite(fields.intercept())) return fail(name + ": the NIfTI header has a slope, and an intercept that is no number");
     header.slope = slope;
     header.intercept = fields.intercept();
   }

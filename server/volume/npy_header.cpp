@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,10 +30,9 @@ std::vector<std::int64_t> tuple_of(std::string_view text) {
   while (!trimmed(text).empty() && numbers.size() < 8) {
     const auto comma = std::min(text.find(','), text.size());
     const std::string_view item = trimmed(text.substr(0, comma));
-    std::int64_t number = 0;
-    const auto [last, error] = std::from_chars(item.data(), item.data() + item.size(), number);
-    if (error != std::errc() || last != item.data() + item.size()) return {};
-    numbers.push_back(number);
+    const auto number = number_of<std::int64_t>(item);
+    if (!number) return {};
+    numbers.push_back(*number);
     text.remove_prefix(std::min(comma + 1, text.size()));
   }
   return numbers;

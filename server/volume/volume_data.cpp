@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -93,7 +94,8 @@ Result<void> read_coded_data(const Samples& source, std::vector<std::byte>& out)
   const VolumeHeader& header = source.header;
   const std::uint64_t needed = header.data_bytes(), packed = source.file.size() - source.start;
   const bool has_bound = header.encoding != Encoding::bzip2;
-  if (has_bound && source.all() / kGreatestDeflateRatio > packed)
+  const std::uint64_t most = header.encoding == Encoding::raw ? packed / 4 + 1 : packed;  // units of 3 bytes, or of one that deflate coded
+  if (has_bound && source.all() / (header.encoding == Encoding::raw ? 3 : kGreatestDeflateRatio) > most)
     return source.too_short(std::to_string(packed) + " bytes of " + (header.encoding == Encoding::raw ? "base64" : "gzip") + " cannot hold as many");
   const auto skip = decoded_skip(source);
   if (!skip) return tl::unexpected<Error>(skip.error());
@@ -112,16 +114,69 @@ Result<void> read_coded_data(const Samples& source, std::vector<std::byte>& out)
 
 bool is_separator(char c) { return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == ','; }
 
-// Parses one number of a text into the bytes of a sample. Integers that do not fit their type fail instead of wrapping.
+// Parses one number of a text into the bytes of a sample. Integers that do not fit their type, and floats that are too
+// large, fail; floats that are too small are rounded.
 template <class T>
 bool parse_sample(std::string_view text, std::byte* sample) {
   if (text.starts_with('+')) text.remove_prefix(1);
   T value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return false;
+  if (end != text.data() + text.size() || text.empty()) return false;
+  if constexpr (std::is_floating_point_v<T>) {
+    if (error == std::errc::result_out_of_range) {
+      const double small = std::strtod(std::string(text).c_str(), nullptr);
+      if (!(std::abs(small) < 1)) return false;
+      value = T(small);
+    }
+  }
+  if (error != std::errc{} && !(std::is_floating_point_v<T> && error == std::errc::result_out_of_range)) return false;
   std::memcpy(sample, &value, sizeof value);
   return true;
 }
+
+// The words of a text in a file, read in chunks. Those that hold numbers end before '<', too, which ends an XML element.
+class WordReader {
+ public:
+  WordReader(const InputFile& file, std::uint64_t offset) : file_(file), offset_(offset) {}
+
+  // The next word, or the beginning of a long one; empty at the end of the file, and before '<'. Valid until the next
+  // call.
+  Result<std::string_view> next() {
+    for (;;) {
+      while (at_ < text_.size() && is_separator(text_[at_])) ++at_;
+      std::size_t end = at_;
+      while (end < text_.size() && !is_separator(text_[end]) && text_[end] != '<' && end - at_ < kLongest) ++end;
+      if (end < text_.size() || is_at_end_) {
+        const std::string_view word = std::string_view(text_).substr(at_, end - at_);
+        at_ = end;
+        return word;
+      }
+      if (auto filled = fill(); !filled) return tl::unexpected<Error>(filled.error());
+    }
+  }
+
+ private:
+  static constexpr std::size_t kLongest = 512;  // characters of a number
+
+  Result<void> fill() {
+    text_.erase(0, at_);
+    at_ = 0;
+    const std::size_t before = text_.size();
+    text_.resize(before + kLineChunk);
+    const auto got = file_.read_some(offset_, std::as_writable_bytes(std::span(text_).subspan(before)));
+    if (!got) return tl::unexpected<Error>(got.error());
+    text_.resize(before + *got);
+    offset_ += *got;
+    is_at_end_ = *got == 0;
+    return {};
+  }
+
+  const InputFile& file_;
+  std::uint64_t offset_;
+  std::string text_;  // what has been read
+  std::size_t at_ = 0;
+  bool is_at_end_ = false;
+};
 
 Result<void> read_text_data(const Samples& source, std::vector<std::byte>& out) {
   const VolumeHeader& header = source.header;
@@ -132,21 +187,16 @@ Result<void> read_text_data(const Samples& source, std::vector<std::byte>& out) 
   const std::uint64_t skipped = source.beside();
   if (left < skipped || (left - skipped) / 2 + 1 < all) return source.too_short(std::to_string(left) + " characters of text cannot hold as many");
   out.resize(header.data_bytes());
-  std::string text(left - skipped, '\0');
-  if (auto read = source.file.read(source.start + skipped, std::as_writable_bytes(std::span(text))); !read) return read;
-  Volume shape{{}, header.grid, header.type, {}};
+  WordReader words(source.file, source.start + skipped);
+  const Volume shape{{}, header.grid, header.type, {}};
   return visit_samples(shape, [&]<class T>(std::span<const T>) -> Result<void> {
-    std::size_t position = 0;
     std::array<std::byte, sizeof(T)> other;
     for (std::uint64_t i = 0; i < before + samples; ++i) {
-      while (position < text.size() && is_separator(text[position])) ++position;
-      std::size_t end = position;
-      while (end < text.size() && !is_separator(text[end])) ++end;
-      if (!parse_sample<T>(std::string_view(text).substr(position, end - position),
-                           i < before ? other.data() : out.data() + (i - before) * sizeof(T)))
+      const auto word = words.next();
+      if (!word) return tl::unexpected<Error>(word.error());
+      if (!parse_sample<T>(*word, i < before ? other.data() : out.data() + (i - before) * sizeof(T)))
         return fail(name + ": sample " + std::to_string(i + 1) + " of " + std::to_string(all) +
-                    (position == end ? " is missing" : std::string(" is no ") + name_of(header.type)));
-      position = end;
+                    (word->empty() ? " is missing" : std::string(" is no ") + name_of(header.type)));
     }
     return {};
   });
@@ -177,6 +227,14 @@ std::optional<SampleType> integer_type(SampleType type, double least, double gre
   return {};
 }
 
+// Whether f32 keeps values apart that are a stored step apart, by a sixteenth of it. Of stored floats: as they are.
+template <class T>
+bool is_f32_enough(double slope, double intercept, double most) {
+  constexpr double kLeast = 1e-20, kMost = 1e38;  // far from where f32 ends
+  if (std::is_same_v<T, float>) return intercept == 0 && most >= kLeast && most <= kMost;
+  return sizeof(T) <= 2 && most <= kMost && std::abs(slope) >= kLeast && most * 0x1p-20 <= std::abs(slope);
+}
+
 }  // namespace
 
 Result<void> check_size(const VolumeHeader& header, const std::string& where) {
@@ -190,15 +248,12 @@ Result<void> check_size(const VolumeHeader& header, const std::string& where) {
 void rescale(Volume& volume, double slope, double intercept) {
   if (slope == 1 && intercept == 0) return;
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
+    if (samples.empty()) return;
+    const auto [least, greatest] = std::minmax_element(samples.begin(), samples.end());
+    const auto [low, high] = std::minmax({slope * double(*least) + intercept, slope * double(*greatest) + intercept});
     std::optional<SampleType> type;
-    if constexpr (std::is_integral_v<T>) {
-      if (is_whole(slope) && is_whole(intercept) && !samples.empty()) {
-        const auto [least, greatest] = std::minmax_element(samples.begin(), samples.end());
-        const auto [low, high] = std::minmax({slope * double(*least) + intercept, slope * double(*greatest) + intercept});
-        type = integer_type(volume.type, low, high);
-      }
-    }
-    if (!type) type = sizeof(T) <= 2 || std::is_same_v<T, float> ? SampleType::f32 : SampleType::f64;
+    if (std::is_integral_v<T> && is_whole(slope) && is_whole(intercept)) type = integer_type(volume.type, low, high);
+    if (!type) type = is_f32_enough<T>(slope, intercept, std::max(std::abs(low), std::abs(high))) ? SampleType::f32 : SampleType::f64;
     const Volume shape{{}, {}, *type, {}};
     auto bytes = visit_samples(shape, [&]<class To>(std::span<const To>) { return converted<To>(samples, slope, intercept); });
     volume.type = *type;

@@ -46,7 +46,7 @@ struct VolumeHeader {
 [[nodiscard]] Result<Volume> read_data(const InputFile& file, const VolumeHeader& header, std::optional<std::uint64_t> time_point = {});
 
 // Makes values of stored numbers: whole ones if slope and intercept are whole and all fit one of the integer types,
-// else f32 if they are at most 16 bits wide, else f64. A slope of 1 and an intercept of 0 change nothing.
+// else f32 if that keeps apart what the stored numbers do, else f64. A slope of 1 and an intercept of 0 change nothing.
 void rescale(Volume& volume, double slope, double intercept);
 
 }  // namespace intervale

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <initializer_list>
+#include <optional>
 #include <pugixml.hpp>
 #include <string>
 #include <vector>
@@ -24,22 +25,21 @@ std::optional<SampleType> vti_type(std::string_view name) {
   return found == kTypes.end() ? std::nullopt : std::optional(SampleType(found - kTypes.begin()));
 }
 
-// Exactly as many numbers as an attribute should have, or what there is instead if it is missing; else nothing.
+// As many numbers as an attribute should have, or what there is instead if it is missing; else nothing.
 template <class T, std::size_t N>
 std::optional<std::array<T, N>> numbers_in(const pugi::xml_attribute& attribute, const std::array<T, N>& instead) {
-  if (!attribute) return instead;
-  std::array<T, N> numbers{};
-  std::string_view text = trimmed(attribute.value());
-  for (T& number : numbers) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error != std::errc()) return {};
-    text = trimmed(text.substr(std::size_t(end - text.data())));
-  }
-  return text.empty() ? std::optional(numbers) : std::nullopt;
+  return attribute ? numbers_of<T, N>(words_of(attribute.value())) : instead;
+}
+
+// Which of the words an attribute is, the first if it is missing; else nothing.
+std::optional<std::size_t> word_in(const pugi::xml_attribute& attribute, std::initializer_list<std::string_view> words) {
+  const auto* const found = attribute ? std::find(words.begin(), words.end(), attribute.value()) : words.begin();
+  return found == words.end() ? std::nullopt : std::optional(std::size_t(found - words.begin()));
 }
 
 struct Extent {
   std::array<std::int64_t, 3> dims{}, first{};
+  friend bool operator==(const Extent&, const Extent&) = default;
 };
 
 std::optional<Extent> extent_of(const pugi::xml_attribute& attribute) {
@@ -73,15 +73,22 @@ std::optional<Affine> vti_affine(const pugi::xml_node& image, const Extent& exte
 // The active scalars; without any the first array.
 pugi::xml_node find_array(const pugi::xml_node& data) {
   const pugi::xml_attribute scalars = data.attribute("Scalars");
-  return scalars ? data.find_child_by_attribute("DataArray", "Name", scalars.value()) : data.child("DataArray");
+  return scalars && *scalars.value() != '\0' ? data.find_child_by_attribute("DataArray", "Name", scalars.value()) : data.child("DataArray");
 }
 
-// Where an element's content begins in the text; its size if that is not to be found. No quoted attribute of a file that
-// VTK writes has a '>'.
+// Where an element's content begins in the text: behind the first '>' outside quotes. Its size if there is none.
 std::size_t content_of(std::string_view text, const pugi::xml_node& node) {
-  const auto begin = node.offset_debug();
-  const auto end = begin < 0 ? text.npos : text.find('>', std::size_t(begin));
-  return end == text.npos ? text.size() : end + 1;
+  char quote = '\0';
+  for (std::size_t at = node.offset_debug() < 0 ? text.size() : std::size_t(node.offset_debug()); at < text.size(); ++at) {
+    const char c = text[at];
+    if (quote == '\0' && c == '>') return at + 1;
+    if (c == quote) {
+      quote = '\0';
+    } else if (quote == '\0' && (c == '"' || c == '\'')) {
+      quote = c;
+    }
+  }
+  return text.size();
 }
 
 // The first numbers of the data, of 4 or 8 bytes each.
@@ -104,15 +111,23 @@ Result<std::vector<std::uint64_t>> read_counts(const InputFile& file, const Volu
 // Sets where the data is: behind the counts that precede it. Those are for plain data its bytes; for compressed data the
 // number of blocks, the bytes of a block and of the last one if that is shorter, and the compressed bytes of each.
 Result<void> skip_counts(const InputFile& file, std::size_t width, VolumeHeader& header) {
-  auto counts = read_counts(file, header, 1, width);
-  if (counts && header.encoding == Encoding::deflate) {
-    const std::uint64_t blocks = counts->front();
-    if (blocks == 0 || blocks > file.size()) return fail(in_quotes(file.path()) + ": bad VTK file: the number of compressed blocks is wrong");
-    counts = read_counts(file, header, 3 + blocks, width);
-  }
+  const bool is_compressed = header.encoding == Encoding::deflate;
+  const std::uint64_t expected = header.data_bytes();
+  auto counts = read_counts(file, header, is_compressed ? 3 : 1, width);
   if (!counts) return tl::unexpected<Error>(counts.error());
-  header.coded_bytes = counts->front();
-  if (header.encoding == Encoding::deflate) {
+  std::uint64_t bytes = counts->front();
+  if (is_compressed) {
+    const std::uint64_t blocks = (*counts)[0], size = (*counts)[1], last = (*counts)[2];
+    const bool is_possible = blocks >= 1 && blocks <= expected && size >= 1 && size <= expected && last < size;
+    bytes = is_possible ? (blocks - (last == 0 ? 0 : 1)) * size + last : 0;
+    if (!is_possible || blocks - 1 > expected / size) bytes = 0;
+  }
+  if (bytes != expected)
+    return fail(in_quotes(file.path()) + ": bad VTK file: the array needs " + std::to_string(expected) + " bytes, and its data has other counts");
+  header.coded_bytes = bytes;
+  if (is_compressed) {
+    counts = read_counts(file, header, 3 + counts->front(), width);
+    if (!counts) return tl::unexpected<Error>(counts.error());
     header.coded_bytes = 0;
     for (std::size_t i = 3; i < counts->size(); ++i) header.coded_bytes += std::min((*counts)[i], file.size());
   }
@@ -127,10 +142,10 @@ Result<void> skip_counts(const InputFile& file, std::size_t width, VolumeHeader&
 }  // namespace
 
 bool is_vti(std::string_view start) {
-  const auto tag = start.find("<VTKFile");
-  if (tag == start.npos) return false;
-  const std::string_view attributes = start.substr(tag, start.find('>', tag) - tag);
-  return attributes.find("type=\"ImageData\"") != attributes.npos;
+  if (start.find("<VTKFile") == start.npos) return false;
+  pugi::xml_document document;
+  document.load_buffer(start.data(), start.size(), pugi::parse_default, pugi::encoding_utf8);
+  return std::string_view(document.child("VTKFile").attribute("type").value()) == "ImageData";
 }
 
 Result<VolumeHeader> read_vti_header(const InputFile& file) {
@@ -148,9 +163,14 @@ Result<VolumeHeader> read_vti_header(const InputFile& file) {
 
   VolumeHeader header;
   header.format = "VTK ImageData";
-  header.big_endian = std::string_view(root.attribute("byte_order").value()) == "BigEndian";
+  const auto order = word_in(root.attribute("byte_order"), {"LittleEndian", "BigEndian"});
+  const auto width = word_in(root.attribute("header_type"), {"UInt32", "UInt64"});
+  if (!order || !width) return bad("byte_order or header_type is not known");
+  header.big_endian = *order == 1;
+  if (image.attribute("NumberOfTimeSteps").as_uint(1) > 1 || array.attribute("TimeStep"))
+    return fail(name + " has time steps; write one of them alone");
   const auto whole = extent_of(image.attribute("WholeExtent")), extent = extent_of(piece.attribute("Extent"));
-  if (!whole || !extent || whole->dims != extent->dims) return bad("the extent of its piece is not the whole extent");
+  if (!whole || !extent || *whole != *extent) return bad("the extent of its piece is not the whole extent");
   const auto affine = vti_affine(image, *extent);
   if (!affine) return bad("Origin, Spacing or Direction are not numbers");
   const auto grid = make_grid(extent->dims, *affine, name);
@@ -159,9 +179,11 @@ Result<VolumeHeader> read_vti_header(const InputFile& file) {
   const auto type = vti_type(array.attribute("type").value());
   if (!type) return fail(name + ": VTK samples of another type than Int8 to Int32, UInt8 to UInt32, Float32 and Float64 are not read");
   header.type = *type;
-  header.components = array.attribute("NumberOfComponents").as_uint(1);
-  if (header.components != 1 && header.components != 3)
-    return fail(name + ": its array has " + std::to_string(header.components) + " components; 1 or 3 are read");
+  const auto components = numbers_in<unsigned, 1>(array.attribute("NumberOfComponents"), {1});
+  if (!components || (components->front() != 1 && components->front() != 3)) return fail(name + ": its array has other than 1 or 3 components");
+  header.components = components->front();
+  const auto tuples = numbers_in<std::uint64_t, 1>(array.attribute("NumberOfTuples"), {grid->sample_count()});
+  if (!tuples || tuples->front() != grid->sample_count()) return bad("its array has not as many tuples as the grid has points");
   if (auto size = check_size(header, name); !size) return tl::unexpected<Error>(size.error());
   if (const std::string_view field = array.attribute("Name").value(); is_label(field)) header.labels.field = field;
 
@@ -176,19 +198,20 @@ Result<VolumeHeader> read_vti_header(const InputFile& file) {
     const pugi::xml_node appended = root.child("AppendedData");
     const auto mark = start->find('_', content_of(*start, appended));
     if (!appended || mark == start->npos) return bad("its data is not in its first MiB");
-    const std::uint64_t offset = array.attribute("offset").as_ullong();
-    if (offset > INT64_MAX) return bad("its data is at no place in the file");
-    header.data_offset = mark + 1 + offset;
-    if (std::string_view(appended.attribute("encoding").value()) != "raw") header.base64_skip = 0;
+    const auto offset = number_of<std::uint64_t>(array.attribute("offset").value());
+    const auto encoding = word_in(appended.attribute("encoding"), {"base64", "raw"});
+    if (!offset || *offset > INT64_MAX || !encoding) return bad("the offset of its array, or the encoding of AppendedData, is not known");
+    header.data_offset = mark + 1 + *offset;
+    if (*encoding == 0) header.base64_skip = 0;
   } else if (format == "binary") {
     header.base64_skip = 0;
   } else {
     return bad("the format of its array is not ascii, binary or appended");
   }
-  const std::string_view compressor = root.attribute("compressor").value(), width = root.attribute("header_type").value();
+  const std::string_view compressor = root.attribute("compressor").value();
   if (!compressor.empty() && compressor != kCompressor) return fail(name + " is compressed by other than zlib; write it with vtkZLibDataCompressor");
   if (!compressor.empty()) header.encoding = Encoding::deflate;
-  if (auto skipped = skip_counts(file, width == "UInt64" ? 8 : 4, header); !skipped) return tl::unexpected<Error>(skipped.error());
+  if (auto skipped = skip_counts(file, *width == 1 ? 8 : 4, header); !skipped) return tl::unexpected<Error>(skipped.error());
   return header;
 }
 

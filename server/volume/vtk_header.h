@@ -11,8 +11,9 @@ namespace intervale {
 [[nodiscard]] bool is_legacy_vtk(std::string_view start);
 
 // Reads and checks the lines up to the first array of point data, of which one or three numbers a sample are read: by
-// SCALARS, COLOR_SCALARS (in binary files), VECTORS or FIELD. Other arrays may follow. Fails on datasets other than
-// STRUCTURED_POINTS, on 64-bit integers, on bits, and if these lines take more than 64 KiB.
+// SCALARS, COLOR_SCALARS (in binary files), VECTORS or FIELD. Other arrays may follow; a FIELD before the point data is
+// skipped. Fails on datasets other than STRUCTURED_POINTS, on counts that contradict each other, on 64-bit integers, on
+// bits, and if these lines take more than 64 KiB.
 [[nodiscard]] Result<VolumeHeader> read_vtk_header(const InputFile& file);
 
 }  // namespace intervale

@@ -115,18 +115,6 @@ std::string vtk(const std::string& coding, const std::string& array, const std::
          "\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 4\nORIGIN -1 2 3\nSPACING 0.5 1 2\nPOINT_DATA 24\n" + array + data;
 }
 
-std::string base64(const std::string& bytes) {
-  constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k) bits = bits << 8 | (k < count ? std::uint8_t(bytes[i + k]) : 0);
-    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[bits >> (18 - 6 * k) & 63] : '=';
-  }
-  return text;
-}
-
 // data: of the array's element; appended: of AppendedData. 1 is the first index of each axis.
 std::string vti(const std::string& root, const std::string& array, const std::string& data, const std::string& appended) {
   return "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" " + root +
@@ -182,6 +170,18 @@ std::string deflated(const std::string& text, Wrapping wrapping) {
   return packed;
 }
 
+std::string base64(const std::string& bytes) {
+  constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k) bits = bits << 8 | (k < count ? std::uint8_t(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[bits >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
 std::string bzip2(const std::string& text) {
   std::string packed(text.size() + text.size() / 100 + 600, '\0'), copy = text;
   auto length = unsigned(packed.size());
@@ -207,7 +207,7 @@ const std::vector<VolumeFile>& volume_files() {
       {"packed.mha", metaimage("CompressedData = True\nElementType = MET_FLOAT\n", deflated(samples<float>(false), Wrapping::zlib)), SampleType::f32,
        kTurned, "LPS"},
       {"text.vtk", vtk("ASCII", "SCALARS density float 1\nLOOKUP_TABLE default\n", text_of_samples()), SampleType::f32, kStraight, ""},
-      {"binary.vtk", vtk("BINARY", "SCALARS density short\n", samples<Short>(true)), SampleType::i16, kStraight, ""},
+      {"binary.vtk", vtk("BINARY", "SCALARS density short 1\nLOOKUP_TABLE default\n", samples<Short>(true)), SampleType::i16, kStraight, ""},
       {"field.vtk", vtk("BINARY", "FIELD FieldData 1\ndensity 1 24 int\n", samples<Int>(true)), SampleType::i32, kStraight, ""},
       {"text.vti", vti("", "type=\"Float32\" format=\"ascii\"", "\n" + text_of_samples(), ""), SampleType::f32, kTurned, "", 0, 1, "</DataArray>"},
       {"base64.vti",

@@ -30,5 +30,6 @@ inline constexpr std::array<std::int32_t, 3> kFileDims{3, 2, 4};
 enum class Wrapping : std::uint8_t { gzip, zlib };
 [[nodiscard]] std::string deflated(const std::string& text, Wrapping wrapping);
 [[nodiscard]] std::string bzip2(const std::string& text);
+[[nodiscard]] std::string base64(const std::string& bytes);
 
 }  // namespace intervale::testing
