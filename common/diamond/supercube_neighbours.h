@@ -205,6 +205,18 @@ class SetFinder {
 };
 using SetNeighbours = SupercubeNeighbours<SetFinder>;
 
+// Calls visit(number) for those parents of a diamond that are in the set; `around` moves to its supercube. Fastest along
+// ascending keys.
+template <class Visit>
+void for_each_parent(SetNeighbours& around, SupercubeKey key, Slot slot, Visit&& visit) {
+  around.move_to(key);
+  const Links& links = around.links(slot);
+  for (int k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
+    const auto parent = around.at(links.vertex[links.parent[k]]);
+    if (parent.supercube.has(parent.slot)) visit(parent.supercube.index(parent.slot));
+  }
+}
+
 // Which of the diamonds named can be merged, finest first: calls merge(group, slot) for each that is split and by then
 // has no split child. A child is one by its place, whether it was handed tetrahedra or not, so that a client's front
 // and its server's plan agree. groups: keys strictly ascending. split_slots(Found): of a supercube.

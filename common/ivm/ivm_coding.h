@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/codec/range_coder.h"
+#include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/interval_volume.h"
 #include "common/util/parallel.h"
 
@@ -26,6 +27,7 @@ bool code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint
   std::array<std::array<SmallNumberModel, 2>, 3> above_children;
   std::vector<std::uint16_t> least(set.size());  // the largest step of a child plus 1; 0 without children
   static_assert(kMaxErrorSteps == 256);
+  SetNeighbours around(set);
   const auto visit = [&](const Place& p) {
     const int cls = class_of_slot(p.slot), finest = scale_of_key(p.key) == 0;
     std::uint8_t& step = steps[p.index];
@@ -35,7 +37,7 @@ bool code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint
     } else {
       step = std::uint8_t(from - 1 + above_children[cls][finest].code(coder, (step - from + 1) & 255u));
     }
-    for_each_parent(set, p, [&](UpdateIndex parent) { least[parent] = std::max(least[parent], std::uint16_t(step + 1)); });
+    for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { least[parent] = std::max(least[parent], std::uint16_t(step + 1)); });
   };
   for (int scale = 0; scale < kMaxLevels; ++scale) {
     const auto [begin, end] = set.of_scale(scale);
@@ -59,6 +61,7 @@ bool code_update_slopes(Coder& coder, const SupercubeSet& set, std::span<std::ui
     std::array<std::array<NumberModel<4>, 4>, 16> model;  // by the mean of the parents, and a quarter of the one before
   };
   const auto models = std::make_unique<std::array<std::array<OfClass, 2>, 3>>();  // by class, and whether it is the finest
+  SetNeighbours around(set);
   for (int scale = kMaxLevels - 1; scale >= 0; --scale) {
     const auto [begin, end] = set.of_scale(scale);
     for (int cls = 0; cls <= 2; ++cls) {
@@ -68,7 +71,7 @@ bool code_update_slopes(Coder& coder, const SupercubeSet& set, std::span<std::ui
         unsigned before = 0;
         set.for_each_in_brick(brick, kSlotsOfClass[std::size_t(cls)], [&](const Place& p) {
           unsigned sum = 0, parents = 0;
-          for_each_parent(set, p, [&](UpdateIndex parent) {
+          for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) {
             sum += slopes[parent];
             ++parents;
           });

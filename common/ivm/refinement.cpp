@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/ranking.h"
 #include "common/util/bits.h"
 
@@ -10,12 +11,13 @@ namespace intervale {
 
 SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>& wants) {
   SplitSet chosen(set.size());
+  SetNeighbours around(set);
   set.for_each_up([&](const Place& p) {
     if (!chosen.contains(p.index)) {
       if (!wants(p)) return;
       chosen.insert(p.index);
     }
-    for_each_parent(set, p, [&](UpdateIndex parent) { chosen.insert(parent); });
+    for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { chosen.insert(parent); });
   });
   return chosen;
 }
@@ -58,9 +60,10 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const RelevantUp
     });
   }
   if (lod.roi || lod.camera) {
+    SetNeighbours around(set);
     set.for_each_up([&](const Place& p) {
       if (!updates.contains(p.index)) return;
-      for_each_parent(set, p, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
+      for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
     });
   }
   // A counting sort over the coarse to fine order.

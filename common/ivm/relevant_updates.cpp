@@ -72,8 +72,14 @@ double diamond_width(const Grid& grid) {
 }
 
 unsigned slope_of(double removed) {
+  // The least numbers that are nearer to the slopes from 2 on than to the one before.
+  static const auto kFrom = [] {
+    std::array<double, kMaxSlope - 2> from{};
+    for (std::size_t i = 0; i < from.size(); ++i) from[i] = std::exp2((double(i) + 1.5 - kSlopeOfOne) * kSlopeStep);
+    return from;
+  }();
   if (!(removed > 0)) return 0;
-  return unsigned(std::clamp(std::lround(std::log2(removed) / kSlopeStep) + kSlopeOfOne, 1L, long(kMaxSlope) - 1));
+  return 1 + unsigned(std::upper_bound(kFrom.begin(), kFrom.end(), removed) - kFrom.begin());
 }
 
 float removed_of(unsigned slope) { return slope == 0 ? 0 : float(std::exp2((int(slope) - kSlopeOfOne) * kSlopeStep)); }

@@ -9,52 +9,57 @@
 
 namespace intervale {
 
-// The spine goes from corner 0 to corner tail().
+// A tetrahedron of a diamond of a class that is known where it is bisected. The spine goes from corner 0 to corner
+// tail_of_class(class).
 struct BisectionTet {
   struct Corner {
     Vertex at;
     float value;
   };
   std::array<Corner, 4> corner;
-  int scale, cls;              // of its diamond
+  int scale;                   // of its diamond
   std::array<Vec3, 4> weight;  // the gradients of the barycentric coordinates, in world units; a bisection changes two of them
   Vec3 gradient;               // of the interpolant
-  [[nodiscard]] int tail() const { return 3 - cls; }
 };
 
+[[nodiscard]] constexpr int tail_of_class(int cls) { return 3 - cls; }
+[[nodiscard]] constexpr int finer_class(int cls) { return cls == 2 ? 0 : cls + 1; }
+
 // Makes `half`, with the corners and weights of a half of `tet`, one class finer.
-inline void step_down(BisectionTet& half, const BisectionTet& tet) {
-  const int tail = tet.tail();
-  half.scale = tet.cls == 2 ? tet.scale - 1 : tet.scale;
-  half.cls = tet.cls == 2 ? 0 : tet.cls + 1;
+template <int kClass>
+void step_down(BisectionTet& half, const BisectionTet& tet) {
+  constexpr int kTail = tail_of_class(kClass);
+  half.scale = kClass == 2 ? tet.scale - 1 : tet.scale;
   // How far the value at the middle is from the interpolant.
-  const double bend = double(half.corner[tail].value) - 0.5 * (double(tet.corner[0].value) + double(tet.corner[tail].value));
-  for (int k = 0; k < 3; ++k) half.gradient[k] += bend * half.weight[tail][k];
+  const double bend = double(half.corner[kTail].value) - 0.5 * (double(tet.corner[0].value) + double(tet.corner[kTail].value));
+  for (int k = 0; k < 3; ++k) half.gradient[k] = tet.gradient[k] + bend * half.weight[kTail][k];
 }
 
-// The half at the start of the spine; middle: of the spine.
-[[nodiscard]] inline BisectionTet half_at_start(const BisectionTet& tet, const BisectionTet::Corner& middle) {
-  const int tail = tet.tail();
+// The half at the start of the spine; middle: of the spine. kClass: of the diamond of `tet`.
+template <int kClass>
+[[nodiscard]] BisectionTet half_at_start(const BisectionTet& tet, const BisectionTet::Corner& middle) {
+  constexpr int kTail = tail_of_class(kClass);
   BisectionTet half = tet;
-  half.corner[tail] = middle;
-  half.weight[0] = subtract(tet.weight[0], tet.weight[tail]);
-  half.weight[tail] = scaled(2, tet.weight[tail]);
-  step_down(half, tet);
+  half.corner[kTail] = middle;
+  half.weight[0] = subtract(tet.weight[0], tet.weight[kTail]);
+  half.weight[kTail] = scaled(2, tet.weight[kTail]);
+  step_down<kClass>(half, tet);
   return half;
 }
 
 // The half at the end of the spine.
-[[nodiscard]] inline BisectionTet half_at_end(const BisectionTet& tet, const BisectionTet::Corner& middle) {
-  const int tail = tet.tail();
+template <int kClass>
+[[nodiscard]] BisectionTet half_at_end(const BisectionTet& tet, const BisectionTet::Corner& middle) {
+  constexpr int kTail = tail_of_class(kClass);
   BisectionTet half = tet;
-  for (int i = 0; i < tail; ++i) {
+  for (int i = 0; i < kTail; ++i) {
     half.corner[i] = tet.corner[i + 1];
     half.weight[i] = tet.weight[i + 1];
   }
-  half.corner[tail] = middle;
-  half.weight[tail - 1] = subtract(tet.weight[tail], tet.weight[0]);
-  half.weight[tail] = scaled(2, tet.weight[0]);
-  step_down(half, tet);
+  half.corner[kTail] = middle;
+  half.weight[kTail - 1] = subtract(tet.weight[kTail], tet.weight[0]);
+  half.weight[kTail] = scaled(2, tet.weight[0]);
+  step_down<kClass>(half, tet);
   return half;
 }
 

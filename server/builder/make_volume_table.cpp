@@ -120,7 +120,7 @@ class CellSums {
  public:
   CellSums(std::span<const T> samples, const std::array<std::int32_t, 3>& dims, std::span<const double> positions)
       : samples_(samples), row_(dims[0]), slice_(row_ * dims[1]), dims_(dims), positions_(positions), places_(positions) {
-    stride_ = std::max<std::size_t>(1, samples.size() / kCells);
+    stride_ = std::max<std::uint64_t>(kOneCell, std::uint64_t(double(samples.size()) / double(kCells) * double(kOneCell)));
     for (const double p : positions) scaled_.push_back(p * kScale);
     scaled_.resize(positions.size() + TetShares::kLanes, std::numeric_limits<double>::infinity());
   }
@@ -148,11 +148,11 @@ class CellSums {
   }
 
  private:
-  // The first of the cells summed in a row. (y, z) times these constants spreads evenly over the numbers of 32 bits:
-  // Martin Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
-  [[nodiscard]] std::ptrdiff_t first_cell(std::int32_t y, std::int32_t z) const {
+  // The place of the first of the cells summed in a row, below the stride. (y, z) times these constants spreads evenly
+  // over the numbers of 32 bits: Martin Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018.
+  [[nodiscard]] std::uint64_t first_cell(std::int32_t y, std::int32_t z) const {
     const std::uint32_t place = std::uint32_t(y) * 0xc13fa9a9u + std::uint32_t(z) * 0x91e10da5u;
-    return std::ptrdiff_t(std::uint64_t(place) * stride_ >> 32);
+    return std::uint64_t(double(place) / double(kOneCell) * double(stride_));
   }
 
   void encode(std::int32_t z, std::vector<PlaceCode>& codes) const {
@@ -169,7 +169,8 @@ class CellSums {
     const std::array<std::array<std::ptrdiff_t, 8>, 2> coded{cell_corners({0, y, z}, row_, up), cell_corners({1, y, z}, row_, up)};
     const T* const values = &samples_[std::size_t(z * slice_ + y * row_)];
     const PlaceCode* const code = codes.data() + (z & 1) * slice_ + y * row_;
-    for (std::ptrdiff_t x = first_cell(y, z); x + 1 < row_; x += std::ptrdiff_t(stride_)) {
+    for (std::uint64_t place = first_cell(y, z); std::ptrdiff_t(place >> 32) + 1 < row_; place += stride_) {
+      const auto x = std::ptrdiff_t(place >> 32);
       std::array<PlaceCode, 8> k{};
       for (int i = 0; i < 8; ++i) k[i] = code[x + coded[x & 1][i]];
       const bool undivided = std::all_of(k.begin() + 1, k.end(), [&k](PlaceCode other) { return other == k[0]; });
@@ -201,7 +202,9 @@ class CellSums {
   std::span<const T> samples_;
   std::ptrdiff_t row_, slice_;
   std::array<std::int32_t, 3> dims_;
-  std::uint64_t stride_ = 1;                  // between the cells summed in a row
+  // Places of cells in a row are counted in parts of a cell.
+  static constexpr std::uint64_t kOneCell = std::uint64_t(1) << 32;
+  std::uint64_t stride_ = kOneCell;           // between the cells summed in a row
   static constexpr std::int32_t kSlices = 4;  // of cells, that a thread takes at once
   // Of values in computations: the difference of two doubles can overflow.
   static constexpr double kScale = sizeof(T) == sizeof(double) ? 0.25 : 1;

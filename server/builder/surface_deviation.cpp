@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -13,6 +14,7 @@
 #include "common/util/round_up.h"
 #include "common/util/vec3.h"
 #include "server/builder/bisection.h"
+#include "server/builder/cube_crossings.h"
 #include "server/builder/interpolation_error.h"
 
 namespace intervale {
@@ -22,54 +24,14 @@ constexpr int kTopScale = 4;  // cubes of this scale are searched one by one; co
 
 // Of a top cube's width: the distance to the next patch where no diamond of the cube has one.
 constexpr double kUnknownDistance = kMaxFarDeviation / (1 << kTopScale);
-constexpr double kFarWidths = 2.01;             // a patch further away than so many widths of the diamond is far
-constexpr double kLeastDeviation = 1e-4;        // of the finest diamonds' width: smaller deviations count as 0
-constexpr double kInsideBox = 1.0 / (1 << 16);  // of a sample: points in the far sides of the box are moved so far into it
+constexpr double kFarWidths = 2.01;       // a patch further away than so many widths of the diamond is far
+constexpr double kLeastDeviation = 1e-4;  // of the finest diamonds' width: smaller deviations count as 0
 
 // Sums of squared deviations are whole numbers, so that their order does not matter.
 constexpr double kRemovedOne = 1 << 20;
+std::int64_t whole(double value) { return std::int64_t(value < 0 ? value - 0.5 : value + 0.5); }
 
 using Tet = BisectionTet;
-
-// Where a value lies between two others, 0 at `from` and 1 at `to`. Halved if their difference is more than a double holds.
-double part_of(double value, double from, double to) {
-  const double whole = to - from;
-  return std::isfinite(whole) ? (value - from) / whole : (value / 2 - from / 2) / (to / 2 - from / 2);
-}
-
-// A point where the field crosses a surface.
-struct Crossing {
-  std::array<float, 4> at;  // barycentric coordinates
-  int surface;
-};
-
-// A surface: the field at alpha or at beta.
-struct Isovalue {
-  double value;
-  bool is_beta;
-  // Whether two samples lie on different sides of it. As in range.h: a sample equal to alpha or beta is inside.
-  [[nodiscard]] bool separates(double a, double b) const { return is_beta ? (a > value) != (b > value) : (a < value) != (b < value); }
-};
-
-// The tetrahedra of a cube follow the paths along its edges from one end of the spine to the other: the axes in order.
-constexpr std::array<std::array<int, 3>, 6> kPaths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
-using CrossingsByTet = std::array<std::vector<Crossing>, kPaths.size()>;
-
-// A diamond of class 0, which is a cube.
-struct Cube {
-  Cube(const Diamond& d, Vertex last) : side(2 * d.h), scale(d.scale), low{d.centre.x - d.h, d.centre.y - d.h, d.centre.z - d.h}, start(d.vertex(0)) {
-    flip = {start.x != low[0], start.y != low[1], start.z != low[2]};
-    most = {last.x - low[0] - kInsideBox, last.y - low[1] - kInsideBox, last.z - low[2] - kInsideBox};
-  }
-  std::int32_t side;
-  int scale;
-  std::array<std::int32_t, 3> low;  // its lowest corner
-  Vertex start;                     // of the spine
-  std::array<bool, 3> flip;         // axes along which the spine descends
-  // The largest coordinates from `low`: points in a far side of the box belong to the tetrahedra before it, not to
-  // those behind, which clamping makes flat.
-  Vec3 most;
-};
 
 // Sets a shared number to the larger of it and `value`.
 void raise(float& to, float value) {
@@ -102,29 +64,37 @@ class Descent {
   Descent(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& largest,
           std::vector<Mean>& means, std::vector<std::int64_t>& removed)
       : field_(field),
-        affine_(grid.affine),
         inverse_(grid.affine.inverse()),
+        affine_(grid.affine),
         domain_(domain),
         set_(set),
+        surfaces_(range),
+        finder_(field, surfaces_),
         largest_(largest),
         means_(means),
         removed_(removed),
         width_(diamond_width(grid)) {
-    if (std::isfinite(range.alpha)) surface_[surfaces_++] = {range.alpha, false};
-    if (std::isfinite(range.beta)) surface_[surfaces_++] = {range.beta, true};
-    if (surfaces_ > 0) zero_ = surface_[0].value;
-    for (int k = 0; k < surfaces_; ++k) isovalue_[k] = float(surface_[k].value - zero_);
+    if (surfaces_.count > 0) zero_ = surfaces_.surface[0].value;
+    for (int k = 0; k < surfaces_.count; ++k) isovalue_[k] = float(surfaces_.surface[k].value - zero_);
   }
 
   // Everything inside one diamond of class 0.
   void measure(const Diamond& d) const {
     const Cube cube(d, field_.last);
-    CrossingsByTet crossings = crossings_in(cube);
-    NearByScale near;
-    near.inside = domain_.is_interior(d);
+    const CubeCrossings found = finder_.find(cube);
+    const bool is_inside = domain_.is_interior(d);
     const double unknown = kUnknownDistance * width_ * double(d.h);
     for (std::size_t t = 0; t < kPaths.size(); ++t) {
-      if (!crossings[t].empty()) descend(tet_of(cube, kPaths[t]), crossings[t], {unknown, unknown}, near);
+      BySurface<std::span<const Crossing>> crossings;
+      std::size_t count = 0;
+      for (std::size_t k = 0; k < kMaxSurfaces; ++k) {
+        crossings[k] = found[t][k];
+        count += found[t][k].size();
+      }
+      if (count == 0) continue;
+      const auto spare = std::make_unique_for_overwrite<Crossing[]>(count * std::size_t(3 * (d.scale + 1)));
+      Cursor cursor{{}, spare.get(), is_inside};
+      descend<0>(tet_of(cube, kPaths[t]), crossings, {unknown, unknown}, cursor);
     }
   }
 
@@ -132,96 +102,50 @@ class Descent {
   [[nodiscard]] double measure_tip(const Diamond& d) const {
     const Vertex a = d.vertex(0), b = d.vertex(1);
     if (!domain_.contains(a) || !domain_.contains(b)) return 0;
-    const Vertex step{(b.x - a.x) / (2 * d.h), (b.y - a.y) / (2 * d.h), (b.z - a.z) / (2 * d.h)};
     const T* const samples = &field_.samples[field_.index(a)];
-    const std::ptrdiff_t stride = &field_.samples[field_.index({a.x + step.x, a.y + step.y, a.z + step.z})] - samples;
+    const T* const end = &field_.samples[field_.index(b)];
     const int steps = 2 * d.h;
+    const double first = double(*samples), last = double(*end);
     double far = 0;
-    for (int k = 0; k < surfaces_; ++k) {
-      const double isovalue = surface_[k].value, first = double(samples[0]), last = double(samples[steps * stride]);
-      if (!surface_[k].separates(first, last)) continue;
-      const double cut = steps * part_of(isovalue, first, last);
+    for (int k = 0; k < surfaces_.count; ++k) {
+      const Isosurface& surface = surfaces_.surface[k];
+      if (!surface.separates(first, last)) continue;
+      const std::ptrdiff_t stride = (end - samples) / steps;
+      const double cut = steps * part_of(surface.value, first, last);
       double nearest = steps;
       for (int i = 0; i < steps; ++i) {
         const double u = double(samples[i * stride]), w = double(samples[(i + 1) * stride]);
-        if (surface_[k].separates(u, w)) nearest = std::min(nearest, std::abs(i + part_of(isovalue, u, w) - cut));
+        if (surface.separates(u, w)) nearest = std::min(nearest, std::abs(i + part_of(surface.value, u, w) - cut));
       }
       far = std::max(far, nearest);
     }
-    return far * length(affine_.direction({double(step.x), double(step.y), double(step.z)}));
+    if (far == 0) return 0;
+    return far * length(affine_.direction({double(b.x - a.x) / steps, double(b.y - a.y) / steps, double(b.z - a.z) / steps}));
   }
 
  private:
-  using Strides = std::array<std::ptrdiff_t, 3>;  // between neighbouring samples along each axis
+  template <class Value>
+  using BySurface = std::array<Value, kMaxSurfaces>;
+  // How far the next patch is, at most, from any point here, as far as coarser diamonds know.
+  using Nearest = BySurface<double>;
+  using Crossings = BySurface<std::span<const Crossing>>;  // in one tetrahedron
 
-  // The crossings on the edges of the finest tetrahedra: in the cell from each sample on, one edge for each set of one,
-  // two or three axes.
-  [[nodiscard]] CrossingsByTet crossings_in(const Cube& cube) const {
-    CrossingsByTet found;
-    const Vertex last = field_.last;
-    const Strides stride{1, last.x + 1, std::ptrdiff_t(last.x + 1) * (last.y + 1)};
-    const auto [x0, y0, z0] = cube.low;
-    const Vertex begin{std::max(0, x0), std::max(0, y0), std::max(0, z0)};
-    const Vertex end{std::min(last.x, x0 + cube.side), std::min(last.y, y0 + cube.side), std::min(last.z, z0 + cube.side)};
-    for (std::int32_t z = begin.z; z <= end.z; ++z) {
-      for (std::int32_t y = begin.y; y <= end.y; ++y) {
-        const T* const row = &field_.samples[field_.index({0, y, z})];
-        for (std::int32_t x = begin.x; x <= end.x; ++x) {
-          const unsigned at_end = unsigned(x == end.x) | unsigned(y == end.y) << 1 | unsigned(z == end.z) << 2;  // axes that lead out of the cube
-          if (at_end == 0 && !is_crossed(row + x, stride)) continue;
-          for (unsigned axes = 1; axes < 8; ++axes) {
-            if ((axes & at_end) == 0) add_crossings(cube, row + x, {x, y, z}, axes, stride, found);
-          }
-        }
-      }
-    }
-    return found;
-  }
-
-  // Whether a cell's eight samples, from the lowest one on, lie on different sides of a surface.
-  [[nodiscard]] bool is_crossed(const T* sample, const Strides& stride) const {
-    T least = *sample, most = *sample;
-    for (unsigned corner = 1; corner < 8; ++corner) {
-      const T value = sample[(corner & 1 ? stride[0] : 0) + (corner & 2 ? stride[1] : 0) + (corner & 4 ? stride[2] : 0)];
-      least = std::min(least, value);
-      most = std::max(most, value);
-    }
-    for (int k = 0; k < surfaces_; ++k) {
-      if (surface_[k].separates(double(least), double(most))) return true;
-    }
-    return false;
-  }
-
-  // Those of one edge: in the cell from v on, along these axes, from the end where those coordinates are even to the
-  // end where they are odd.
-  void add_crossings(const Cube& cube, const T* sample, const std::array<std::int32_t, 3>& v, unsigned axes, const Strides& stride,
-                     CrossingsByTet& found) const {
-    Vec3 even{}, odd{};  // the ends, from v
-    const T *first = sample, *second = sample;
-    for (int i = 0; i < 3; ++i) {
-      if ((axes >> i & 1) == 0) continue;
-      const bool back = (v[i] & 1) != 0;
-      (back ? even : odd)[i] = 1;
-      (back ? first : second) += stride[i];
-    }
-    const double a = double(*first), b = double(*second);
-    for (int k = 0; k < surfaces_; ++k) {
-      if (!surface_[k].separates(a, b)) continue;
-      const double t = part_of(surface_[k].value, a, b);
-      Vec3 p;  // in the cube, from 0 at the start of the spine to 1 at its end
-      for (int i = 0; i < 3; ++i) {
-        p[i] = std::min(v[i] - cube.low[i] + even[i] + t * (odd[i] - even[i]), cube.most[i]);
-        p[i] = (cube.flip[i] ? cube.side - p[i] : p[i]) / cube.side;
-      }
-      const auto path =
-          std::find_if(kPaths.begin(), kPaths.end(), [&p](const auto& axis) { return p[axis[0]] >= p[axis[1]] && p[axis[1]] >= p[axis[2]]; });
-      const double x = p[(*path)[0]], y = p[(*path)[1]], z = p[(*path)[2]];
-      found[std::size_t(path - kPaths.begin())].push_back({{float(1 - x), float(x - y), float(y - z), float(z)}, k});
-    }
-  }
+  // The supercube of a scale that was looked up last: the next diamond is mostly in it too.
+  struct Near {
+    Vertex position{-1, -1, -1};
+    std::uint64_t occupancy = 0;
+    SupercubeIndex supercube;
+    UpdateIndex first;
+  };
+  // What one path of a cube needs on its way down.
+  struct Cursor {
+    std::array<Near, kTopScale + 1> near;  // by scale
+    Crossing* spare;                       // room for the crossings of all levels that follow
+    bool is_inside;                        // the cube lies in the box
+  };
 
   [[nodiscard]] Tet tet_of(const Cube& cube, const std::array<int, 3>& path) const {
-    Tet tet{{}, cube.scale, 0, {}, {}};
+    Tet tet{{}, cube.scale, {}, {}};
     Vertex v = cube.start;
     tet.corner[0] = {v, float(value(v))};
     for (int i = 0; i < 3; ++i) {
@@ -241,19 +165,8 @@ class Descent {
 
   [[nodiscard]] double value(Vertex v) const { return field_.at(domain_.clamp(v)) - zero_; }
 
-  // The supercube of each scale that was looked up last: the next diamond is mostly in it too.
-  struct Near {
-    Vertex position{-1, -1, -1};
-    std::uint64_t occupancy = 0;
-    SupercubeIndex supercube;
-    UpdateIndex first;
-  };
-  struct NearByScale : std::array<Near, kTopScale + 1> {
-    bool inside = false;  // the cube lies in the box
-  };
-
-  [[nodiscard]] std::optional<UpdateIndex> find(Vertex centre, int scale, NearByScale& near) const {
-    Near& here = near[std::size_t(scale)];
+  [[nodiscard]] std::optional<UpdateIndex> find(Vertex centre, int scale, Cursor& cursor) const {
+    Near& here = cursor.near[std::size_t(scale)];
     const Vertex position{centre.x >> (scale + 2), centre.y >> (scale + 2), centre.z >> (scale + 2)};
     if (here.position != position) {
       const auto found = set_.find_supercube(scale, position);
@@ -266,7 +179,7 @@ class Descent {
   }
 
   // Whether the tetrahedron, or at least its diamond, has a patch of that surface.
-  [[nodiscard]] bool has_patch(const Tet& tet, Vertex centre, const Isovalue& surface) const {
+  [[nodiscard]] bool has_patch(const Tet& tet, Vertex centre, const Isosurface& surface) const {
     const double first = tet.corner[0].value + zero_;
     for (int i = 1; i < 4; ++i) {
       if (surface.separates(first, tet.corner[i].value + zero_)) return true;
@@ -278,104 +191,123 @@ class Descent {
     return false;
   }
 
-  // By surface: how far the next patch is, at most, from any point here, as far as coarser diamonds know.
-  using Nearest = std::array<double, 2>;
+  // What the interpolant in a tetrahedron misses a surface's value by, at the crossings of the field.
+  struct Misses {
+    double largest = 0, sum = 0, sum_of_squares = 0;
+  };
+  [[nodiscard]] static Misses misses(const Crossing& values, float isovalue, std::span<const Crossing> crossings) {
+    Misses result;
+    for (const Crossing& c : crossings) {
+      const Crossing product = c * values;
+      const double miss = double(std::abs(product[0] + product[1] + product[2] + product[3] - isovalue));
+      result.largest = std::max(result.largest, miss);
+      result.sum += miss;
+      result.sum_of_squares += miss * miss;
+    }
+    return result;
+  }
 
   // Records what the crossings in a tetrahedron say of its diamond, and narrows `nearest` where there is a patch. Returns
   // the sum of the squares of their deviations, in squares of width_.
-  double record(const Tet& tet, Vertex centre, UpdateIndex update, std::span<const Crossing> crossings, Nearest& nearest,
-                const NearByScale& near) const {
-    const std::array<float, 4> values{tet.corner[0].value, tet.corner[1].value, tet.corner[2].value, tet.corner[3].value};
-    double alpha_off = -1, beta_off = -1, sum = 0;  // the largest differences of the interpolant from each surface's value; -1: no crossing
-    std::array<double, 2> squares{};                // of the differences, their sum; by surface
-    std::array<int, 2> count{};
-    for (const Crossing& c : crossings) {
-      float at = 0;
-      for (int i = 0; i < 4; ++i) at += c.at[i] * values[i];
-      const double here = std::abs(at - isovalue_[c.surface]);
-      alpha_off = std::max(alpha_off, c.surface == 0 ? here : -1.0);
-      beta_off = std::max(beta_off, c.surface == 0 ? -1.0 : here);
-      sum += here;
-      squares[std::size_t(c.surface)] += here * here;
-      ++count[std::size_t(c.surface)];
-    }
+  double record(const Tet& tet, Vertex centre, UpdateIndex update, const Crossings& crossings, Nearest& nearest, const Cursor& cursor) const {
+    const Crossing values{tet.corner[0].value, tet.corner[1].value, tet.corner[2].value, tet.corner[3].value};
     const double width = width_ * double(1 << tet.scale);
     const bool is_moved =
-        !near.inside && !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Tet::Corner& c) { return domain_.contains(c.at); });
-    const double slope = is_moved ? 0 : std::sqrt(dot(tet.gradient, tet.gradient));
-    const std::array<double, 2> off{alpha_off, beta_off};
-    double largest = 0, sum_of_squares = 0;
-    for (int k = 0; k < surfaces_; ++k) {
-      if (off[k] < 0) continue;
-      if (is_moved || has_patch(tet, centre, surface_[k])) {
+        !cursor.is_inside && !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Tet::Corner& c) { return domain_.contains(c.at); });
+    const double squared_slope = is_moved ? 0 : dot(tet.gradient, tet.gradient), slope = std::sqrt(squared_slope);
+    double largest = 0, sum = 0, sum_of_squares = 0;
+    std::size_t all = 0;
+    for (std::size_t k = 0; k < kMaxSurfaces; ++k) {
+      if (crossings[k].empty()) continue;
+      const Misses missed = misses(values, isovalue_[k], crossings[k]);
+      const auto count = double(crossings[k].size());
+      sum += missed.sum;
+      all += crossings[k].size();
+      if (is_moved || has_patch(tet, centre, surfaces_.surface[k])) {
         nearest[k] = width;
-        largest = std::max(largest, off[k] < width * slope ? off[k] / slope : width);
-        const double most = count[k] * width * width;
-        sum_of_squares += squares[k] < most * slope * slope ? squares[k] / (slope * slope) : most;
+        largest = std::max(largest, missed.largest < width * slope ? missed.largest / slope : width);
+        const double most = count * width * width;
+        sum_of_squares += missed.sum_of_squares < most * squared_slope ? missed.sum_of_squares / squared_slope : most;
       } else {
         const double far = nearest[k] > kFarWidths * width ? nearest[k] : width;
         largest = std::max(largest, far);
-        sum_of_squares += count[k] * far * far;
+        sum_of_squares += count * far * far;
       }
     }
     if (largest > kLeastDeviation * width_) raise(largest_[update], round_up(largest));
-    if (!is_moved) means_[near[std::size_t(tet.scale)].supercube].add(sum / double(crossings.size()) / (width * slope));
+    if (!is_moved) means_[cursor.near[std::size_t(tet.scale)].supercube].add(sum / (double(all) * width * slope));
     return sum_of_squares / (width_ * width_);
   }
 
-  // Returns what record() does.
-  double descend(const Tet& tet, std::span<Crossing> crossings, Nearest nearest, NearByScale& near) const {
-    const int tail = tet.tail();
-    const Vertex a = tet.corner[0].at, b = tet.corner[tail].at;
+  // Returns what record() does. kClass: of the tetrahedron's diamond.
+  template <int kClass>
+  double descend(const Tet& tet, const Crossings& crossings, Nearest nearest, Cursor& cursor) const {
+    const Vertex a = tet.corner[0].at, b = tet.corner[tail_of_class(kClass)].at;
     const Vertex centre{(a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2};
-    const auto update = find(centre, tet.scale, near);
+    const auto update = find(centre, tet.scale, cursor);
     if (!update) return 0;
-    const double before = record(tet, centre, *update, crossings, nearest, near);
+    const double before = record(tet, centre, *update, crossings, nearest, cursor);
     double after = 0;
-    if (tet.scale > 0 || tet.cls < 2) after = descend_into_halves(tet, {centre, float(value(centre))}, crossings, nearest, near);
-    std::atomic_ref<std::int64_t>(removed_[*update]).fetch_add(std::llround((before - after) * kRemovedOne), std::memory_order_relaxed);
+    if (tet.scale > 0 || kClass < 2) after = descend_into_halves<kClass>(tet, {centre, float(value(centre))}, crossings, nearest, cursor);
+    std::atomic_ref<std::int64_t>(removed_[*update]).fetch_add(whole((before - after) * kRemovedOne), std::memory_order_relaxed);
     return before;
   }
 
-  double descend_into_halves(const Tet& tet, const Tet::Corner& middle, std::span<Crossing> crossings, const Nearest& nearest,
-                             NearByScale& near) const {
-    const int tail = tet.tail();
+  template <int kClass>
+  double descend_into_halves(const Tet& tet, const Tet::Corner& middle, const Crossings& crossings, const Nearest& nearest, Cursor& cursor) const {
+    constexpr int kFiner = finer_class(kClass);
+    Crossing* const room = cursor.spare;
+    Crossings first, second;
+    for (std::size_t k = 0; k < kMaxSurfaces; ++k) {
+      const auto [to, end] = std::array{cursor.spare, cursor.spare + crossings[k].size()};
+      Crossing* const between = divide<kClass>(crossings[k], to);
+      first[k] = {to, between};
+      second[k] = {between, end};
+      cursor.spare = end;
+    }
+    const auto is_empty = [](const Crossings& c) { return std::all_of(c.begin(), c.end(), [](const auto& of) { return of.empty(); }); };
     double sum = 0;
-    const auto end_of_first = std::partition(crossings.begin(), crossings.end(), [tail](const Crossing& c) { return c.at[0] >= c.at[tail]; });
-    const auto split = std::size_t(end_of_first - crossings.begin());
-    const std::span<Crossing> first = crossings.first(split), second = crossings.subspan(split);
-    if (!first.empty()) {
-      for (Crossing& c : first) {
-        c.at[0] -= c.at[tail];
-        c.at[tail] *= 2;
-      }
-      sum += descend(half_at_start(tet, middle), first, nearest, near);
-    }
-    if (!second.empty()) {
-      for (Crossing& c : second) {
-        const float head = c.at[0];
-        const float rest = c.at[tail] - head;
-        for (int i = 0; i + 1 < tail; ++i) c.at[i] = c.at[i + 1];
-        c.at[tail - 1] = rest;
-        c.at[tail] = 2 * head;
-      }
-      sum += descend(half_at_end(tet, middle), second, nearest, near);
-    }
+    if (!is_empty(first)) sum += descend<kFiner>(half_at_start<kClass>(tet, middle), first, nearest, cursor);
+    if (!is_empty(second)) sum += descend<kFiner>(half_at_end<kClass>(tet, middle), second, nearest, cursor);
+    cursor.spare = room;
     return sum;
   }
 
+  // Writes the crossings of a tetrahedron with coordinates in its halves: of the half at the start from `to` on, and of
+  // the other one behind. Returns where that begins.
+  template <int kClass>
+  static Crossing* divide(std::span<const Crossing> crossings, Crossing* to) {
+    constexpr int kTail = tail_of_class(kClass);
+    Crossing* end = to + crossings.size();
+    for (const Crossing& c : crossings) {
+      const float head = c[0], tail = c[kTail];
+      Crossing half = c;
+      if (head >= tail) {
+        half[0] = head - tail;
+        half[kTail] = 2 * tail;
+        *to++ = half;
+      } else {
+        for (int i = 0; i + 1 < kTail; ++i) half[i] = c[i + 1];
+        half[kTail - 1] = tail - head;
+        half[kTail] = 2 * head;
+        *--end = half;
+      }
+    }
+    return to;
+  }
+
   const Field<T>& field_;
-  Affine affine_, inverse_;  // of the grid
+  Affine inverse_, affine_;  // of the grid
   const Domain& domain_;
   const SupercubeSet& set_;
+  Isosurfaces surfaces_;
+  CrossingFinder<T> finder_;
   std::vector<float>& largest_;         // by update
   std::vector<Mean>& means_;            // by supercube: deviations in its tetrahedra over the diamonds' width
   std::vector<std::int64_t>& removed_;  // by update, in squares of width_ / kRemovedOne
   double width_;                        // of a diamond with h = 1
-  std::array<Isovalue, 2> surface_{};
-  std::array<float, 2> isovalue_{};  // counted from zero_
-  int surfaces_ = 0;
-  double zero_ = 0;  // values in tetrahedra are counted from it, so that floats are precise enough
+  BySurface<float> isovalue_{};         // counted from zero_
+  double zero_ = 0;                     // values in tetrahedra are counted from it, so that floats are precise enough
 };
 
 }  // namespace

@@ -12,11 +12,10 @@ namespace intervale {
 namespace {
 
 struct Cluster {
-  float removed = 0, updates = 1;
-  [[nodiscard]] float slope() const { return removed / updates; }
+  float removed = 0, updates = 1, slope = removed / updates;
 };
 
-// Calls visit(update, slot, scale, neighbours) for each diamond of one class of a scale.
+// Calls visit(update, key, slot, neighbours) for each diamond of one class of a scale.
 template <class Visit>
 void for_each_of_class(const SupercubeSet& set, int scale, int cls, const ParallelFor& parallel, const Visit& visit) {
   const auto [begin, end] = set.of_scale(scale);
@@ -28,20 +27,9 @@ void for_each_of_class(const SupercubeSet& set, int scale, int cls, const Parall
       const UpdateIndex first = set.first(brick, s);
       around.move_to(key);
       for (const Slot slot : set_bits<Slot>(occupancy & kSlotsOfClass[std::size_t(cls)]))
-        visit(first + count_below(occupancy, slot), slot, scale, around);
+        visit(first + count_below(occupancy, slot), key, slot, around);
     });
   });
-}
-
-// How many of its parents are in the set.
-int parents_of(SetNeighbours& around, Slot slot) {
-  const Links& links = around.links(slot);
-  int count = 0;
-  for (int k = 0; k < diamond_type(kTypeOfSlot[std::size_t(slot)]).parents; ++k) {
-    const auto parent = around.at(links.vertex[links.parent[std::size_t(k)]]);
-    count += int(parent.supercube.has(parent.slot));
-  }
-  return count;
 }
 
 }  // namespace
@@ -50,7 +38,8 @@ std::vector<std::uint8_t> update_slopes(const SupercubeSet& set, std::span<const
                                         const ParallelFor& parallel) {
   std::vector<Cluster> part(set.size());  // of a diamond's cluster: what each of its parents gets
   std::vector<std::uint8_t> slopes(set.size());
-  const auto visit = [&](UpdateIndex i, Slot slot, int scale, SetNeighbours& around) {
+  const auto visit = [&](UpdateIndex i, SupercubeKey key, Slot slot, SetNeighbours& around) {
+    const int scale = scale_of_key(key);
     std::array<Cluster, kMaxChildren> children;
     std::size_t count = 0;
     if (scale > 0 || class_of_slot(slot) < 2) {
@@ -61,16 +50,17 @@ std::vector<std::uint8_t> update_slopes(const SupercubeSet& set, std::span<const
     }
     Cluster own{.removed = float(std::max(removed[i], 0.0))};
     for (; count > 0; --count) {
-      const auto steeper = [](const Cluster& a, const Cluster& b) { return a.slope() < b.slope(); };
+      const auto steeper = [](const Cluster& a, const Cluster& b) { return a.slope < b.slope; };
       Cluster& best = *std::max_element(children.begin(), children.begin() + std::ptrdiff_t(count), steeper);
-      if (best.slope() <= own.slope()) break;
-      own.removed += best.removed;
-      own.updates += best.updates;
+      if (best.slope <= own.slope) break;
+      own = {own.removed + best.removed, own.updates + best.updates};
       best = children[count - 1];
     }
-    slopes[i] = std::uint8_t(scale > top_scale ? kMaxSlope : slope_of(own.slope()));
-    const auto parents = float(std::max(parents_of(around, slot), 1));
-    part[i] = {own.removed / parents, own.updates / parents};
+    slopes[i] = std::uint8_t(scale > top_scale ? kMaxSlope : slope_of(own.slope));
+    int parents = 0;
+    for_each_parent(around, key, slot, [&parents](UpdateIndex) { ++parents; });
+    const auto shares = float(std::max(parents, 1));
+    part[i] = {own.removed / shares, own.updates / shares};
   };
   for (int scale = 0; scale < scales; ++scale) {
     for (int cls = 2; cls >= 0; --cls) for_each_of_class(set, scale, cls, parallel, visit);

@@ -13,6 +13,7 @@
 #include "server/builder/value_builder.h"
 #include "tests/support/coverage.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/parents.h"
 #include "tests/support/seeds.h"
 #include "tests/support/value_fields.h"
 
@@ -82,7 +83,7 @@ TEST_P(RangeExtraction, ADataSetRefinedUniformlyHasEveryRangeWithinItsOwn) {
 TEST_P(RangeExtraction, ErrorsAreSaturated) {
   const SupercubeSet& set = volume->set();
   set.for_each_down([&](const Place& p) {
-    for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_GE(volume->error_step(parent), volume->error_step(p.index)); });
+    testing::for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_GE(volume->error_step(parent), volume->error_step(p.index)); });
   });
   EXPECT_EQ(volume->error_steps().back(), float(volume->description().max_error));
 }

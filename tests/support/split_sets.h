@@ -3,6 +3,7 @@
 
 #include "common/diamond/split_set.h"
 #include "server/builder/field_hierarchy.h"
+#include "tests/support/parents.h"
 
 namespace intervale::testing {
 

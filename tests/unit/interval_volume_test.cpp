@@ -18,6 +18,7 @@
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/surface_deviation.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/parents.h"
 #include "tests/support/parts.h"
 
 namespace intervale {
@@ -150,7 +151,7 @@ TEST_P(ObjectErrors, AreNoLessThanHalfOfWhatWasMeasuredAnywhereBelow) {
   const SupercubeSet& set = sigma_->set();
   std::vector<float> moves = surface_deviation(volume_, range_, sigma_->domain(), set).largest;
   set.for_each_up(
-      [&](const Place& p) { for_each_parent(set, p, [&](UpdateIndex parent) { moves[parent] = std::max(moves[parent], moves[p.index]); }); });
+      [&](const Place& p) { testing::for_each_parent(set, p, [&](UpdateIndex parent) { moves[parent] = std::max(moves[parent], moves[p.index]); }); });
   std::size_t told = 0;
   set.for_each_down([&](const Place& p) {
     if (sigma_->error(p.index) == 0) return;  // no factor makes anything of that

@@ -15,6 +15,7 @@
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/parents.h"
 #include "tests/support/parts.h"
 
 namespace intervale {
@@ -255,7 +256,7 @@ TEST_P(Ranks, SelectIsClosedUnderParentsAndMinimal) {
     });
     volume_.set().for_each_up([&](const Place& p) {
       if (!expected.contains(p.index)) return;
-      for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { expected.insert(parent); });
+      testing::for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { expected.insert(parent); });
     });
     const SplitSet chosen = select(volume_, lod);
     ASSERT_EQ(chosen, expected) << "trial " << trial << ": " << chosen.count() << " chosen, " << expected.count() << " expected";
@@ -289,13 +290,13 @@ TEST_P(Ranks, InOrderParentsComeFirstAndRanksDoNotAscend) {
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ranks[p.index] = rank; });
     volume_.set().for_each_up([&](const Place& p) {
       if (!chosen.contains(p.index)) return;
-      for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
+      testing::for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
     });
     SplitSet seen(volume_.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
       const Place p = volume_.set().place(order[i]);
       ASSERT_TRUE(chosen.contains(p.index) && !seen.contains(p.index));
-      for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ASSERT_TRUE(seen.contains(parent)) << "trial " << trial; });
+      testing::for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ASSERT_TRUE(seen.contains(parent)) << "trial " << trial; });
       if (i > 0) {
         ASSERT_LE(ranks[order[i]], ranks[order[i - 1]]) << "trial " << trial;
       }

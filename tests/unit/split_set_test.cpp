@@ -12,6 +12,7 @@
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/parents.h"
 
 namespace intervale {
 namespace {
@@ -114,7 +115,7 @@ TEST_P(SplitSets, AncestorsAreInsertedBeforeTheirDescendants) {
     for (const SlotGroup& g : inserter.insert({place.brick, place.supercube, place.key, slots})) {
       for (const Slot slot : set_bits<Slot>(g.slots)) {
         const Place p = set.place_in(g.brick, g.supercube, g.key, slot);
-        for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_TRUE(replayed.contains(parent)); });
+        testing::for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_TRUE(replayed.contains(parent)); });
         ASSERT_FALSE(replayed.contains(p.index));
         replayed.insert(p.index);
       }

@@ -12,6 +12,7 @@
 #include "server/builder/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/parents.h"
 
 namespace intervale {
 namespace {
@@ -26,7 +27,7 @@ std::vector<double> naive_slopes(const SupercubeSet& set, const std::vector<doub
   std::vector<std::vector<UpdateIndex>> children(set.size());
   std::vector<int> parents(set.size());
   set.for_each_down([&](const Place& p) {
-    for_each_parent(set, p, [&](UpdateIndex parent) {
+    testing::for_each_parent(set, p, [&](UpdateIndex parent) {
       children[parent].push_back(p.index);
       ++parents[p.index];
     });
