@@ -42,6 +42,7 @@ struct BuildCommand {
   bool big_endian = false, json = false;
   std::uint64_t skip = 0;
   std::optional<std::uint64_t> time_point;
+  std::optional<std::string> part;
 };
 
 // A channel to be built.
@@ -142,8 +143,8 @@ Result<std::pair<std::vector<Channel>, std::vector<ChannelKeys>>> build_channels
   for (const ChannelInput& input : inputs) {
     Progress progress("channel " + printable(input.name));
     const auto header = read_volume_header(input.file);
-    const bool has_several = header && *header && (*header)->time_points > 1;
-    auto volume = read_volume(input.file, {}, has_several ? options.time_point : std::nullopt);
+    const bool has_several = header && *header && (*header)->time_points > 1, has_parts = header && *header && !(*header)->parts.empty();
+    auto volume = read_volume(input.file, {}, has_several ? options.time_point : std::nullopt, has_parts ? options.part : std::nullopt);
     if (!volume) return tl::unexpected(volume.error());
     if (volume->grid.dims != grid.dims)
       return fail(
@@ -242,7 +243,7 @@ Result<void> run(const BuildCommand& options) {
     if (auto output = check_output(channel.file, options.output); !output) return output;
   }
 
-  auto volume = read_volume(options.input, *layout, options.time_point);
+  auto volume = read_volume(options.input, *layout, options.time_point, options.part);
   if (!volume) return tl::unexpected(volume.error());
   if (volume->components != 1) return misuse("'" + options.input + "' has vectors: a field has one number a sample; vectors are read by --channel");
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
@@ -268,7 +269,11 @@ void add_build_command(Program& program) {
   const auto o = std::make_shared<BuildCommand>();
   CLI::App& command =
       program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
-  command.add_option("INPUT", o->input, "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy or VTK, or raw samples (with --dims and --type)")->required();
+  command
+      .add_option("INPUT", o->input,
+                  "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF or DICOM; a folder of TIFF or DICOM files; or raw samples (with --dims and "
+                  "--type)")
+      ->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
   add_range_option(command, o->range,
                    "Closed range of values to keep: numbers, -inf or inf; LO may equal HI. Without it the data set has every range");
@@ -293,6 +298,8 @@ void add_build_command(Program& program) {
   command.add_option("--time-point", o->time_point, "Which volume of a file with several, one for each time point; the first is 0")
       ->check([](const std::string& text) { return text.starts_with('-') ? std::string("the first time point is 0") : std::string(); }, "", "")
       ->type_name("N");
+  command.add_option("--part,--series", o->part, "Which volume of a file or folder with several, such as a DICOM series: its name, as info tells it")
+      ->type_name("NAME");
   command.add_option("--threads", o->threads, "Number of threads; 0: one for each core")->capture_default_str();
   command.add_option("--dims", o->dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
   command.add_option("--type", o->type, "Raw input: type of a sample: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");

@@ -24,7 +24,8 @@ namespace {
 
 struct InfoCommand {
   std::string file;
-  std::vector<std::string> range;  // of info only
+  std::vector<std::string> range;   // of info only
+  std::optional<std::string> part;  // of info only
   bool json = false;
 };
 
@@ -93,6 +94,8 @@ const char* name_of(Encoding encoding) {
       return "bzip2";
     case Encoding::text:
       return "text";
+    case Encoding::library:
+      return "library";
   }
   return "";
 }
@@ -103,6 +106,8 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header)
   const auto& [dims, affine] = header.grid;
   const Vec3 spacing = affine.spacing(), origin = affine.origin();
   if (options.json) {
+    auto parts = nlohmann::ordered_json::array();
+    for (const VolumePart& part : header.parts) parts.push_back({{"name", part.name}, {"about", part.about}});
     return print_json({{"file", options.file},
                        {"format", header.format},
                        {"encoding", name_of(header.encoding)},
@@ -118,9 +123,16 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header)
                        {"space", header.space},
                        {"unit", header.labels.unit},
                        {"field", header.labels.field},
-                       {"field_unit", header.labels.field_unit}});
+                       {"field_unit", header.labels.field_unit},
+                       {"parts", parts}});
   }
-  std::string text = fmt::format("{}: {}, {}\n", printable(options.file), header.format, name_of(header.encoding));
+  std::string text = fmt::format("{}: {}{}\n", printable(options.file), header.format,
+                                 header.encoding == Encoding::library ? "" : fmt::format(", {}", name_of(header.encoding)));
+  if (!header.parts.empty()) {
+    text += fmt::format("{} {}: choose one with build --part{}\n", header.parts.size(), header.parts_are,
+                        options.part ? "" : "; what follows is about the first");
+    for (const VolumePart& part : header.parts) text += fmt::format("  {}  {}\n", printable(part.name), printable(part.about));
+  }
   text += fmt::format("samples   {} x {} x {}, {}{}\n", dims[0], dims[1], dims[2], name_of(header.type),
                       header.components == 1 ? "" : fmt::format(", vectors of {}", header.components));
   if (header.time_points > 1)
@@ -147,15 +159,17 @@ void add(Program& program, const char* name, const char* description) {
   const auto run = [options](const auto& set) { return Command()(*options, set); };
   CLI::App& command = program.add_command(name, description, [options, run]() -> Result<void> {
     if constexpr (std::is_same_v<Command, Info>) {
-      const auto header = read_volume_header(options->file);
+      const auto header = read_volume_header(options->file, options->part);
       if (header && *header) return print_input(*options, **header);
       if (!header) return tl::unexpected(header.error());
     }
     return is_value_file(options->file) ? load_values(options->file, on_all_cores).and_then(run) : load_ivm(options->file).and_then(run);
   });
   constexpr bool is_info = std::is_same_v<Command, Info>;
-  command.add_option("FILE", options->file, is_info ? "Interval volume (.ivm), or a volume that build reads" : "Interval volume (.ivm)")->required();
+  command.add_option("FILE", options->file, is_info ? "Interval volume (.ivm), or a volume or folder that build reads" : "Interval volume (.ivm)")
+      ->required();
   if constexpr (is_info) {
+    command.add_option("--part,--series", options->part, "Which volume of a file or folder with several")->type_name("NAME");
     add_range_option(command, options->range, "Print the volume that this closed range of values encloses, too: numbers, -inf or inf");
   }
   add_json_flag(command, options->json);

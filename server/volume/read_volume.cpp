@@ -9,9 +9,11 @@
 #include <string_view>
 #include <utility>
 
+#include "server/volume/child_reader.h"
 #include "server/volume/decoder.h"
 #include "server/volume/header_bytes.h"
 #include "server/volume/input_file.h"
+#include "server/volume/library_formats.h"
 #include "server/volume/metaimage_header.h"
 #include "server/volume/mrc_header.h"
 #include "server/volume/nifti_header.h"
@@ -65,6 +67,40 @@ std::string decoded_start(const InputFile& file) {
   return start;
 }
 
+// A format that is read by a program of its own.
+struct LibraryFormat {
+  bool (*begins)(std::string_view start);
+  ReaderProgram program;
+};
+// A DICOM file may begin as TIFF, too.
+constexpr std::array<LibraryFormat, 2> kLibraryFormats{{{begins_as_dicom, {"read-dicom", "DICOM"}}, {begins_as_tiff, {"read-tiff", "TIFF"}}}};
+
+const ReaderProgram* find_program(std::string_view start) {
+  const auto* const found = std::find_if(kLibraryFormats.begin(), kLibraryFormats.end(), [start](const LibraryFormat& f) { return f.begins(start); });
+  return found == kLibraryFormats.end() ? nullptr : &found->program;
+}
+
+// The program for a file, or for most of a folder's files that have one; nullptr: none.
+Result<const ReaderProgram*> program_of(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto of_file = [](const std::filesystem::path& file) {
+    return InputFile::open(file).and_then([](const InputFile& opened) { return read_start(opened, kStart); }).map(find_program).value_or(nullptr);
+  };
+  if (!std::filesystem::is_directory(path, error)) return of_file(path);
+  std::array<std::size_t, kLibraryFormats.size()> count{};
+  const auto end = std::filesystem::recursive_directory_iterator();
+  for (auto entry = std::filesystem::recursive_directory_iterator(path, error); !error && entry != end; entry.increment(error)) {
+    std::error_code none;
+    if (!entry->is_regular_file(none)) continue;
+    const ReaderProgram* const found = of_file(entry->path());
+    for (std::size_t k = 0; k < count.size(); ++k) count[k] += found == &kLibraryFormats[k].program;
+  }
+  if (error) return fail(in_quotes(path) + ": " + error.message());
+  const auto most = std::max_element(count.begin(), count.end());
+  if (*most == 0) return fail(in_quotes(path) + " is a folder without TIFF or DICOM files");
+  return &kLibraryFormats[std::size_t(most - count.begin())].program;
+}
+
 std::string position_of(std::size_t index, const Grid& grid) {
   const auto x = static_cast<std::size_t>(grid.dims[0]), y = static_cast<std::size_t>(grid.dims[1]);
   return std::string("(") + std::to_string(index % x) + ", " + std::to_string(index / x % y) + ", " + std::to_string(index / x / y) + ")";
@@ -87,7 +123,11 @@ Result<void> check_floats(std::span<Float> samples, std::optional<double> replac
 
 }  // namespace
 
-Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path) {
+Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part) {
+  const auto program = program_of(path);
+  if (!program) return tl::unexpected<Error>(program.error());
+  if (*program != nullptr) return read_header_by(**program, path, part).map([](VolumeHeader header) { return std::optional(std::move(header)); });
+  if (part) return misuse(in_quotes(path) + " has one volume: leave out --part");
   const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   const auto start = read_start(*file, kStart);
@@ -101,8 +141,11 @@ Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::pa
   return format->read_header(*file).map([](VolumeHeader header) { return std::optional(std::move(header)); });
 }
 
-Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point) {
-  const auto header = read_volume_header(path);
+Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point,
+                           const std::optional<std::string>& part) {
+  const auto program = program_of(path);
+  if (!layout && program && *program != nullptr) return read_volume_by(**program, path, part, time_point);
+  const auto header = read_volume_header(path, part);
   if (layout && header && !*header) {
     if (time_point.value_or(0) != 0) return misuse("raw samples have one time point: leave out --time-point, and --skip what is before them");
     return read_raw(path, *layout);
@@ -112,7 +155,7 @@ Result<Volume> read_volume(const std::filesystem::path& path, const std::optiona
   if (!header) return tl::unexpected<Error>(header.error());
   if (!*header)
     return misuse(in_quotes(path) +
-                  " is not NRRD, NIfTI, MetaImage, MRC, NumPy or VTK: say what its raw samples are with --dims X Y Z and --type TYPE");
+                  " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF or DICOM: say what its raw samples are with --dims X Y Z and --type TYPE");
   const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   return read_data(*file, **header, time_point);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "common/util/result.h"
 #include "server/volume/raw_reader.h"
@@ -11,13 +12,15 @@
 
 namespace intervale {
 
-// What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy or VTK, as it begins, whatever its
-// name; without that the name decides. None: the file's samples are raw.
-[[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path);
+// What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF or DICOM, as it begins,
+// whatever its name; without that the name decides. Or in a folder with the files of a TIFF or DICOM volume. None: the
+// file's samples are raw. part: which of several volumes (VolumeHeader::parts); none: the first.
+[[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part = {});
 
-// A layout for a file that describes itself is misuse, and so is none for any other, whose samples are raw. time_point:
-// see read_data.
-Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point = {});
+// A layout for a file that describes itself is misuse, and so is none for any other, whose samples are raw. To choose no
+// part or time point of several, or one that is not there, is misuse.
+Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point = {},
+                           const std::optional<std::string>& part = {});
 
 // The samples of one component of a volume, as a volume: component < volume.components.
 [[nodiscard]] Volume component_of(const Volume& volume, unsigned component);

@@ -245,6 +245,15 @@ Result<void> check_size(const VolumeHeader& header, const std::string& where) {
   return {};
 }
 
+Result<std::uint64_t> check_time_point(const VolumeHeader& header, std::optional<std::uint64_t> time_point, const std::string& where) {
+  const std::string last = std::to_string(header.time_points - 1);
+  if (!time_point && header.time_points > 1)
+    return misuse(where + " has " + std::to_string(header.time_points) + " time points: choose one, 0 to " + last + ", with --time-point");
+  if (time_point.value_or(0) >= header.time_points)
+    return misuse(where + " has no time point " + std::to_string(*time_point) + ": the last one is " + last);
+  return time_point.value_or(0);
+}
+
 void rescale(Volume& volume, double slope, double intercept) {
   if (slope == 1 && intercept == 0) return;
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
@@ -262,13 +271,8 @@ void rescale(Volume& volume, double slope, double intercept) {
 }
 
 Result<Volume> read_data(const InputFile& file, const VolumeHeader& header, std::optional<std::uint64_t> time_point) {
-  const std::string last = std::to_string(header.time_points - 1);
-  if (!time_point && header.time_points > 1)
-    return misuse(in_quotes(file.path()) + " has " + std::to_string(header.time_points) + " time points: choose one, 0 to " + last +
-                  ", with --time-point");
-  const std::uint64_t chosen = time_point.value_or(0);
-  if (chosen >= header.time_points)
-    return misuse(in_quotes(file.path()) + " has no time point " + std::to_string(chosen) + ": the last one is " + last);
+  const auto chosen = check_time_point(header, time_point, in_quotes(file.path()));
+  if (!chosen) return tl::unexpected<Error>(chosen.error());
   Volume volume{file.path().stem().string(), header.grid, header.type, {}, header.labels, header.components};
   const auto data = !header.data_file ? InputFile::open(file.path()) : detached_path(file.path(), *header.data_file).and_then(InputFile::open);
   if (!data) return tl::unexpected<Error>(data.error());
@@ -279,7 +283,7 @@ Result<Volume> read_data(const InputFile& file, const VolumeHeader& header, std:
                 "; is the file cut short?");
   const bool is_plain = header.encoding == Encoding::raw && !header.base64_skip;
   const auto read = is_plain ? read_raw_data : header.encoding == Encoding::text ? read_text_data : read_coded_data;
-  if (auto done = read({*data, header, *start, chosen * header.data_bytes()}, volume.bytes); !done) return tl::unexpected<Error>(done.error());
+  if (auto done = read({*data, header, *start, *chosen * header.data_bytes()}, volume.bytes); !done) return tl::unexpected<Error>(done.error());
   if (header.big_endian) swap_bytes(volume.bytes, volume.type);
   rescale(volume, header.slope, header.intercept);
   return volume;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/support/complaints.h"
+#include "tests/support/library_files.h"
 #include "tests/support/peers.h"
 #include "tests/support/programs.h"
 #include "tests/support/temp_dir.h"
@@ -306,6 +307,31 @@ TEST(Programs, InfoSaysWhatIsInAVolumeAndBuildTakesIt) {
     EXPECT_EQ(built.at("values"), (nlohmann::json{{"least", -300}, {"greatest", 12}})) << file.name;
   }
   expect_complaint(run({program("intervale"), "info", folder.file("x.nii", "x")}), 1, "is not a NIfTI file", "intervale: ");
+}
+
+TEST(Programs, AFolderOfDicomImagesIsLookedAtAndBuilt) {
+  if (!std::filesystem::exists(program("read-dicom"))) GTEST_SKIP() << "no read-dicom";
+  const TempDir folder;
+  std::filesystem::create_directory(folder / "scan");
+  for (int k = 0; k < 5; ++k) {
+    testing::DicomImage image;
+    image.instance = k;
+    image.series = k < 3 ? "1.2.3" : "9.8";
+    image.position = "0\\0\\" + std::to_string(3 * k);
+    image.pixels.assign(6, std::int16_t(k));
+    folder.file("scan/" + std::to_string(k), testing::dicom_file(image));
+  }
+  const std::string scan = folder / "scan", out = folder / "v.ivm";
+  const auto info = json_of(run({program("intervale"), "info", scan, "--json"}));
+  EXPECT_EQ(info.at("format"), "DICOM");
+  EXPECT_EQ(info.at("parts").size(), 2u);
+  EXPECT_THAT(run({program("intervale"), "info", scan}).out, HasSubstr("2 series: choose one with build --part; what follows is about the first"));
+  const auto unchosen = run({program("intervale"), "build", scan, "-o", out});
+  EXPECT_EQ(unchosen.status, 2);
+  EXPECT_THAT(unchosen.err, HasSubstr("choose one with --part: 1.2.3 (CT 3 x 2, 3 images), 9.8 (CT 3 x 2, 2 images)"));
+  const auto built = json_of(run({program("intervale"), "build", scan, "--series", "9.8", "-o", out, "--json"}));
+  EXPECT_EQ(built.at("dims"), (nlohmann::json{3, 2, 2}));
+  EXPECT_EQ(built.at("values"), (nlohmann::json{{"least", 3}, {"greatest", 4}}));
 }
 
 TEST(Programs, ARangeThatHoldsNothingIsSaid) {

@@ -1,0 +1,25 @@
+// Formats that are read by a library, in a program of its own (child_reader.h): how their files begin.
+#pragma once
+
+#include <string_view>
+
+namespace intervale {
+
+// start: the first bytes of a file, four at least.
+[[nodiscard]] inline bool begins_as_tiff(std::string_view start) {
+  using namespace std::string_view_literals;
+  return start.starts_with("II*\0"sv) || start.starts_with("MM\0*"sv) || start.starts_with("II+\0"sv) || start.starts_with("MM\0+"sv);
+}
+
+// start: the first 132 bytes of a file. DICOM files begin with 128 bytes for other formats, and "DICM" (PS3.10, section
+// 7.1). Older ones lack both, and begin with the first element of group 2 or 8.
+[[nodiscard]] inline bool begins_as_dicom(std::string_view start) {
+  using namespace std::string_view_literals;
+  if (start.size() >= 132 && start.substr(128, 4) == "DICM"sv) return true;
+  for (const auto first : {"\x02\0\0\0UL"sv, "\x08\0\0\0UL"sv, "\x08\0\x05\0CS"sv, "\x08\0\x08\0CS"sv, "\x08\0\x16\0UI"sv}) {
+    if (start.starts_with(first)) return true;
+  }
+  return false;
+}
+
+}  // namespace intervale
