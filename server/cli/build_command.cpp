@@ -142,9 +142,11 @@ Result<std::pair<std::vector<Channel>, std::vector<ChannelKeys>>> build_channels
   std::pair<std::vector<Channel>, std::vector<ChannelKeys>> built;
   for (const ChannelInput& input : inputs) {
     Progress progress("channel " + printable(input.name));
-    const auto header = read_volume_header(input.file);
+    NamedVolume named = named_volume(input.file.string());
+    const auto header = read_volume_header(named.path, named.part);
     const bool has_several = header && *header && (*header)->time_points > 1, has_parts = header && *header && !(*header)->parts.empty();
-    auto volume = read_volume(input.file, {}, has_several ? options.time_point : std::nullopt, has_parts ? options.part : std::nullopt);
+    if (has_parts && !named.part) named.part = options.part;
+    auto volume = read_volume(named.path, {}, has_several ? options.time_point : std::nullopt, named.part);
     if (!volume) return tl::unexpected(volume.error());
     if (volume->grid.dims != grid.dims)
       return fail(
@@ -238,12 +240,13 @@ Result<void> run(const BuildCommand& options) {
   const std::filesystem::path folder = std::filesystem::absolute(options.output).parent_path();
   if (!std::filesystem::is_directory(folder))
     return fail("cannot write '" + options.output + "': the folder '" + folder.string() + "' does not exist");
-  if (auto output = check_output(options.input, options.output); !output) return output;
+  const NamedVolume input = named_volume(options.input, options.part);
+  if (auto output = check_output(input.path, options.output); !output) return output;
   for (const ChannelInput& channel : *channels) {
-    if (auto output = check_output(channel.file, options.output); !output) return output;
+    if (auto output = check_output(named_volume(channel.file.string()).path, options.output); !output) return output;
   }
 
-  auto volume = read_volume(options.input, *layout, options.time_point, options.part);
+  auto volume = read_volume(input.path, *layout, options.time_point, input.part);
   if (!volume) return tl::unexpected(volume.error());
   if (volume->components != 1) return misuse("'" + options.input + "' has vectors: a field has one number a sample; vectors are read by --channel");
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
@@ -271,7 +274,8 @@ void add_build_command(Program& program) {
       program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
   command
       .add_option("INPUT", o->input,
-                  "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF or DICOM; a folder of TIFF or DICOM files; or raw samples (with --dims and "
+                  "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM or HDF5 (also FILE:/ARRAY); a folder of TIFF or DICOM files; or raw "
+                  "samples (with --dims and "
                   "--type)")
       ->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");

@@ -159,7 +159,8 @@ void add(Program& program, const char* name, const char* description) {
   const auto run = [options](const auto& set) { return Command()(*options, set); };
   CLI::App& command = program.add_command(name, description, [options, run]() -> Result<void> {
     if constexpr (std::is_same_v<Command, Info>) {
-      const auto header = read_volume_header(options->file, options->part);
+      const NamedVolume volume = named_volume(options->file, options->part);
+      const auto header = read_volume_header(volume.path, volume.part);
       if (header && *header) return print_input(*options, **header);
       if (!header) return tl::unexpected(header.error());
     }

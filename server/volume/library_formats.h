@@ -22,4 +22,11 @@ namespace intervale {
   return false;
 }
 
+// start: the first 520 bytes of a file; the first 512 may be those of another format, as in MATLAB's files (HDF5 File Format
+// Specification, section II.A).
+[[nodiscard]] inline bool begins_as_hdf5(std::string_view start) {
+  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+  return start.starts_with(kSignature) || (start.size() >= 520 && start.substr(512).starts_with(kSignature));
+}
+
 }  // namespace intervale

@@ -73,7 +73,10 @@ struct LibraryFormat {
   ReaderProgram program;
 };
 // A DICOM file may begin as TIFF, too.
-constexpr std::array<LibraryFormat, 2> kLibraryFormats{{{begins_as_dicom, {"read-dicom", "DICOM"}}, {begins_as_tiff, {"read-tiff", "TIFF"}}}};
+constexpr std::array<LibraryFormat, 3> kLibraryFormats{
+    {{begins_as_dicom, {"read-dicom", "DICOM"}}, {begins_as_tiff, {"read-tiff", "TIFF"}}, {begins_as_hdf5, {"read-hdf5", "HDF5"}}}};
+
+constexpr std::size_t kFolderFormats = 2;  // the first ones of them: volumes in several files
 
 const ReaderProgram* find_program(std::string_view start) {
   const auto* const found = std::find_if(kLibraryFormats.begin(), kLibraryFormats.end(), [start](const LibraryFormat& f) { return f.begins(start); });
@@ -87,13 +90,13 @@ Result<const ReaderProgram*> program_of(const std::filesystem::path& path) {
     return InputFile::open(file).and_then([](const InputFile& opened) { return read_start(opened, kStart); }).map(find_program).value_or(nullptr);
   };
   if (!std::filesystem::is_directory(path, error)) return of_file(path);
-  std::array<std::size_t, kLibraryFormats.size()> count{};
+  std::array<std::size_t, kFolderFormats> count{};
   const auto end = std::filesystem::recursive_directory_iterator();
   for (auto entry = std::filesystem::recursive_directory_iterator(path, error); !error && entry != end; entry.increment(error)) {
     std::error_code none;
     if (!entry->is_regular_file(none)) continue;
     const ReaderProgram* const found = of_file(entry->path());
-    for (std::size_t k = 0; k < count.size(); ++k) count[k] += found == &kLibraryFormats[k].program;
+    for (std::size_t k = 0; k < kFolderFormats; ++k) count[k] += found == &kLibraryFormats[k].program;
   }
   if (error) return fail(in_quotes(path) + ": " + error.message());
   const auto most = std::max_element(count.begin(), count.end());
@@ -122,6 +125,13 @@ Result<void> check_floats(std::span<Float> samples, std::optional<double> replac
 }
 
 }  // namespace
+
+NamedVolume named_volume(const std::string& text, const std::optional<std::string>& part) {
+  std::error_code none;
+  const auto colon = text.find(":/");
+  if (colon == std::string::npos || colon == 0 || part || std::filesystem::exists(text, none)) return {text, part};
+  return {text.substr(0, colon), text.substr(colon + 1)};
+}
 
 Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part) {
   const auto program = program_of(path);
@@ -154,8 +164,9 @@ Result<Volume> read_volume(const std::filesystem::path& path, const std::optiona
     return misuse(in_quotes(path) + " describes itself: leave out --dims and --type, or rename the file if its samples are raw");
   if (!header) return tl::unexpected<Error>(header.error());
   if (!*header)
-    return misuse(in_quotes(path) +
-                  " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF or DICOM: say what its raw samples are with --dims X Y Z and --type TYPE");
+    return misuse(
+        in_quotes(path) +
+        " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM or HDF5: say what its raw samples are with --dims X Y Z and --type TYPE");
   const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   return read_data(*file, **header, time_point);

@@ -12,7 +12,15 @@
 
 namespace intervale {
 
-// What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF or DICOM, as it begins,
+// What a person names: FILE:/ARRAY is an array of an HDF5 file, unless there is a file of that whole name or a part is
+// chosen otherwise.
+struct NamedVolume {
+  std::filesystem::path path;
+  std::optional<std::string> part;
+};
+[[nodiscard]] NamedVolume named_volume(const std::string& text, const std::optional<std::string>& part = {});
+
+// What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM or HDF5, as it begins,
 // whatever its name; without that the name decides. Or in a folder with the files of a TIFF or DICOM volume. None: the
 // file's samples are raw. part: which of several volumes (VolumeHeader::parts); none: the first.
 [[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part = {});

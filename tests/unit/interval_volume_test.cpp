@@ -150,8 +150,9 @@ TEST_P(ObjectErrors, AreNeverAboveHalfTheDiamondsWidthOrWhatIsFurthest) {
 TEST_P(ObjectErrors, AreNoLessThanHalfOfWhatWasMeasuredAnywhereBelow) {
   const SupercubeSet& set = sigma_->set();
   std::vector<float> moves = surface_deviation(volume_, range_, sigma_->domain(), set).largest;
-  set.for_each_up(
-      [&](const Place& p) { testing::for_each_parent(set, p, [&](UpdateIndex parent) { moves[parent] = std::max(moves[parent], moves[p.index]); }); });
+  set.for_each_up([&](const Place& p) {
+    testing::for_each_parent(set, p, [&](UpdateIndex parent) { moves[parent] = std::max(moves[parent], moves[p.index]); });
+  });
   std::size_t told = 0;
   set.for_each_down([&](const Place& p) {
     if (sigma_->error(p.index) == 0) return;  // no factor makes anything of that

@@ -1,0 +1,134 @@
+// HDF5 files, which a program of its own reads. Made by the library itself, where there is one.
+#if __has_include(<hdf5.h>)
+#include <gtest/gtest.h>
+#include <hdf5.h>
+
+#include <filesystem>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "server/volume/read_volume.h"
+#include "tests/support/temp_dir.h"
+
+namespace intervale {
+namespace {
+
+class Hdf5 : public ::testing::Test {
+ protected:
+  // Numbers from `first` on, z, y, x, perhaps with time before them.
+  static void add(hid_t file, const char* name, const std::vector<hsize_t>& dims, int first, bool is_packed = false) {
+    std::vector<std::int16_t> numbers(std::accumulate(dims.begin(), dims.end(), hsize_t(1), std::multiplies<>()));
+    std::iota(numbers.begin(), numbers.end(), std::int16_t(first));
+    const hid_t space = H5Screate_simple(int(dims.size()), dims.data(), nullptr), how = H5Pcreate(H5P_DATASET_CREATE);
+    if (is_packed) {
+      H5Pset_chunk(how, int(dims.size()), dims.data());
+      H5Pset_deflate(how, 6);
+    }
+    const hid_t set = H5Dcreate2(file, name, H5T_STD_I16BE, space, H5P_DEFAULT, how, H5P_DEFAULT);
+    H5Dwrite(set, H5T_NATIVE_INT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data());
+    H5Dclose(set);
+    H5Pclose(how);
+    H5Sclose(space);
+  }
+  static void add_attribute(hid_t file, const char* set_name, const char* name, const std::vector<double>& numbers) {
+    const hid_t set = H5Dopen2(file, set_name, H5P_DEFAULT);
+    const hsize_t count = numbers.size();
+    const hid_t space = H5Screate_simple(1, &count, nullptr);
+    const hid_t attribute = H5Acreate2(set, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT);
+    H5Awrite(attribute, H5T_NATIVE_DOUBLE, numbers.data());
+    H5Aclose(attribute);
+    H5Sclose(space);
+    H5Dclose(set);
+  }
+  [[nodiscard]] hid_t create() const { return H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT); }
+  const TempDir folder_;
+  const std::filesystem::path path_ = folder_ / "v.h5";
+};
+
+std::vector<double> numbers_in(const Volume& volume) {
+  return visit_samples(volume, [](auto samples) { return std::vector<double>(samples.begin(), samples.end()); });
+}
+
+TEST_F(Hdf5, ArraysHaveTheAxesZYX) {
+  const hid_t file = create();
+  add(file, "density", {4, 3, 2}, 100, true);
+  add_attribute(file, "density", "element_size_um", {3, 2, 0.5});
+  add_attribute(file, "density", "scale_factor", {2});
+  add_attribute(file, "density", "add_offset", {-1});
+  add(file, "flat", {4, 3}, 0);
+  H5Fclose(file);
+  const auto volume = read_volume(path_, {});
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->grid.dims, (std::array<std::int32_t, 3>{2, 3, 4}));
+  EXPECT_EQ(volume->grid.affine, Affine::of({0.5, 2, 3}));
+  EXPECT_EQ(volume->labels.unit, "\u00b5m");
+  EXPECT_EQ(volume->labels.field, "density");
+  for (std::size_t i = 0; i < 24; ++i) EXPECT_EQ(numbers_in(*volume)[i], 2 * (100 + double(i)) - 1) << i;
+}
+
+TEST_F(Hdf5, OneOfSeveralArraysIsChosen) {
+  const hid_t file = create();
+  add(file, "a", {2, 3, 4}, 0);
+  add(file, "later", {3, 2, 3, 4}, 0);
+  H5Fclose(file);
+  const auto unchosen = read_volume(path_, {});
+  ASSERT_FALSE(unchosen);
+  EXPECT_TRUE(unchosen.error().usage);
+  EXPECT_NE(unchosen.error().message.find("2 arrays: choose one with --part: /a (4 x 3 x 2 of i16), /later (4 x 3 x 2 of i16, 3 time points)"),
+            std::string::npos)
+      << unchosen.error().message;
+  const auto named = named_volume(path_.string() + ":/later");
+  EXPECT_EQ(named.path, path_);
+  const auto volume = read_volume(named.path, {}, 2, named.part);
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(numbers_in(*volume)[0], 48);
+  EXPECT_FALSE(read_volume(path_, {}, 3, "/later"));
+  EXPECT_FALSE(read_volume(path_, {}, {}, "/none"));
+}
+
+// A file of a few bytes may claim any number of samples, and name other files for them.
+TEST_F(Hdf5, OnlyTheFileItselfHasSamples) {
+  const hid_t file = create();
+  const std::vector<hsize_t> huge{100'000, 100'000, 1000}, chunk{1, 1000, 1000}, small{2, 2, 2};
+  hid_t space = H5Screate_simple(3, huge.data(), nullptr), how = H5Pcreate(H5P_DATASET_CREATE);
+  H5Pset_chunk(how, 3, chunk.data());
+  H5Dclose(H5Dcreate2(file, "claims", H5T_STD_U8LE, space, H5P_DEFAULT, how, H5P_DEFAULT));
+  H5Pclose(how);
+  H5Sclose(space);
+  space = H5Screate_simple(3, small.data(), nullptr);
+  how = H5Pcreate(H5P_DATASET_CREATE);
+  H5Pset_external(how, "/etc/passwd", 0, 8);
+  H5Dclose(H5Dcreate2(file, "elsewhere", H5T_STD_U8LE, space, H5P_DEFAULT, how, H5P_DEFAULT));
+  H5Pclose(how);
+  H5Sclose(space);
+  H5Fclose(file);
+  const auto claims = read_volume(path_, {}, {}, "/claims");
+  ASSERT_FALSE(claims);
+  EXPECT_NE(claims.error().message.find("which cannot be the 10000000000000 of its samples"), std::string::npos) << claims.error().message;
+  EXPECT_FALSE(read_volume(path_, {}, {}, "/elsewhere"));
+}
+
+TEST_F(Hdf5, DamagedFilesDoNoHarm) {
+  const hid_t file = create();
+  add(file, "a", {4, 3, 2}, 0, true);
+  H5Fclose(file);
+  const std::string whole = contents_of(path_);
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 40; ++trial) {
+    std::string bytes = whole;
+    for (int k = 0; k < 1 + trial / 10; ++k) bytes[8 + random() % (bytes.size() - 8)] = char(random());
+    if (trial % 5 == 0) bytes.resize(8 + random() % (bytes.size() - 8));
+    const auto volume = read_volume(folder_.file("damaged", bytes), {}, 0);
+    if (volume) {
+      EXPECT_EQ(volume->bytes.size(), volume->grid.sample_count() * size_of(volume->type));
+    } else {
+      EXPECT_EQ(volume.error().message.find('\n'), std::string::npos) << volume.error().message;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace intervale
+#endif
