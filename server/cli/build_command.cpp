@@ -273,10 +273,11 @@ void add_build_command(Program& program) {
   CLI::App& command =
       program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
   command
-      .add_option("INPUT", o->input,
-                  "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM or HDF5 (also FILE:/ARRAY); a folder of TIFF or DICOM files; or raw "
-                  "samples (with --dims and "
-                  "--type)")
+      .add_option(
+          "INPUT", o->input,
+          "Volume: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM, HDF5 or Zarr (also FILE:/ARRAY); a folder of TIFF or DICOM files; or raw "
+          "samples (with --dims and "
+          "--type)")
       ->required();
   command.add_option("-o,--output", o->output, "Interval volume to write (.ivm)")->required()->type_name("OUT.ivm");
   add_range_option(command, o->range,

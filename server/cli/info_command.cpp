@@ -100,8 +100,8 @@ const char* name_of(Encoding encoding) {
   return "";
 }
 
-// Of a volume that a data set can be built from.
-Result<void> print_input(const InfoCommand& options, const VolumeHeader& header) {
+// Of a volume that a data set can be built from. is_chosen: it is the one of several that was asked for.
+Result<void> print_input(const InfoCommand& options, const VolumeHeader& header, bool is_chosen) {
   if (!options.range.empty()) return misuse("--range belongs to a data set (.ivm), and " + in_quotes(options.file) + " is an input of build");
   const auto& [dims, affine] = header.grid;
   const Vec3 spacing = affine.spacing(), origin = affine.origin();
@@ -130,7 +130,7 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header)
                                  header.encoding == Encoding::library ? "" : fmt::format(", {}", name_of(header.encoding)));
   if (!header.parts.empty()) {
     text += fmt::format("{} {}: choose one with build --part{}\n", header.parts.size(), header.parts_are,
-                        options.part ? "" : "; what follows is about the first");
+                        is_chosen ? "" : "; what follows is about the first");
     for (const VolumePart& part : header.parts) text += fmt::format("  {}  {}\n", printable(part.name), printable(part.about));
   }
   text += fmt::format("samples   {} x {} x {}, {}{}\n", dims[0], dims[1], dims[2], name_of(header.type),
@@ -161,7 +161,7 @@ void add(Program& program, const char* name, const char* description) {
     if constexpr (std::is_same_v<Command, Info>) {
       const NamedVolume volume = named_volume(options->file, options->part);
       const auto header = read_volume_header(volume.path, volume.part);
-      if (header && *header) return print_input(*options, **header);
+      if (header && *header) return print_input(*options, **header, volume.part.has_value());
       if (!header) return tl::unexpected(header.error());
     }
     return is_value_file(options->file) ? load_values(options->file, on_all_cores).and_then(run) : load_ivm(options->file).and_then(run);

@@ -1,7 +1,11 @@
 // Formats that are read by a library, in a program of its own (child_reader.h): how their files begin.
 #pragma once
 
+#include <filesystem>
 #include <string_view>
+
+#include "common/util/result.h"
+#include "server/volume/child_reader.h"
 
 namespace intervale {
 
@@ -28,5 +32,9 @@ namespace intervale {
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
   return start.starts_with(kSignature) || (start.size() >= 520 && start.substr(512).starts_with(kSignature));
 }
+
+// The program for a file or a Zarr folder; for another folder, and the folders in it, that which most of the first 100
+// files have that have one. nullptr: none. Fails for a folder without any.
+[[nodiscard]] Result<const ReaderProgram*> find_reader_program(const std::filesystem::path& path);
 
 }  // namespace intervale

@@ -67,43 +67,6 @@ std::string decoded_start(const InputFile& file) {
   return start;
 }
 
-// A format that is read by a program of its own.
-struct LibraryFormat {
-  bool (*begins)(std::string_view start);
-  ReaderProgram program;
-};
-// A DICOM file may begin as TIFF, too.
-constexpr std::array<LibraryFormat, 3> kLibraryFormats{
-    {{begins_as_dicom, {"read-dicom", "DICOM"}}, {begins_as_tiff, {"read-tiff", "TIFF"}}, {begins_as_hdf5, {"read-hdf5", "HDF5"}}}};
-
-constexpr std::size_t kFolderFormats = 2;  // the first ones of them: volumes in several files
-
-const ReaderProgram* find_program(std::string_view start) {
-  const auto* const found = std::find_if(kLibraryFormats.begin(), kLibraryFormats.end(), [start](const LibraryFormat& f) { return f.begins(start); });
-  return found == kLibraryFormats.end() ? nullptr : &found->program;
-}
-
-// The program for a file, or for most of a folder's files that have one; nullptr: none.
-Result<const ReaderProgram*> program_of(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto of_file = [](const std::filesystem::path& file) {
-    return InputFile::open(file).and_then([](const InputFile& opened) { return read_start(opened, kStart); }).map(find_program).value_or(nullptr);
-  };
-  if (!std::filesystem::is_directory(path, error)) return of_file(path);
-  std::array<std::size_t, kFolderFormats> count{};
-  const auto end = std::filesystem::recursive_directory_iterator();
-  for (auto entry = std::filesystem::recursive_directory_iterator(path, error); !error && entry != end; entry.increment(error)) {
-    std::error_code none;
-    if (!entry->is_regular_file(none)) continue;
-    const ReaderProgram* const found = of_file(entry->path());
-    for (std::size_t k = 0; k < kFolderFormats; ++k) count[k] += found == &kLibraryFormats[k].program;
-  }
-  if (error) return fail(in_quotes(path) + ": " + error.message());
-  const auto most = std::max_element(count.begin(), count.end());
-  if (*most == 0) return fail(in_quotes(path) + " is a folder without TIFF or DICOM files");
-  return &kLibraryFormats[std::size_t(most - count.begin())].program;
-}
-
 std::string position_of(std::size_t index, const Grid& grid) {
   const auto x = static_cast<std::size_t>(grid.dims[0]), y = static_cast<std::size_t>(grid.dims[1]);
   return std::string("(") + std::to_string(index % x) + ", " + std::to_string(index / x % y) + ", " + std::to_string(index / x / y) + ")";
@@ -134,7 +97,7 @@ NamedVolume named_volume(const std::string& text, const std::optional<std::strin
 }
 
 Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part) {
-  const auto program = program_of(path);
+  const auto program = find_reader_program(path);
   if (!program) return tl::unexpected<Error>(program.error());
   if (*program != nullptr) return read_header_by(**program, path, part).map([](VolumeHeader header) { return std::optional(std::move(header)); });
   if (part) return misuse(in_quotes(path) + " has one volume: leave out --part");
@@ -153,7 +116,7 @@ Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::pa
 
 Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point,
                            const std::optional<std::string>& part) {
-  const auto program = program_of(path);
+  const auto program = find_reader_program(path);
   if (!layout && program && *program != nullptr) return read_volume_by(**program, path, part, time_point);
   const auto header = read_volume_header(path, part);
   if (layout && header && !*header) {
@@ -166,7 +129,7 @@ Result<Volume> read_volume(const std::filesystem::path& path, const std::optiona
   if (!*header)
     return misuse(
         in_quotes(path) +
-        " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM or HDF5: say what its raw samples are with --dims X Y Z and --type TYPE");
+        " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM, HDF5 or Zarr: say what its raw samples are with --dims X Y Z and --type TYPE");
   const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   return read_data(*file, **header, time_point);

@@ -12,8 +12,8 @@
 
 namespace intervale {
 
-// What a person names: FILE:/ARRAY is an array of an HDF5 file, unless there is a file of that whole name or a part is
-// chosen otherwise.
+// What a person names: FILE:/ARRAY is an array of an HDF5 file or a Zarr folder, unless there is a file of that whole
+// name or a part is chosen otherwise.
 struct NamedVolume {
   std::filesystem::path path;
   std::optional<std::string> part;
@@ -21,8 +21,8 @@ struct NamedVolume {
 [[nodiscard]] NamedVolume named_volume(const std::string& text, const std::optional<std::string>& part = {});
 
 // What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM or HDF5, as it begins,
-// whatever its name; without that the name decides. Or in a folder with the files of a TIFF or DICOM volume. None: the
-// file's samples are raw. part: which of several volumes (VolumeHeader::parts); none: the first.
+// whatever its name; without that the name decides. Or in a folder: of Zarr, or with the files of a TIFF or DICOM
+// volume. None: the file's samples are raw. part: which of several volumes (VolumeHeader::parts); none: the first.
 [[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part = {});
 
 // A layout for a file that describes itself is misuse, and so is none for any other, whose samples are raw. To choose no
