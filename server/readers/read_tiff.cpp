@@ -27,6 +27,7 @@ namespace intervale {
 namespace {
 
 constexpr tmsize_t kMostMemory = tmsize_t(1) << 30;  // bytes at once, for what a file claims
+constexpr std::uint64_t kGreatestRatio = 10'000;     // of compression
 constexpr std::size_t kMostPages = std::size_t(kMaxSide) * 16;
 
 using Tiff = std::unique_ptr<TIFF, void (*)(TIFF*)>;
@@ -53,6 +54,10 @@ class TiffFile {
   }
   [[nodiscard]] bool is_open() const { return tiff_ != nullptr; }
   [[nodiscard]] TIFF* get() const { return tiff_.get(); }
+  [[nodiscard]] std::uint64_t size() const {
+    std::error_code none;
+    return std::filesystem::file_size(path_, none);
+  }
   [[nodiscard]] tl::unexpected<Error> failure(const std::string& what) const {
     return fail(in_quotes(path_) + ": " + what + (message_.empty() ? "" : " (" + message_ + ")"));
   }
@@ -108,17 +113,39 @@ struct Described {
   Vec3 spacing{1, 1, 1};
   std::string unit;
   std::uint64_t channels = 1, time_points = 1;
+  std::uint64_t slices = 0;  // 0: not said
+  bool has_known_units = true;
   std::string order = "ZCT";  // which of slice, channel and time changes first from page to page
 };
+
+// The metres in a unit of length; 0: not known.
+double metres_in(std::string_view unit) {
+  constexpr std::array<std::pair<std::string_view, double>, 7> kUnits{
+      {{"\u00b5m", 1e-6}, {"nm", 1e-9}, {"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}, {"\u00c5", 1e-10}, {"pm", 1e-12}}};
+  const auto* const found = std::find_if(kUnits.begin(), kUnits.end(), [unit](const auto& known) { return known.first == unit; });
+  return found == kUnits.end() ? 0 : found->second;
+}
+
+// The first child of that name, whatever its namespace is called.
+pugi::xml_node child_of(const pugi::xml_node& node, std::string_view name) {
+  return node.find_child([name](const pugi::xml_node& child) {
+    const std::string_view whole = child.name();
+    return whole.substr(whole.find(':') + 1) == name;
+  });
+}
 
 Described described_by_ome(const pugi::xml_node& pixels) {
   Described d;
   const std::array<const char*, 3> keys{"PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"};
   for (std::size_t k = 0; k < 3; ++k) {
     const double size = pixels.attribute(keys[k]).as_double(1);
-    if (std::isfinite(size) && size > 0) d.spacing[k] = size;
+    if (!std::isfinite(size) || !(size > 0) || !pixels.attribute(keys[k])) continue;
+    const std::string unit = pixels.attribute((std::string(keys[k]) + "Unit").c_str()).as_string("\u00b5m");
+    if (d.unit.empty()) d.unit = unit;
+    d.has_known_units = d.has_known_units && (unit == d.unit || (metres_in(unit) > 0 && metres_in(d.unit) > 0));
+    d.spacing[k] = unit == d.unit ? size : size * metres_in(unit) / metres_in(d.unit);
   }
-  if (pixels.attribute(keys[0])) d.unit = pixels.attribute("PhysicalSizeXUnit").as_string("\u00b5m");
+  d.slices = pixels.attribute("SizeZ").as_ullong(0);
   d.channels = pixels.attribute("SizeC").as_ullong(1);
   d.time_points = pixels.attribute("SizeT").as_ullong(1);
   const std::string order = pixels.attribute("DimensionOrder").as_string();
@@ -136,6 +163,7 @@ Described described_by_imagej(std::string_view text, TIFF* tiff) {
   };
   d.channels = number_of<std::uint64_t>(value("channels")).value_or(1);
   d.time_points = number_of<std::uint64_t>(value("frames")).value_or(1);
+  d.slices = number_of<std::uint64_t>(value("slices")).value_or(0);
   d.order = "CZT";
   d.unit = value("unit") == "micron" || value("unit") == "\\u00B5m" ? "\u00b5m" : std::string(value("unit"));
   float x = 0, y = 0;
@@ -154,13 +182,15 @@ Described description_of(TIFF* tiff) {
   if (std::string_view(text).starts_with("ImageJ=")) return described_by_imagej(text, tiff);
   pugi::xml_document document;
   if (!document.load_string(text)) return {};
-  const pugi::xml_node pixels = document.child("OME").child("Image").child("Pixels");
+  const pugi::xml_node pixels = child_of(child_of(child_of(document, "OME"), "Image"), "Pixels");
   return pixels ? described_by_ome(pixels) : Described();
 }
 
 // A page's samples, row by row.
 Result<void> read_page(const TiffFile& file, const Page& page, std::size_t width, std::vector<std::byte>& out) {
   TIFF* const tiff = file.get();
+  const std::uint64_t bytes = std::uint64_t(page.width) * page.height * width;
+  if (bytes / kGreatestRatio > file.size()) return file.failure("a page says that it has " + std::to_string(bytes) + " bytes, which cannot be in it");
   out.assign(std::size_t(page.width) * page.height * width, std::byte());
   const std::size_t row = std::size_t(page.width) * width;
   if (TIFFIsTiled(tiff) == 0) {
@@ -266,6 +296,10 @@ Result<VolumeHeader> header_of(const Pages& pages, const Page& page, const Descr
   if (channels == 0 || times == 0 || channels > all || times > all || all % (channels * times) != 0)
     return fail(name + " has " + std::to_string(all) + " pages, which are not those of " + std::to_string(channels) + " channels and " +
                 std::to_string(times) + " time points");
+  if (described.slices != 0 && described.slices != all / channels / times)
+    return fail(name + " has " + std::to_string(all) + " pages, and says that it has " + std::to_string(described.slices) + " slices, " +
+                std::to_string(channels) + " channels and " + std::to_string(times) + " time points; are pages missing?");
+  if (!described.has_known_units) return fail(name + ": its distances along x, y and z are in different units");
   VolumeHeader header;
   const auto grid = make_grid({page.width, page.height, std::int64_t(all / channels / times)}, Affine::of(described.spacing), name);
   if (!grid) return tl::unexpected<Error>(grid.error());
@@ -284,7 +318,10 @@ Result<void> read(const ReaderRequest& request) {
   if (!pages) return tl::unexpected<Error>(pages.error());
   const Page first = page_of(pages->file().get());
   Described described = description_of(pages->file().get());
-  if (!pages->is_one_file()) described.channels = described.time_points = 1;  // each file is one slice
+  if (!pages->is_one_file()) {  // each file is one slice
+    described.channels = described.time_points = 1;
+    described.slices = 0;
+  }
   const auto header = header_of(*pages, first, described, request);
   if (!header) return tl::unexpected<Error>(header.error());
   const std::uint64_t channel = request.part ? number_of<std::uint64_t>(*request.part).value_or(described.channels) : 0;

@@ -104,6 +104,24 @@ TEST_F(Tiff, OmeSaysDistancesChannelsAndTimes) {
   EXPECT_EQ(volume->labels.unit, "\u00b5m");
 }
 
+TEST_F(Tiff, OmeMayHaveUnitsOfEachAxisAndANamespace) {
+  const auto with = [](const std::string& attributes) {
+    return "<o:OME xmlns:o=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\"><o:Image><o:Pixels DimensionOrder=\"XYZCT\" SizeC=\"1\" "
+           "SizeT=\"1\" " +
+           attributes + "/></o:Image></o:OME>";
+  };
+  const auto read = [&](const std::string& attributes) {
+    return read_volume(folder_.file("v", testing::tiff_file(3, 2, pages(4), with(attributes))), {});
+  };
+  const auto volume =
+      read("SizeZ=\"4\" PhysicalSizeX=\"2\" PhysicalSizeXUnit=\"nm\" PhysicalSizeY=\"3\" PhysicalSizeYUnit=\"nm\" PhysicalSizeZ=\"0.5\"");
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->labels.unit, "nm");
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(volume->grid.affine.spacing()[k], (Vec3{2, 3, 500}[k]), 1e-9) << k;
+  expect_failure(read("SizeZ=\"5\""), "says that it has 5 slices");
+  expect_failure(read("PhysicalSizeX=\"2\" PhysicalSizeY=\"3\" PhysicalSizeYUnit=\"pixel\""), "in different units");
+}
+
 TEST_F(Tiff, ImagejSaysDistances) {
   const auto volume =
       read_volume(folder_.file("v.tif", testing::tiff_file(3, 2, pages(4), "ImageJ=1.53\nimages=4\nslices=4\nunit=mm\nspacing=3\n")), {});
@@ -118,6 +136,7 @@ TEST_F(Tiff, WhatIsNoVolumeIsToldInOneLine) {
   expect_failure(read_volume(folder_.file("v", testing::tiff_file(3, 2, {colours, colours}, {}, 3)), {}), "in colour");
   expect_failure(read_volume(folder_.file("v", whole.substr(0, whole.size() - 40)), {}), "damaged or cut short");
   expect_failure(read_volume(folder_.file("v", whole.substr(0, 8)), {}), "cannot be read as TIFF");
+  expect_failure(read_volume(folder_.file("v", testing::tiff_file(100'000, 100'000, pages(2))), {}), "which cannot be in it");
   expect_failure(read_volume(folder_.file("v", testing::tiff_file(3, 2, pages(1))), {}), "1 sample on axis z");
   expect_failure(read_volume(folder_.file("v", whole), RawLayout{{2, 2, 2}, SampleType::u8, false, 0, {}}), "describes itself", true);
   std::filesystem::create_directory(folder_ / "empty");
