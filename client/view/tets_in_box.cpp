@@ -1,4 +1,5 @@
 #include "client/view/tets_in_box.h"
+#include "common/view/seen_box.h"
 
 #include <utility>
 

@@ -21,6 +21,7 @@
 #include "common/ivm/interval_volume.h"
 #include "common/view/lod.h"
 #include "common/view/screen_error.h"
+#include "common/view/seen_box.h"
 
 namespace intervale {
 

@@ -2,11 +2,9 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 
-#include "common/diamond/diamond.h"
 #include "common/diamond/grid.h"
 #include "common/util/result.h"
 #include "common/util/vec3.h"
@@ -46,36 +44,6 @@ struct Lod {
   std::optional<std::uint64_t> max_tets;     // the mesh never has more tetrahedra than this
   std::optional<std::uint64_t> max_updates;  // nor more updates than this
   friend bool operator==(const Lod&, const Lod&) = default;
-};
-
-// A box of the world, seen from the samples of a grid. Closed. Beyond the samples there is nothing to refine: a box that
-// lies there meets nothing.
-class SeenBox {
- public:
-  SeenBox(const Box& box, const Grid& grid);
-  [[nodiscard]] bool contains(const Vec3& sample) const { return meets(sample, {}); }
-  // Whether it touches the world box around a box of samples. reach: half the sides of that.
-  [[nodiscard]] bool meets(const Vec3& middle, const Vec3& reach) const {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const double at = dot(across_[i], middle), far = dot(width_[i], reach);
-      if (!(at + far >= min_[i] && at - far <= max_[i])) return false;
-    }
-    return true;
-  }
-  // The same for the box around a diamond. centre: of the diamond; h: 2^scale.
-  [[nodiscard]] bool meets(Vertex centre, std::int32_t h) const {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const double at = across_[i][0] * centre.x + across_[i][1] * centre.y + across_[i][2] * centre.z;
-      if (!(at + h >= min_[i] && at - h <= max_[i])) return false;
-    }
-    return true;
-  }
-
- private:
-  // By axis of the world: its coordinate of a sample, from the first sample, in units of what it changes by from one
-  // corner of a cell to another. So a cube of samples with half its side h reaches just as far.
-  std::array<Vec3, 3> across_{}, width_{};  // width_: without signs
-  Vec3 min_{}, max_{};                      // of the box
 };
 
 // Misuse if a number is out of range or not finite; the message says what is valid.

@@ -22,6 +22,7 @@
 #include "server/builder/relevance.h"
 #include "server/builder/supercube_family.h"
 #include "server/builder/value_steps.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -10,6 +10,7 @@
 #include "common/diamond/domain.h"
 #include "common/util/bits.h"
 #include "server/builder/value_steps.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

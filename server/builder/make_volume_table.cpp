@@ -16,6 +16,7 @@
 #include "server/builder/cell_tets.h"
 #include "server/builder/sample_range.h"
 #include "server/builder/volume_positions.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "common/util/bits.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -7,6 +7,8 @@
 #include <array>
 #include <cstddef>
 
+#include "server/volume/visit_samples.h"
+
 namespace intervale {
 SampleRange sample_range(const Volume& volume) {
   using Indices = tbb::blocked_range<std::size_t>;

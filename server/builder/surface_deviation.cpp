@@ -16,6 +16,7 @@
 #include "server/builder/bisection.h"
 #include "server/builder/cube_crossings.h"
 #include "server/builder/interpolation_error.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

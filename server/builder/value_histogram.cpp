@@ -12,6 +12,7 @@
 
 #include "server/builder/sample_range.h"
 #include "server/builder/value_steps.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

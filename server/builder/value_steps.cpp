@@ -18,6 +18,7 @@
 #include "common/util/decimal.h"
 #include "server/builder/exact_step.h"
 #include "server/builder/sample_range.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "server/builder/cell_tets.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -25,6 +25,8 @@
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"
+#include "server/volume/visit_samples.h"
+#include "server/volume/volume_header.h"
 
 namespace intervale {
 namespace {

@@ -18,6 +18,7 @@
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"
+#include "server/volume/volume_header.h"
 
 namespace intervale {
 namespace {

@@ -15,6 +15,7 @@
 #include "common/util/printable.h"
 #include "server/readers/dicom_series.h"
 #include "server/readers/reader_program.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "server/volume/header_bytes.h"
+#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -19,6 +19,7 @@
 #include "server/volume/nifti_header.h"
 #include "server/volume/npy_header.h"
 #include "server/volume/nrrd_header.h"
+#include "server/volume/volume_header.h"
 #include "server/volume/vti_header.h"
 #include "server/volume/vtk_header.h"
 

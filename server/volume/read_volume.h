@@ -8,9 +8,10 @@
 #include "common/util/result.h"
 #include "server/volume/raw_reader.h"
 #include "server/volume/volume.h"
-#include "server/volume/volume_header.h"
 
 namespace intervale {
+
+struct VolumeHeader;
 
 // What a person names: FILE:/ARRAY is an array of an HDF5 file or a Zarr folder, unless there is a file of that whole
 // name or a part is chosen otherwise.

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "server/volume/decoder.h"
+#include "server/volume/visit_samples.h"
 #include "server/volume/volume_header.h"
 
 namespace intervale {

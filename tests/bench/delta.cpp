@@ -19,6 +19,7 @@
 #include "server/builder/border_shape.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/interpolation_error.h"
+#include "server/volume/visit_samples.h"
 #include "tests/bench/cases.h"
 
 namespace intervale::bench {

@@ -15,6 +15,7 @@
 #include "common/mesh/io/mesh_writer.h"
 #include "common/program/program.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/volume/visit_samples.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/timing.h"
 

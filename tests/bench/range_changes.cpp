@@ -16,6 +16,7 @@
 #include "common/util/bits.h"
 #include "server/builder/border_shape.h"
 #include "server/builder/relevance.h"
+#include "server/volume/visit_samples.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/timing.h"
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/volume/read_volume.h"
+#include "server/volume/volume_header.h"
 
 // teem's reader loses a small array for some headers that it refuses (_nrrdRead, teem 1.12).
 extern "C" const char* __lsan_default_suppressions() { return "leak:airArrayNew\n"; }

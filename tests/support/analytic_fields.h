@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "server/volume/visit_samples.h"
 #include "server/volume/volume.h"
 
 namespace intervale::testing {

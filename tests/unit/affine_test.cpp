@@ -8,6 +8,7 @@
 
 #include "common/patch/description.h"
 #include "common/view/lod.h"
+#include "common/view/seen_box.h"
 #include "tests/support/affines.h"
 #include "tests/support/special_values.h"
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/volume/read_volume.h"
+#include "server/volume/visit_samples.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

@@ -10,6 +10,8 @@
 
 #include "server/volume/header_line.h"
 #include "server/volume/read_volume.h"
+#include "server/volume/visit_samples.h"
+#include "server/volume/volume_header.h"
 #include "tests/support/library_files.h"
 #include "tests/support/temp_dir.h"
 

@@ -6,6 +6,8 @@
 
 #include "server/volume/nrrd.h"
 #include "server/volume/read_volume.h"
+#include "server/volume/visit_samples.h"
+#include "server/volume/volume_header.h"
 #include "tests/support/affines.h"
 #include "tests/support/temp_dir.h"
 #include "tests/support/volume_files.h"

@@ -13,6 +13,7 @@
 #include "common/ivm/interval_volume.h"
 #include "common/patch/range.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/volume/visit_samples.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/bisection.h"
 #include "tests/support/special_values.h"

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/builder/value_steps.h"
+#include "server/volume/visit_samples.h"
 #include "tests/support/analytic_fields.h"
 
 namespace intervale {

@@ -1,5 +1,6 @@
 // Every format that volumes are read from, by the same laws.
 #include "tests/support/volume_files.h"
+#include "server/volume/visit_samples.h"
 
 #include <gtest/gtest.h>
 
@@ -9,6 +10,7 @@
 
 #include "common/patch/description.h"
 #include "server/volume/read_volume.h"
+#include "server/volume/volume_header.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {

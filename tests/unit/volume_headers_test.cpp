@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "server/volume/read_volume.h"
+#include "server/volume/visit_samples.h"
+#include "server/volume/volume_header.h"
 #include "tests/support/temp_dir.h"
 #include "tests/support/volume_files.h"
 

@@ -16,6 +16,7 @@
 #include "common/mesh/mesh.h"
 #include "server/builder/cell_tets.h"
 #include "server/builder/make_volume_table.h"
+#include "server/volume/visit_samples.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/naive_volume.h"

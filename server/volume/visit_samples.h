@@ -1,0 +1,23 @@
+// The samples of a volume in the C++ type that they have.
+#pragma once
+
+#include <boost/mp11/algorithm.hpp>
+#include <cstddef>
+#include <span>
+#include <tuple>
+
+#include "common/patch/sample_type.h"
+#include "server/volume/volume.h"
+
+namespace intervale {
+
+// Calls visitor with the samples as a std::span<const T> of the volume's own type T, and returns what it returns.
+template <class Visitor>
+decltype(auto) visit_samples(const Volume& volume, Visitor&& visitor) {
+  return boost::mp11::mp_with_index<std::tuple_size_v<SampleTypes>>(std::size_t(volume.type), [&](auto type) {
+    using T = std::tuple_element_t<type, SampleTypes>;
+    return visitor(std::span<const T>(reinterpret_cast<const T*>(volume.bytes.data()), volume.bytes.size() / sizeof(T)));
+  });
+}
+
+}  // namespace intervale
