@@ -1,8 +1,10 @@
 #include "client/net/connection.h"
 
 #include <algorithm>
+#include <boost/asio/post.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -14,6 +16,7 @@
 namespace intervale {
 namespace {
 
+namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
@@ -26,8 +29,13 @@ struct StreamConnection::Socket {
   BlockingRun run;
   websocket::stream<Stream> ws{run.io()};
   beast::flat_buffer buffer;
+  std::optional<beast::error_code> read;  // a message was read, or the attempt failed
+  bool is_reading = false;                // a read is under way
+  bool is_woken = false;
   bool is_lost = false;
 
+  // Waits for the next message. False: it was woken, or the time is over.
+  bool wait(ClientSession::Clock::time_point until);
   Result<void> shake_hands();
   tl::unexpected<Error> lost(beast::error_code error);
   [[nodiscard]] Error faulted(const protocol::Fault& fault, const Error& error) const;
@@ -55,6 +63,23 @@ Result<void> StreamConnection::Socket::shake_hands() {
     return fail(url.authority() + " is not an intervale server: it does not support " + protocol::kSubprotocol);
   }
   return {};
+}
+
+bool StreamConnection::Socket::wait(ClientSession::Clock::time_point until) {
+  constexpr auto kForever = ClientSession::Clock::time_point::max();
+  if (!is_reading) {
+    is_reading = true;
+    read.reset();
+    buffer.clear();
+    ws.async_read(buffer, [this](beast::error_code error, std::size_t /*size*/) { read = error; });
+  }
+  if (run.io().stopped()) run.io().restart();
+  while (!read && !is_woken && (until == kForever ? run.io().run_one() : run.io().run_one_until(until)) != 0) {
+  }
+  is_woken = false;
+  if (!read) return false;
+  is_reading = false;
+  return true;
 }
 
 tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) {
@@ -112,10 +137,10 @@ Result<void> StreamConnection::send(ClientSession& session) {
   return {};
 }
 
-Result<ClientSession::Event> StreamConnection::receive(ClientSession& session) {
+Result<ClientSession::Event> StreamConnection::receive(ClientSession& session, ClientSession::Clock::time_point until) {
   Socket& socket = *socket_;
-  socket.buffer.clear();
-  if (const auto error = socket.run([&](auto done) { socket.ws.async_read(socket.buffer, done); })) return socket.lost(error);
+  if (!socket.wait(until)) return ClientSession::Event{};
+  if (*socket.read) return socket.lost(*socket.read);
   if (socket.ws.got_text()) return fail("the server at " + socket.url.authority() + " sent a text message; all messages are binary");
   auto event = session.receive({static_cast<const std::uint8_t*>(socket.buffer.data().data()), socket.buffer.size()}, ClientSession::Clock::now());
   if (!event && session.fault()) {
@@ -125,6 +150,10 @@ Result<ClientSession::Event> StreamConnection::receive(ClientSession& session) {
   if (!event) return event;
   if (auto sent = send(session); !sent) return tl::unexpected(sent.error());
   return event;
+}
+
+void StreamConnection::wake() {
+  asio::post(socket_->run.io(), [socket = socket_.get()] { socket->is_woken = true; });
 }
 
 void StreamConnection::close() {

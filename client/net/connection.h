@@ -20,7 +20,7 @@ inline constexpr std::chrono::seconds kSilenceTime{30};  // without an answer to
 // The server answered 503 with that body. Its first line, cut at 80 bytes, says why, unless it is HTML (from a proxy).
 [[nodiscard]] Error turned_away(const ServerUrl& url, std::string_view body);
 
-// The connection of one session at a time, on one thread. Every error names the server. After one, only is_lost() may
+// The connection of one session at a time, on one thread but for wake(). Every error names the server. After one, only is_lost() may
 // be called.
 class StreamConnection {
  public:
@@ -32,8 +32,12 @@ class StreamConnection {
   // Sends what the session has to send.
   Result<void> send(ClientSession& session);
 
-  // Waits for the next message, passes it to the session, and sends what that has to send then.
-  Result<ClientSession::Event> receive(ClientSession& session);
+  // Waits for the next message, passes it to the session, and sends what that has to send then. Event::none once `until` is
+  // over; what arrives later is for the next call.
+  Result<ClientSession::Event> receive(ClientSession& session, ClientSession::Clock::time_point until = ClientSession::Clock::time_point::max());
+
+  // From any thread: a receive() that waits, or else the next one, returns Event::none. What arrives meanwhile is not lost.
+  void wake();
 
   // Whether the last error was the end of the connection or of the server, so that connecting again may help.
   [[nodiscard]] bool is_lost() const;

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/util/export.h"
 #include "common/util/result.h"
 
 namespace intervale {
@@ -23,13 +24,13 @@ struct ServerUrl {
   bool secure = false;  // TLS
   Access access = {};
 
-  [[nodiscard]] std::string authority() const;  // "localhost:8080", "[::1]:8080"
+  [[nodiscard]] INTERVALE_EXPORT std::string authority() const;  // "localhost:8080", "[::1]:8080"
   [[nodiscard]] std::string server() const { return (secure ? "wss://" : "ws://") + authority(); }
 };
 
 // Parses "ws://host:port" or "ws://host:port/name"; wss:// for TLS. An IPv6 address is in brackets. The default port is
 // 80, or 443 with TLS. The name is percent-decoded; a % without two hexadecimal digits after it stays. Anything else is
 // Error::usage. access: of the result.
-[[nodiscard]] Result<ServerUrl> parse_url(std::string_view text, Access access = {});
+[[nodiscard]] INTERVALE_EXPORT Result<ServerUrl> parse_url(std::string_view text, Access access = {});
 
 }  // namespace intervale

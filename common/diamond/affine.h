@@ -4,13 +4,14 @@
 #include <array>
 #include <cstddef>
 
+#include "common/util/export.h"
 #include "common/util/vec3.h"
 
 namespace intervale {
 
 // world = A (i, j, k) + t. For a diagonal A with positive numbers, the results are those of t + spacing * (i, j, k) to
 // the bit.
-struct Affine {
+struct INTERVALE_EXPORT Affine {
   // Row by row, 3 x 4: the first three columns are A, the fourth is t.
   std::array<double, 12> rows{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 

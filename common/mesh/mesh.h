@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/util/export.h"
+
 namespace intervale {
 
 // What a mesh point lies on: a grid vertex inside the range (inside), the alpha surface or the beta surface.
@@ -17,8 +19,8 @@ enum class Surface : std::uint8_t { inside = 0, alpha = 1, beta = 2 };
 
 // Memory for an array of many MiB, in huge pages where the system has them: to touch ordinary ones for the first time
 // would take a fifth of the time of making a mesh. Throws std::bad_alloc.
-[[nodiscard]] void* allocate_large(std::size_t bytes);
-void free_large(void* memory);
+[[nodiscard]] INTERVALE_EXPORT void* allocate_large(std::size_t bytes);
+INTERVALE_EXPORT void free_large(void* memory);
 
 // An allocator whose vectors leave new elements uninitialised: a large mesh is written once, by many threads.
 template <class T>
@@ -67,6 +69,6 @@ struct Mesh {
 
 // The sum of the volumes of the tetrahedra, in world units cubed; compensated, so that their order changes it by less
 // than 1e-12 relative.
-[[nodiscard]] double volume_of(const Mesh& mesh);
+[[nodiscard]] INTERVALE_EXPORT double volume_of(const Mesh& mesh);
 
 }  // namespace intervale

@@ -4,11 +4,12 @@
 #include <string>
 
 #include "common/mesh/mesh.h"
+#include "common/util/export.h"
 
 namespace intervale {
 
 // 32 hexadecimal digits. Equal for meshes of the same tetrahedra, by position and Surface, in any order of points and
 // tetrahedra. Other meshes have another digest, except by collision; not cryptographic. O(tetrahedra).
-[[nodiscard]] std::string mesh_digest(const Mesh& mesh);
+[[nodiscard]] INTERVALE_EXPORT std::string mesh_digest(const Mesh& mesh);
 
 }  // namespace intervale

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/util/export.h"
 #include "common/util/result.h"
 
 namespace intervale {
@@ -20,9 +21,9 @@ struct Labels {
 };
 
 // Whether a text is UTF-8 of at most kMaxLabel bytes, without control characters.
-[[nodiscard]] bool is_label(std::string_view text);
+[[nodiscard]] INTERVALE_EXPORT bool is_label(std::string_view text);
 
 // Fails if one of them is no label.
-[[nodiscard]] Result<void> check_labels(const Labels& labels);
+[[nodiscard]] INTERVALE_EXPORT Result<void> check_labels(const Labels& labels);
 
 }  // namespace intervale

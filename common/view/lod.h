@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "common/diamond/grid.h"
+#include "common/util/export.h"
 #include "common/util/result.h"
 #include "common/util/vec3.h"
 
@@ -19,7 +20,7 @@ struct Box {
 };
 
 // The box around the samples.
-[[nodiscard]] Box box_of(const Grid& grid);
+[[nodiscard]] INTERVALE_EXPORT Box box_of(const Grid& grid);
 
 // A perspective camera and the screen it fills. World coordinates.
 struct Camera {
@@ -47,7 +48,7 @@ struct Lod {
 };
 
 // Misuse if a number is out of range or not finite; the message says what is valid.
-[[nodiscard]] Result<void> check_lod(const Lod& lod);
+[[nodiscard]] INTERVALE_EXPORT Result<void> check_lod(const Lod& lod);
 
 // The error that a level of detail asks for, in the field's units. max_error: the data set's.
 [[nodiscard]] inline double error_of(const Lod& lod, double max_error) {

@@ -17,11 +17,7 @@
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
 #include "server/builder/all_cores.h"
-#include "server/builder/channel_builder.h"
-#include "server/builder/field_hierarchy.h"
-#include "server/builder/find_keys.h"
-#include "server/builder/value_builder.h"
-#include "server/builder/value_steps.h"
+#include "server/builder/build_data_set.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"
@@ -136,12 +132,10 @@ Result<std::vector<ChannelInput>> parse_channels(const BuildCommand& options) {
   return channels;
 }
 
-std::string text_of_dims(const Grid& grid) { return fmt::format("{} x {} x {}", grid.dims[0], grid.dims[1], grid.dims[2]); }
-
-// The channels of a data set of this grid and set: one after the other, so that the samples of one are in memory.
-Result<std::pair<std::vector<Channel>, std::vector<ChannelKeys>>> build_channels(const std::vector<ChannelInput>& inputs, const BuildCommand& options,
-                                                                                 const Grid& grid, const SupercubeSet& set) {
-  std::pair<std::vector<Channel>, std::vector<ChannelKeys>> built;
+// The channels of a data set of this grid and set.
+Result<BuiltChannels> build_channels(const std::vector<ChannelInput>& inputs, const BuildCommand& options, const Grid& grid,
+                                     const SupercubeSet& set) {
+  BuiltChannels built;
   for (const ChannelInput& input : inputs) {
     Progress progress("channel " + printable(input.name));
     NamedVolume named = named_volume(input.file.string());
@@ -150,14 +144,7 @@ Result<std::pair<std::vector<Channel>, std::vector<ChannelKeys>>> build_channels
     if (has_parts && !named.part) named.part = options.part;
     auto volume = read_volume(named.path, {}, has_several ? options.time_point : std::nullopt, named.part);
     if (!volume) return tl::unexpected(volume.error());
-    if (volume->grid.dims != grid.dims)
-      return fail(
-          fmt::format("channel '{}' has {} samples, the field has {}", printable(input.name), text_of_dims(volume->grid), text_of_dims(grid)));
-    if (auto finite = check_finite(*volume, options.nan); !finite) return tl::unexpected(finite.error());
-    auto channel = build_channel(*volume, input.name, input.step, set);
-    if (!channel) return tl::unexpected(Error{"channel '" + printable(input.name) + "': " + channel.error().message, channel.error().usage});
-    built.first.push_back(std::move(channel->channel));
-    built.second.push_back(std::move(channel->keys));
+    if (auto added = add_channel(built, *volume, input.name, input.step, options.nan, grid, set); !added) return tl::unexpected(added.error());
   }
   return built;
 }
@@ -180,26 +167,20 @@ std::string text_of_values(const Volume& volume) {
   });
 }
 
-// Of one range: frees the samples once they are not needed any more.
-Result<nlohmann::ordered_json> build_range(const BuildCommand& options, const std::vector<ChannelInput>& inputs, Volume& volume, const Range& range,
+// Of one range.
+Result<nlohmann::ordered_json> write_range(const BuildCommand& options, const std::vector<ChannelInput>& inputs, Volume& volume, const Range& range,
                                            std::string& text) {
   const std::string values = text_of_values(volume);
-  const auto format = choose_value_format(volume, options.step);
-  if (!format) return tl::unexpected(format.error());
-  const bool is_exact = has_exact_values(volume, *format);
-  round_samples(volume, *format);
   Result<IntervalVolume> made = fail("");
   {
     Progress progress("building " + volume.name);
-    const FieldHierarchy hierarchy(
-        volume, {range, options.refine == "uniform" ? Refine::uniform : Refine::boundary, [&](double done) { progress.fraction(done); }});
-    made = hierarchy.compact(*format, is_exact);
+    const Refine refine = options.refine == "uniform" ? Refine::uniform : Refine::boundary;
+    made = build_range(volume, {range, refine, [&](double done) { progress.fraction(done); }}, options.step);
   }
   if (!made) return tl::unexpected(made.error());
-  volume.bytes = std::vector<std::byte>();  // the compression runs on several threads
-  auto channels = build_channels(inputs, options, volume.grid, made->set());
-  if (!channels) return tl::unexpected(channels.error());
-  if (auto set = made->set_channels(std::move(channels->first), std::move(channels->second)); !set) return tl::unexpected(set.error());
+  auto built = build_channels(inputs, options, volume.grid, made->set());
+  if (!built) return tl::unexpected(built.error());
+  if (auto set = made->set_channels(std::move(built->channels), std::move(built->keys)); !set) return tl::unexpected(set.error());
   if (auto saved = save_ivm(options.output, *made, on_all_cores); !saved) return tl::unexpected(saved.error());
   if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
     fmt::print(stderr, "intervale: warning: no part of the volume lies in the range; its values are {}\n", values);
@@ -209,19 +190,16 @@ Result<nlohmann::ordered_json> build_range(const BuildCommand& options, const st
 }
 
 // Of every range.
-Result<nlohmann::ordered_json> build_values(const BuildCommand& options, const std::vector<ChannelInput>& inputs, Volume& volume, std::string& text) {
-  if (volume.grid.sample_count() > kMostSamples)
-    return misuse("the volume has more than 2^31 - 1 samples, too many for every range: give --range LO HI");
-  const auto format = choose_value_format(volume, options.step);
-  if (!format) return tl::unexpected(format.error());
+Result<nlohmann::ordered_json> write_every_range(const BuildCommand& options, const std::vector<ChannelInput>& inputs, Volume& volume,
+                                                 std::string& text) {
   Progress progress("building " + volume.name);
-  ValueVolume::Parts parts = build_value_volume(volume, *format, [&](double done) { progress.fraction(done); }).take();
-  volume.bytes = std::vector<std::byte>();
-  auto channels = build_channels(inputs, options, volume.grid, parts.set);
-  if (!channels) return tl::unexpected(channels.error());
-  parts.description.channels = std::move(channels->first);
-  parts.channel_keys = std::move(channels->second);
-  const ValueVolume made(std::move(parts));
+  auto parts = build_every_range(volume, options.step, [&](double done) { progress.fraction(done); });
+  if (!parts) return tl::unexpected(parts.error());
+  auto built = build_channels(inputs, options, volume.grid, parts->set);
+  if (!built) return tl::unexpected(built.error());
+  parts->description.channels = std::move(built->channels);
+  parts->channel_keys = std::move(built->keys);
+  const ValueVolume made(std::move(*parts));
   if (auto saved = save_values(options.output, made, on_all_cores); !saved) return tl::unexpected(saved.error());
   text = text_of(made, options.output);
   return stats_of(made, options.output);
@@ -258,7 +236,7 @@ Result<void> run(const BuildCommand& options) {
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   std::string text;
-  auto stats = *range ? build_range(options, *channels, *volume, **range, text) : build_values(options, *channels, *volume, text);
+  auto stats = *range ? write_range(options, *channels, *volume, **range, text) : write_every_range(options, *channels, *volume, text);
   if (!stats) return tl::unexpected(stats.error());
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (options.json) {

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/ivm/extraction.h"
 #include "common/ivm/load_volume.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/join.h"
@@ -23,7 +22,7 @@
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
 #include "server/builder/all_cores.h"
-#include "server/builder/find_relevant_updates.h"
+#include "server/builder/extract_meshes.h"
 #include "server/cli/commands.h"
 
 namespace intervale {
@@ -66,19 +65,15 @@ struct Extracted {
 Result<Extracted> extract_ranges(const ExtractCommand& options, const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown) {
   const auto numbers = find_channels(volume->description().channels, with_channel_of(options.picture, options.channels));
   if (!numbers) return tl::unexpected(numbers.error());
-  const std::vector<MeshChannel> channels = channels_of(*volume, *numbers);
-  const auto relevant = find_relevant_updates(volume, shown, options.lod.camera ? Distances::measured : Distances::none);
   Progress progress("extracting " + volume->description().name);
-  const ParallelFor parallel = with_progress(progress, on_all_cores);
-  const auto fronts = extract(*volume, *relevant, shown, options.lod, parallel);
-  if (!fronts) return tl::unexpected(fronts.error());
+  auto extracted = extract_meshes(volume, shown, options.lod, *numbers, with_progress(progress, on_all_cores));
+  if (!extracted) return tl::unexpected(extracted.error());
   Extracted all;
   std::vector<Mesh> meshes;
-  meshes.reserve(fronts->size());
-  for (const Extraction& one : *fronts) {
-    meshes.push_back(one.front.mesh(parallel, channels));
+  for (ExtractedMesh& one : *extracted) {
     all.updates += one.updates;
-    if (shown.size() > 1) all.each.push_back(figures_of(meshes.back(), one.updates, options.digest, one.front.range()));
+    if (shown.size() > 1) all.each.push_back(figures_of(one.mesh, one.updates, options.digest, one.range));
+    meshes.push_back(std::move(one.mesh));
   }
   all.mesh = joined(std::move(meshes));
   return all;

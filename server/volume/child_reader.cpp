@@ -1,5 +1,6 @@
 #include "server/volume/child_reader.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <spawn.h>
@@ -27,11 +28,21 @@ constexpr std::size_t kMaxMessage = 1000;
 constexpr int kPatience = 60'000;                  // milliseconds without a byte
 constexpr std::size_t kFirstBytes = 64ull << 20u;  // allocated before any sample has arrived
 
-// Beside this program, as in a build folder, or in libexec, as it is installed.
+// The folder of the shared library that this is part of; of the program, if of none.
+std::filesystem::path folder_of_library() {
+  Dl_info library{};
+  if (::dladdr(reinterpret_cast<const void*>(&folder_of_library), &library) == 0 || library.dli_fname == nullptr) return {};
+  std::error_code none;
+  return std::filesystem::weakly_canonical(library.dli_fname, none).parent_path();
+}
+
+// Beside this program, as in a build folder, or in the libexec of where it or this library is installed.
 std::filesystem::path path_of(const ReaderProgram& program) {
   std::error_code none;
-  const auto folder = std::filesystem::read_symlink("/proc/self/exe", none).parent_path();
-  for (const auto& candidate : {folder / program.name, folder.parent_path() / "libexec" / "intervale" / program.name}) {
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", none).parent_path(), library = folder_of_library();
+  const auto installed = std::filesystem::path("libexec") / "intervale" / program.name;
+  for (const auto& candidate : {folder / program.name, folder.parent_path() / installed, library / program.name, library / installed,
+                                library.parent_path() / installed, library.parent_path().parent_path() / installed}) {
     if (::access(candidate.c_str(), X_OK) == 0) return candidate;
   }
   return {};

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "common/util/export.h"
 #include "common/util/result.h"
 #include "server/volume/raw_reader.h"
 #include "server/volume/volume.h"
@@ -19,7 +20,7 @@ struct NamedVolume {
   std::filesystem::path path;
   std::optional<std::string> part;
 };
-[[nodiscard]] NamedVolume named_volume(const std::string& text, const std::optional<std::string>& part = {});
+[[nodiscard]] INTERVALE_EXPORT NamedVolume named_volume(const std::string& text, const std::optional<std::string>& part = {});
 
 // What is in a file that describes itself: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM or HDF5, as it begins,
 // whatever its name; without that the name decides. Or in a folder: of Zarr, or with the files of a TIFF or DICOM
@@ -28,14 +29,14 @@ struct NamedVolume {
 
 // A layout for a file that describes itself is misuse, and so is none for any other, whose samples are raw. To choose no
 // part or time point of several, or one that is not there, is misuse.
-Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point = {},
-                           const std::optional<std::string>& part = {});
+INTERVALE_EXPORT Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout,
+                                            std::optional<std::uint64_t> time_point = {}, const std::optional<std::string>& part = {});
 
 // The samples of one component of a volume, as a volume: component < volume.components.
-[[nodiscard]] Volume component_of(const Volume& volume, unsigned component);
+[[nodiscard]] INTERVALE_EXPORT Volume component_of(const Volume& volume, unsigned component);
 
 // Fails if a sample is NaN or infinite, and gives the (i, j, k) of the first one; a replacement, if given, is stored in
 // all of them instead. A replacement that is not finite in the volume's type is misuse.
-Result<void> check_finite(Volume& volume, std::optional<double> replacement);
+INTERVALE_EXPORT Result<void> check_finite(Volume& volume, std::optional<double> replacement);
 
 }  // namespace intervale

@@ -4,6 +4,7 @@
 #include <span>
 #include <string_view>
 
+#include "common/util/export.h"
 #include "common/util/result.h"
 #include "server/volume/volume.h"
 
@@ -16,10 +17,10 @@ inline constexpr int kMaxSampleSize = 1024;
 // gyroid: sin x cos y + sin y cos z + sin z cos x over two periods, -1.5 to 1.5; 0 is the minimal surface.
 // marschner-lobb: the test signal for reconstruction filters, f_M = 6, alpha = 0.25, 0 to 255.
 // hydrogen: the probability density of the 3d_z2 orbital, 0 to 255.
-std::span<const std::string_view> sample_names();
+INTERVALE_EXPORT std::span<const std::string_view> sample_names();
 
 // A cube of size^3 samples of type f32 over [-1, 1]^3; misuse for an unknown name or a size out of bounds. The result
 // does not depend on the number of threads. O(size^3), buckyball a few times slower than the others.
-Result<Volume> make_sample(std::string_view name, int size);
+INTERVALE_EXPORT Result<Volume> make_sample(std::string_view name, int size);
 
 }  // namespace intervale

@@ -36,6 +36,8 @@ NOT_RUN = {
     "cmake --preset tsan && cmake --build --preset tsan --target e2e_tests": BUILDS,
     "export PATH=$PWD/build/release/bin:$PATH": "sets the PATH, which this test does too",
     "cmake --install build/release --prefix ~/.local": "writes to the home folder",
+    "cmake -S client/examples -B build/examples -DCMAKE_PREFIX_PATH=$HOME/.local": "Package.Cpp does it in another folder",
+    "cmake --build build/examples": "likewise",
     "ctest --preset release -L unit": RUNS_TESTS,
     "ctest --preset release -L e2e": RUNS_TESTS,
     "ctest --preset release -R Front -j2": RUNS_TESTS,

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "common/mesh/mesh.h"
+#include "common/util/export.h"
 #include "common/util/result.h"
 
 namespace intervale {
@@ -18,11 +19,12 @@ using ByteSink = std::function<Result<void>(std::span<const std::byte>)>;
 
 // Whether a mesh can be written to this path, by its extension; misuse with the list of extensions otherwise. Call
 // before long work.
-Result<void> check_mesh_path(const std::filesystem::path& path);
+INTERVALE_EXPORT Result<void> check_mesh_path(const std::filesystem::path& path);
 
 // Writes a mesh in the format of path's extension. An empty mesh is a valid empty file. Fails on coordinates that the
 // format cannot hold: infinite ones and NaN; for .stl and .glb, those beyond 32-bit floats.
-Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh);                        // an AtomicFile
-Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, const ByteSink& sink);  // opens no file; path also names it in errors
+INTERVALE_EXPORT Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh);  // an AtomicFile
+INTERVALE_EXPORT Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh,
+                                         const ByteSink& sink);  // opens no file; path also names it in errors
 
 }  // namespace intervale
