@@ -38,6 +38,7 @@ NOT_RUN = {
     "cmake --install build/release --prefix ~/.local": "writes to the home folder",
     "cmake -S client/examples -B build/examples -DCMAKE_PREFIX_PATH=$HOME/.local": "Package.Cpp does it in another folder",
     "cmake --build build/examples": "likewise",
+    "python3 -m build --wheel --no-isolation client/python": "Package.Python does it with this build",
     "ctest --preset release -L unit": RUNS_TESTS,
     "ctest --preset release -L e2e": RUNS_TESTS,
     "ctest --preset release -R Front -j2": RUNS_TESTS,
