@@ -109,7 +109,7 @@ void add_data_sets(py::module_& module) {
       .def_property_readonly("field_unit", [](const Volume& v) { return v.labels.field_unit; });
   module.def(
       "read",
-      [](const std::string& path, std::optional<std::string> part, std::optional<std::uint64_t> time_point) {
+      [](const std::string& path, const std::optional<std::string>& part, std::optional<std::uint64_t> time_point) {
         const NamedVolume named = named_volume(path, part);
         return value_of(read_volume(named.path, {}, time_point, named.part), Kind::format);
       },

@@ -17,6 +17,7 @@ COLUMNS = 120
 # Between backticks, looking like paths, and in no folder of this project.
 NO_PATHS = {
     "build/release/bin": "output of a build",
+    "build/release/python": "output of a build",
     "http/1.1": "a protocol",
 }
 

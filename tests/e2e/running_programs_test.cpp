@@ -61,6 +61,7 @@ TEST(Programs, AServerThatIsKilledAndStartedAgainIsFoundAgain) {
   const Relay relay(server->port(), [&](std::uint64_t bytes) {
     if (bytes > 12000 && !killed.exchange(true)) {
       server->process().signal(SIGKILL);
+      (void)server->process().wait();  // until then the port is its own
       second = std::make_unique<Process>(std::vector<std::string>{program("intervale"), "serve", buckyball().string(), "--listen", address});
       return false;
     }
