@@ -9,7 +9,7 @@
 #include "server/volume/volume_header.h"
 
 // teem's reader loses a small array for some headers that it refuses (_nrrdRead, teem 1.12).
-extern "C" const char* __lsan_default_suppressions() { return "leak:airArrayNew\n"; }
+extern "C" [[gnu::visibility("default")]] const char* __lsan_default_suppressions() { return "leak:airArrayNew\n"; }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const int file = ::memfd_create("fuzzed", MFD_CLOEXEC);

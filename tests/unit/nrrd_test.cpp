@@ -13,7 +13,7 @@
 #include "tests/support/volume_files.h"
 
 // teem forgets 88 bytes whenever a header is consistent line by line but not as a whole. Ours are still watched.
-extern "C" const char* __lsan_default_suppressions();
+extern "C" [[gnu::visibility("default")]] const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() { return "leak:libteem"; }
 
 namespace intervale {
