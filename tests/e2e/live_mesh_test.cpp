@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <chrono>
 #include <cstdint>
@@ -47,6 +48,8 @@ class LiveMeshes : public ::testing::Test {
     EXPECT_TRUE(every.save(file));
     server = start({}, file);
   }
+  // oneTBB is not instrumented: the thread sanitizer would report false races of its workers.
+  const tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
   const TempDir folder;
   const std::string file = folder / "every.ivm";
   DataSet every;
