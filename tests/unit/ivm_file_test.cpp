@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <memory>
 #include <random>
 
@@ -18,6 +17,7 @@
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/value_builder.h"
 #include "server/builder/value_steps.h"
+#include "tests/support/equal_volumes.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/parts.h"
 #include "tests/support/special_values.h"
@@ -25,8 +25,6 @@
 
 namespace intervale {
 namespace {
-
-using Parts = IntervalVolume::Parts;
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -41,32 +39,6 @@ Result<IntervalVolume> decode_exact(std::span<const std::byte> bytes) {
 }
 
 bool is_one_line(const std::string& message) { return !message.empty() && message.find('\n') == std::string::npos; }
-
-std::vector<std::uint8_t> codes_of(const IntervalVolume& v) {
-  std::vector<std::uint8_t> codes;
-  for (const ErrorToDistance c : v.relevant().error_to_distance()) codes.push_back(c.code());
-  return codes;
-}
-
-// But for what only a file has: a name and a hash.
-void expect_equal(const IntervalVolume& a, const IntervalVolume& b) {
-  Description described = b.description();
-  described.name = a.description().name;
-  described.content_hash = a.description().content_hash;
-  EXPECT_EQ(a.description(), described);
-  EXPECT_TRUE(std::ranges::equal(a.set().occupancy(), b.set().occupancy()));
-  EXPECT_TRUE(std::ranges::equal(a.error_steps(), b.error_steps()));
-  EXPECT_TRUE(std::ranges::equal(codes_of(a), codes_of(b)));
-  EXPECT_EQ(a.relevant().has_slopes(), b.relevant().has_slopes());
-  ASSERT_EQ(a.size(), b.size());
-  a.set().for_each_down([&](const Place& p) {
-    const auto q = b.set().find(a.set().centre(p));
-    ASSERT_TRUE(q);
-    EXPECT_EQ(a.key(p.index), b.key(q->index));
-    EXPECT_EQ(a.error(p.index), b.error(q->index));
-    EXPECT_EQ(a.relevant().slope(p.index), b.relevant().slope(q->index));
-  });
-}
 
 TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
   const TempDir folder;
@@ -90,7 +62,7 @@ TEST(IvmFile, LoadingGivesBackWhatWasSaved) {
     const auto loaded = load_ivm(path);
     ASSERT_TRUE(loaded) << loaded.error().message;
     EXPECT_EQ((*loaded)->description().name, "first.second");
-    expect_equal(sigma, **loaded);
+    testing::expect_equal(sigma, **loaded);
     const auto valid = validate(**loaded);
     EXPECT_TRUE(valid) << valid.error().message;
   }
@@ -105,7 +77,7 @@ TEST(IvmFile, SlopesMayBeMissing) {
   ASSERT_TRUE(without);
   const auto decoded = decode_ivm(encode_ivm(*without), "without");
   ASSERT_TRUE(decoded) << decoded.error().message;
-  expect_equal(*without, *decoded);
+  testing::expect_equal(*without, *decoded);
   EXPECT_EQ(decoded->description().content_hash, decode_ivm(encode_ivm(sigma), "with")->description().content_hash) << "the mesh is the same";
 }
 
@@ -323,82 +295,6 @@ TEST(IvmFile, AFileThatCannotBeWrittenIsAnErrorThatNamesIt) {
   const auto saved = save_ivm(path, small_volume());
   ASSERT_FALSE(saved);
   EXPECT_THAT(saved.error().message, HasSubstr("x.ivm"));
-}
-
-TEST(Assemble, PartsThatFitMakeAnEqualVolume) {
-  const IntervalVolume sigma = small_volume();
-  const auto again = IntervalVolume::assemble(testing::parts_of(sigma));
-  ASSERT_TRUE(again) << again.error().message;
-  expect_equal(sigma, *again);
-}
-
-TEST(Assemble, PartsThatDoNotFitAreRefused) {
-  const IntervalVolume sigma = small_volume();
-  ASSERT_GT(sigma.error_steps().size(), 3u);
-  const struct {
-    const char* what;
-    void (*spoil)(Parts&);
-  } cases[] = {
-      {"too few steps", [](Parts& p) { p.steps.pop_back(); }},
-      {"too few error_to_distance codes", [](Parts& p) { p.surface.to_distance.pop_back(); }},
-      {"too few slopes", [](Parts& p) { p.surface.slopes.pop_back(); }},
-      {"a slope out of range", [](Parts& p) { p.surface.slopes.back() = kMaxSlope + 1; }},
-      {"too many steps", [](Parts& p) { p.steps.push_back(0); }},
-      {"no steps", [](Parts& p) { p.steps.clear(); }},
-      {"no values", [](Parts& p) { p.keys = {}; }},
-      {"a value too many", [](Parts& p) { p.keys = ValueKeys(p.keys.size() + 1, p.description.format.last); }},
-      {"a value out of range",
-       [](Parts& p) {
-         p.keys.set(0, p.description.format.last);
-         --p.description.format.last;
-         p.description.corners = {};
-       }},
-      {"no set", [](Parts& p) { p.set = SupercubeSet(); }},
-      {"an error that is not there", [](Parts& p) { p.steps[0] = std::uint8_t(p.error_steps.size()); }},
-      {"errors that descend", [](Parts& p) { std::swap(p.error_steps[0], p.error_steps[1]); }},
-      {"a negative error", [](Parts& p) { p.error_steps[0] = -1; }},
-      {"an infinite error", [](Parts& p) { p.error_steps.back() = std::numeric_limits<float>::infinity(); }},
-      {"an error that is no number", [](Parts& p) { p.error_steps[1] = std::numeric_limits<float>::quiet_NaN(); }},
-      {"no errors", [](Parts& p) { p.error_steps.clear(); }},
-      {"too many errors", [](Parts& p) { p.error_steps.resize(kMaxErrorSteps + 1, p.error_steps.back()); }},
-      {"a corner out of range", [](Parts& p) { p.description.corners[7] = p.description.format.last + 1; }},
-      {"a negative step", [](Parts& p) { p.description.format.step = -1; }},
-      {"a negative largest error", [](Parts& p) { p.description.max_error = -1; }},
-      {"a side of 1 sample", [](Parts& p) { p.description.grid.dims[1] = 1; }},
-      {"a negative side", [](Parts& p) { p.description.grid.dims[2] = -9; }},
-      {"a side that is too long", [](Parts& p) { p.description.grid.dims[0] = kMaxSide + 1; }},
-      {"no spacing", [](Parts& p) { p.description.grid.affine.rows[0] = 0; }},
-      {"infinite spacing", [](Parts& p) { p.description.grid.affine.rows[0] = kInf; }},
-      {"an origin that is no number", [](Parts& p) { p.description.grid.affine.rows[11] = std::numeric_limits<double>::quiet_NaN(); }},
-      {"a range upside down",
-       [](Parts& p) {
-         p.description.range = {1, 0};
-       }},
-      {"a range that is no number", [](Parts& p) { p.description.range.beta = std::numeric_limits<double>::quiet_NaN(); }},
-  };
-  for (const auto& c : cases) {
-    Parts parts = testing::parts_of(sigma);
-    c.spoil(parts);
-    const auto assembled = IntervalVolume::assemble(std::move(parts));
-    ASSERT_FALSE(assembled) << c.what;
-    EXPECT_TRUE(is_one_line(assembled.error().message)) << c.what;
-  }
-}
-
-// What assemble() cannot see, validate() does.
-TEST(Assemble, PartsThatFitButMeanNothingAreNotValid) {
-  const IntervalVolume sigma = small_volume();
-  const auto refused = [&](auto spoil) {
-    auto parts = testing::parts_of(sigma);
-    spoil(parts);
-    const auto assembled = IntervalVolume::assemble(std::move(parts));
-    return !assembled || !validate(*assembled);
-  };
-  EXPECT_FALSE(refused([](auto&) {}));
-  EXPECT_TRUE(refused([](auto& p) { ++p.description.full.tets; }));
-  EXPECT_TRUE(refused([](auto& p) { --p.description.full.vertices; }));
-  EXPECT_TRUE(refused([](auto& p) { p.description.grid.dims = {3, 2, 2}; })) << "updates outside the box";
-  EXPECT_TRUE(refused([](auto& p) { p.steps[0] = 0; })) << "the root's error is its descendants' least";
 }
 
 }  // namespace
