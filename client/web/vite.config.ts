@@ -1,26 +1,6 @@
-// Environment: INTERVALE_CORE_DIR, the folder with core.js and core.wasm, which CMake builds; without it the page can
-// be built, but reports that it has no core. INTERVALE_VIEWER_OUT, the output folder.
-import { existsSync } from 'node:fs';
-import { resolve } from 'node:path';
+// Environment: INTERVALE_VIEWER_OUT, the output folder. The client core, which CMake builds, is to lie in
+// package/src/core.
 import { defineConfig, type Plugin } from 'vite';
-
-function clientCore(folder: string | undefined): Plugin {
-  return {
-    name: 'client-core',
-    enforce: 'pre',
-    resolveId(id) {
-      if (!id.startsWith('@core/')) return null;
-      const path = resolve(folder ?? '.', id.slice('@core/'.length));
-      if (folder && existsSync(path.replace(/\?.*$/, ''))) return path;
-      return '\0' + id;
-    },
-    load(id) {
-      if (id === '\0@core/core.js') return 'export default () => Promise.reject(new Error("this build of the page has no client core"));';
-      if (id.startsWith('\0@core/')) return 'export default "";';
-      return null;
-    },
-  };
-}
 
 // Leaves out the shaders of three.js, since the page has its own: they would be a quarter of its size. All of them are
 // in one object, in which three.js looks up `#include`.
@@ -40,13 +20,11 @@ function withoutShaders(): Plugin {
   };
 }
 
-const core = () => clientCore(process.env.INTERVALE_CORE_DIR);
-
 export default defineConfig({
   base: './', // relative: the page may be served below any path
-  plugins: [core(), withoutShaders()],
+  plugins: [withoutShaders()],
   resolve: { alias: [{ find: /^three$/, replacement: 'three/src/Three.js' }] },
-  worker: { format: 'es', plugins: () => [core()] },
+  worker: { format: 'es' },
   build: {
     outDir: process.env.INTERVALE_VIEWER_OUT ?? 'dist',
     emptyOutDir: true,

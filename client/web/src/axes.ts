@@ -1,6 +1,6 @@
 // The orientation marker: the directions of x, y and z, in a corner of the picture. index.html has a line and a letter
 // for each.
-import { axes, type Pose } from './camera';
+import { axes, type Pose } from '../package/src/camera';
 
 const kLength = 25; // of a line, in units of the SVG's view box
 const kLetter = kLength + 8; // the letter's distance from the origin

@@ -2,11 +2,11 @@
 // frame; once all are there they replace the old ones in one step, so that no frame shows cracks. Nothing here visits
 // single vertices.
 import { BufferAttribute, BufferGeometry, LineSegments, type Material, Mesh, Scene, Sphere, Vector3 } from 'three';
-import { type Frame, toDrawing } from './frame';
+import { type Frame, toDrawing } from '../package/src/frame';
 import type { SurfaceMaterials } from './materials';
-import type { SurfaceChange, SurfacePiece } from './messages';
+import type { SurfaceChange, SurfacePiece } from '../package/src/messages';
 import { setValues, type Uploader } from './upload';
-import { applied, boxAround, center, corners, diagonal } from './vec';
+import { applied, boxAround, center, corners, diagonal } from '../package/src/vec';
 
 interface PieceObjects {
   range: number;

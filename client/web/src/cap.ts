@@ -1,7 +1,7 @@
 // The cap: the faces where the clip plane cuts the tetrahedra of each range.
 import { BufferAttribute, BufferGeometry } from 'three';
 import { capColorMaterials, capDepthMaterials, capPickMaterial, thicknessMaterial } from './materials';
-import type { Cap } from './messages';
+import type { Cap } from '../package/src/messages';
 import { staticMesh } from './static_mesh';
 import { setValues, type Uploader } from './upload';
 

@@ -1,13 +1,13 @@
 // The controls of the clip plane: a switch, buttons, a slider, and two handles in the picture that move and rotate it.
-import { axes, ontoViewPlane } from './camera';
+import { axes, ontoViewPlane } from '../package/src/camera';
 import { element, input, onClick } from './dom';
 import { short } from './format';
 import type { Handles } from './handles';
-import type { Box, Plane, Vec3 } from './messages';
+import type { Box, Plane, Vec3 } from '../package/src/messages';
 import { clamped, facing, handlePosition, mainAxis, normalTip, offsetRange, rotatedTowards, throughCenter } from './plane';
 import type { ViewState } from './state';
 import type { Store } from './store';
-import { add, diagonal, dot, kAxes, rotated, scale, sub } from './vec';
+import { add, diagonal, dot, kAxes, rotated, scale, sub } from '../package/src/vec';
 import type { Viewer } from './viewer';
 
 const kMoveStep = 0.01; // per arrow key, as a fraction of the box's diagonal

@@ -1,9 +1,9 @@
 // Handles over the picture. They are buttons: reached by Tab, moved by arrow keys, dragged by pointer or touch.
-import { inViewPlane, projected, unitsPerPixel } from './camera';
+import { inViewPlane, projected, unitsPerPixel } from '../package/src/camera';
 import { create, element } from './dom';
 import { watchArrows } from './keyboard';
-import type { Vec3 } from './messages';
-import { length, sub } from './vec';
+import type { Vec3 } from '../package/src/messages';
+import { length, sub } from '../package/src/vec';
 import type { Viewer } from './viewer';
 
 export interface Handle {

@@ -1,5 +1,5 @@
 // The keyboard. Letters work everywhere except in text fields; arrows, plus and minus only while the canvas has focus.
-import { orbited, panned, zoomed } from './camera';
+import { orbited, panned, zoomed } from '../package/src/camera';
 import { create } from './dom';
 import type { Viewer } from './viewer';
 

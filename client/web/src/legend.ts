@@ -1,10 +1,10 @@
 // The legend (a colour bar), where colours show values of the field or a channel, thickness or levels of detail.
 import { type ColorMap, kLevelColors, kThicknessColors } from './color_maps';
-import type { Dataset } from './datasets';
+import type { Dataset } from '../package/src/datasets';
 import { element } from './dom';
 import { short } from './format';
 import { channelOf } from './palette';
-import type { Range } from './range';
+import type { Range } from '../package/src/ranges';
 import { showsValues, type ViewState } from './state';
 import type { Thickness } from './thickness';
 

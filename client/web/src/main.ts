@@ -1,16 +1,17 @@
-// The page: connects the controls, the view's state, the worker and the picture.
+// The page: connects the controls, the view's state, the mesh and the picture.
 import { automation } from './automation';
 import { showAxes } from './axes';
 import { watchBanner } from './banner';
 import { ClipControls } from './clip';
-import { type Dataset, fetchStatistics, listDatasets } from './datasets';
+import { type Dataset, fetchStatistics, listDatasets, streamUrl } from '../package/src/datasets';
 import { element, input, onClick } from './dom';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
 import { showLegend } from './legend';
+import { watchMesh } from './mesh_status';
 import { channelOf } from './palette';
 import { watchPanel } from './panel';
-import { watchPointers } from './pointer';
+import { watchPointers } from '../package/src/pointer';
 import { Probe } from './probe';
 import { watchProgress } from './progress';
 import { rangesOf } from './range';
@@ -24,7 +25,7 @@ import { watchTheme } from './theme';
 import { ValueColors } from './value_colors';
 import { Viewer } from './viewer';
 import { kMostVolumeTets, VolumeControls } from './volume_controls';
-import { updatesIn, type Wanted, WorkerClient } from './worker_client';
+import { LiveMesh, updatesIn, type Wanted } from '../package/src/live_mesh';
 
 const kNoWebGl = 'The viewer needs WebGL 2, which this browser does not provide: it may be outdated, or hardware acceleration may be disabled.';
 const kContextLost = 'The WebGL context was lost. The picture returns when the browser restores the context; the mesh is kept.';
@@ -41,7 +42,7 @@ class Page {
   private readonly probe: Probe;
   private volume: VolumeControls | null = null;
 
-  constructor(private readonly viewer: Viewer, private readonly worker: WorkerClient) {
+  constructor(private readonly viewer: Viewer, private readonly mesh: LiveMesh) {
     this.handles = new Handles(viewer);
     this.clip = new ClipControls(view, viewer, this.handles);
     this.region = new RegionControls(view, viewer, this.handles);
@@ -55,14 +56,14 @@ class Page {
     view.watch([], (value) => {
       const chosen = value.dataset !== status.value.dataset?.name && status.value.datasets?.find(({ name }) => name === value.dataset);
       if (chosen) this.open(chosen);
-      else this.updateWorker();
+      else this.updateMesh();
     });
     this.watchControls();
     watchAddress();
   }
 
   // Opens the data set that the address names, or else the first.
-  async load(request = listDatasets(status.value.token)): Promise<void> {
+  async load(request = listDatasets(document.baseURI, status.value.token)): Promise<void> {
     status.set({ error: null });
     const listing = await request;
     element('token-form').hidden = !('needsToken' in listing);
@@ -83,10 +84,10 @@ class Page {
   private watchViewer(): void {
     const { viewer } = this;
     viewer.onShown = (version) => {
-      this.worker.send({ type: 'shown', version });
+      this.mesh.shown(version);
       status.set({ surfaceVersion: version });
     };
-    viewer.onResize = () => this.updateWorker();
+    viewer.onResize = () => this.updateMesh();
     viewer.onContext = (isLost) => status.set({ notice: isLost ? kContextLost : null });
     viewer.onDrawn = () => {
       const pose = viewer.pose();
@@ -109,10 +110,10 @@ class Page {
     onClick('help', showHelp);
     watchPanel(view, status);
     watchRanges(view, status, (ranges) => {
-      this.worker.preview(ranges);
+      this.mesh.preview(ranges);
       this.valueColors.preview(ranges);
     });
-    watchSaving(status, viewer, this.worker);
+    watchSaving(status, viewer, this.mesh);
     watchTheme(() => {
       viewer.picture.setBackground(getComputedStyle(element('stage')).backgroundColor);
       viewer.picture.outlines.setColor(getComputedStyle(element('handles')).color);
@@ -174,13 +175,13 @@ class Page {
     };
   }
 
-  private updateWorker(): void {
+  private updateMesh(): void {
     const wanted = this.wanted();
-    if (wanted && status.value.dataset) this.worker.update(wanted);
+    if (wanted && status.value.dataset) this.mesh.update(wanted);
   }
 
   private async loadStatistics(dataset: Dataset): Promise<void> {
-    const statistics = await fetchStatistics(dataset, status.value.token);
+    const statistics = await fetchStatistics(document.baseURI, dataset, status.value.token);
     if (status.value.dataset === dataset) status.set({ statistics });
   }
 
@@ -192,7 +193,9 @@ class Page {
     this.region.opened();
     view.set({ dataset: dataset.name, ...(dataset.hasEveryRange ? {} : { ranges: kDefaults.ranges }) });
     const wanted = this.wanted();
-    if (wanted) this.worker.open(dataset.name, wanted);
+    if (!wanted) return;
+    status.set({ error: null, progress: null, tets: null, connection: { state: 'connecting' } });
+    this.mesh.open(streamUrl(document.baseURI), dataset.name, wanted, status.value.token);
   }
 }
 
@@ -224,22 +227,22 @@ function watchAddress(): void {
 function start(): void {
   watchProgress(status);
   let viewer: Viewer;
-  // First the worker: it loads the core while this thread prepares to draw.
-  const worker = new WorkerClient(status, (report) => {
-    if (report.type === 'saved') downloadMesh(report);
-    else viewer.take(report);
-  });
-  const listing = listDatasets(null);
+  // First the mesh: its worker loads the core while this thread prepares to draw.
+  const mesh = new LiveMesh({ isShownLater: true });
+  watchMesh(mesh, status);
+  mesh.addEventListener('saved', ({ detail }) => downloadMesh(detail));
+  const listing = listDatasets(document.baseURI);
   try {
     viewer = new Viewer(element<HTMLCanvasElement>('canvas'), view);
   } catch {
-    worker.terminate();
+    mesh.close();
     watchBanner(status, () => location.reload());
     status.set({ error: kNoWebGl });
     return;
   }
-  window.intervale = automation(view, status, viewer, worker);
-  void new Page(viewer, worker).load(listing);
+  window.intervale = automation(view, status, viewer, mesh);
+  viewer.watch(mesh);
+  void new Page(viewer, mesh).load(listing);
 }
 
 start();

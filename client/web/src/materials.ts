@@ -4,7 +4,8 @@ import {
   RawShaderMaterial, type ShaderMaterialParameters, SrcAlphaFactor, Vector2, Vector3, Vector4, ZeroFactor,
 } from 'three';
 import * as shaders from './shaders';
-import { kMostRanges, kSurfaces, type Styles, type SurfaceName } from './state';
+import { kSurfaces, type SurfaceName } from '../package/src/colors';
+import { kMostRanges, type Styles } from './state';
 import * as volumeShaders from './volume_shaders';
 
 const colors = (): { value: Vector3[] } => ({ value: Array.from({ length: kMostRanges }, () => new Vector3()) });

@@ -1,8 +1,8 @@
 // How opaque values are in volume rendering, and what rays are drawn with. Pure functions, as those of the native program
 // (common/view/transfer_function.h).
 import type { ColorMap } from './color_maps';
-import type { Range } from './range';
-import { clamp } from './vec';
+import type { Range } from '../package/src/ranges';
+import { clamp } from '../package/src/vec';
 
 // A value, and the opacity of a hundredth of the box's diagonal that is filled with it: 0 lets all light pass, 1 none.
 export interface OpacityPoint {

@@ -1,11 +1,11 @@
 // Outlines over the picture: of the region, and of the clip plane within the data's box, with its normal. Dim where
 // something is in front of them.
 import { BufferAttribute, BufferGeometry, Color, LineSegments, Scene } from 'three';
-import { type Frame, toDrawing } from './frame';
+import { type Frame, toDrawing } from '../package/src/frame';
 import { lineMaterial } from './materials';
-import type { Box, Plane, Vec3 } from './messages';
+import type { Box, Plane, Vec3 } from '../package/src/messages';
 import { handlePosition, normalTip, planeOutline } from './plane';
-import { boxOutline } from './vec';
+import { boxOutline } from '../package/src/vec';
 
 export class Outlines {
   readonly scene = new Scene();

@@ -1,9 +1,10 @@
 // The panel of controls: shows the view's state, and changes it.
-import type { Dataset } from './datasets';
+import type { Dataset } from '../package/src/datasets';
 import { create, element, input, onClick, setText } from './dom';
 import { bytes, count, short } from './format';
-import { rangeOf } from './range';
-import { exclusive, kSurfaces, type ViewState } from './state';
+import { rangeOf } from '../package/src/ranges';
+import { kSurfaces } from '../package/src/colors';
+import { exclusive, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
 

@@ -1,11 +1,11 @@
 // The picture: what is drawn, with which materials, in which order. Draws only when asked to.
 import { BufferGeometry, Color, LinearSRGBColorSpace, type Material, Mesh, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
 import { BoundarySurfaceView } from './boundary_surface';
-import { type Pose, rayThrough } from './camera';
+import { type Pose, rayThrough } from '../package/src/camera';
 import { CapView } from './cap';
-import { type Frame, toDrawing } from './frame';
+import { type Frame, toDrawing } from '../package/src/frame';
 import { setStyles, shared, surfaceMaterials } from './materials';
-import type { Box, Cap, Vec3 } from './messages';
+import type { Box, Cap, Vec3 } from '../package/src/messages';
 import { Outlines } from './outlines';
 import { Pick } from './pick';
 import { stylesOf, type Styles, type SurfaceStyle, type ViewState } from './state';
@@ -14,7 +14,7 @@ import { Thickness } from './thickness';
 import { Transparency } from './transparency';
 import { Uploader } from './upload';
 import { VolumeView } from './volume';
-import { along, corners, dot, length, sub, unit } from './vec';
+import { along, corners, dot, length, sub, unit } from '../package/src/vec';
 
 const kMaxPixelRatio = 2; // device pixels per CSS pixel
 const kAroundTets = 0.25; // the greatest opacity of surfaces around shrunken tetrahedra, which they would hide

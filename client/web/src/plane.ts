@@ -1,7 +1,7 @@
 // Planes that cut a box: pure geometry. Normals have length 1; what lies on the normal's side of a plane is cut away.
 // World coordinates.
-import type { Box, Plane, Vec3 } from './messages';
-import { add, along, center, clamp, corners, diagonal, dot, kBoxEdges, scale, sub, unit } from './vec';
+import type { Box, Plane, Vec3 } from '../package/src/messages';
+import { add, along, center, clamp, corners, diagonal, dot, kBoxEdges, scale, sub, unit } from '../package/src/vec';
 
 const kNormalLength = 0.18; // of the drawn normal, as a fraction of the box's diagonal
 

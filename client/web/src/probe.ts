@@ -1,8 +1,8 @@
 // The probe: a label beside the pointer that tells the value of the field or of the channel that is shown, and the position of what is drawn there.
-import type { ChannelInfo, Dataset } from './datasets';
+import type { ChannelInfo, Dataset } from '../package/src/datasets';
 import { element, setText } from './dom';
 import { withDigits } from './format';
-import type { Frame } from './frame';
+import type { Frame } from '../package/src/frame';
 import { channelOf } from './palette';
 import type { Probed } from './picture';
 import { rounded } from './range';

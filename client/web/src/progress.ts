@@ -1,8 +1,8 @@
 // How far the view is refined: the status line below the picture, and the statistics in the panel.
-import { volumeUnit } from './datasets';
+import { volumeUnit } from '../package/src/datasets';
 import { create, element, setText } from './dom';
 import { bounded, bytes, count, short } from './format';
-import type { Progress } from './messages';
+import type { Progress } from '../package/src/messages';
 import type { Status } from './status';
 import type { Store } from './store';
 

@@ -1,20 +1,9 @@
 // The ranges of values that are shown. A data set of one range is shown in it; one that has more, in any range within;
 // one of every range, in up to four of them. Pure functions.
-import type { Dataset, Statistics } from './datasets';
+import type { Dataset, Statistics } from '../package/src/datasets';
+import { type Range, rangeOf } from '../package/src/ranges';
 import type { ViewState } from './state';
-import { clamp } from './vec';
-
-export type Range = [least: number, greatest: number];
-
-// What is shown of a data set if this is asked for; null: its own range. Of every range, the upper half of the values
-// unless asked otherwise.
-export function rangeOf(dataset: Dataset, asked: Range | null): Range | null {
-  if (!dataset.hasRangesWithin) return null;
-  const [least, greatest] = dataset.values;
-  const wanted: Range | null = asked ?? (dataset.hasEveryRange ? [(least + greatest) / 2, greatest] : null);
-  const [low, high] = dataset.range;
-  return wanted && [clamp(wanted[0], low, high), clamp(wanted[1], low, high)];
-}
+import { clamp } from '../package/src/vec';
 
 // The same of a view, for one range or several; none: its own range.
 export function rangesOf(dataset: Dataset, { range, ranges }: Pick<ViewState, 'range' | 'ranges'>): Range[] {

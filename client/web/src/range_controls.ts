@@ -1,12 +1,14 @@
 // The controls of the ranges: a row of number fields for each, and for data sets of every range the histogram of the
 // field with two handles for each range, and buttons to show more of them. While a handle moves, the page shows what was
 // received of its range; the server is asked when it rests.
-import { boxVolume, type Dataset, type Statistics, volumeUnit } from './datasets';
+import { boxVolume, type Dataset, type Statistics, volumeUnit } from '../package/src/datasets';
 import { element, onClick, setText } from './dom';
 import { short } from './format';
-import { boundMoved, enclosedShare, freeRange, type Range, rangesOf } from './range';
+import type { Range } from '../package/src/ranges';
+import { boundMoved, enclosedShare, freeRange, rangesOf } from './range';
 import { type End, kHeight, RangeRow } from './range_row';
-import { kMostRanges, kRangeColors, type StyledRange, type SurfaceStyle, type ViewState } from './state';
+import { kRangeColors } from '../package/src/colors';
+import { kMostRanges, type StyledRange, type SurfaceStyle, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
 

@@ -1,11 +1,12 @@
 // The controls of one range: two number fields, of which an empty one is an infinite bound; two handles on the
 // histogram; and where there are several ranges, its colour, its opacity and a button that removes it.
-import type { Statistics } from './datasets';
+import type { Statistics } from '../package/src/datasets';
 import { create, createSvg, element, setText } from './dom';
 import { short } from './format';
-import { type Range, rounded } from './range';
+import type { Range } from '../package/src/ranges';
+import { rounded } from './range';
 import type { SurfaceStyle } from './state';
-import { clamp } from './vec';
+import { clamp } from '../package/src/vec';
 
 export type End = 0 | 1;
 export const kEnds: readonly End[] = [0, 1];

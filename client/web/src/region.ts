@@ -1,12 +1,12 @@
 // The region of interest: a box in world coordinates that is refined to full detail. Its controls: a switch, six
 // numbers, and seven handles, of its faces and of the whole box.
-import { inViewPlane, ontoViewPlane } from './camera';
+import { inViewPlane, ontoViewPlane } from '../package/src/camera';
 import { create, element, input } from './dom';
 import type { Handle, Handles } from './handles';
-import type { Box, Vec3 } from './messages';
+import type { Box, Vec3 } from '../package/src/messages';
 import type { ViewState } from './state';
 import type { Store } from './store';
-import { add, center, clamp, dot, kAxes, scale, sub } from './vec';
+import { add, center, clamp, dot, kAxes, scale, sub } from '../package/src/vec';
 import type { Viewer } from './viewer';
 
 const kAxisNames = ['X', 'Y', 'Z'];

@@ -1,10 +1,10 @@
 // Saves pictures and meshes as files, and copies links to the view.
 import { create, element, onClick } from './dom';
-import type { MeshFormat, Report } from './messages';
+import type { MeshFormat, Report } from '../package/src/messages';
 import type { Status } from './status';
 import type { Store } from './store';
 import type { Viewer } from './viewer';
-import type { WorkerClient } from './worker_client';
+import type { LiveMesh } from '../package/src/live_mesh';
 
 const kMimeTypes: Record<MeshFormat, string> = { vtu: 'application/xml', stl: 'model/stl', glb: 'model/gltf-binary' };
 const kFormats = Object.keys(kMimeTypes) as MeshFormat[];
@@ -18,7 +18,7 @@ function download(name: string, blob: Blob): void {
 export const downloadMesh = ({ format, name, bytes }: Extract<Report, { type: 'saved' }>): void =>
   download(name, new Blob([bytes], { type: kMimeTypes[format] }));
 
-export function watchSaving(status: Store<Status>, viewer: Viewer, worker: WorkerClient): void {
+export function watchSaving(status: Store<Status>, viewer: Viewer, mesh: LiveMesh): void {
   const note = element('share-note');
   const show = (text: string) => (note.textContent = text);
   onClick('copy-link', async () => {
@@ -38,7 +38,7 @@ export function watchSaving(status: Store<Status>, viewer: Viewer, worker: Worke
   for (const format of kFormats) {
     onClick(`save-${format}`, () => {
       status.set({ saving: format });
-      worker.send({ type: 'save', format });
+      mesh.send({ type: 'save', format });
       show(`Writing .${format}…`);
     });
   }

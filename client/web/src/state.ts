@@ -7,18 +7,16 @@
 // range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe,
 // probe), shrink, color=value, channel (a name), palette (a name),
 // span=low,high, render=volume, opacity=value:opacity,value:opacity,..., and alpha, beta and box (each rrggbb,opacity).
-import { kFov, type Pose } from './camera';
-import type { Box, Plane, Vec3 } from './messages';
+import { kFov, type Pose } from '../package/src/camera';
+import { kRangeColors, kSurfaceColors, kSurfaces, type SurfaceName } from '../package/src/colors';
+import type { Box, Plane, Vec3 } from '../package/src/messages';
 import { type OpacityCurve, readOpacity, writeOpacity } from './opacity';
-import { clamp, cross, length, sub, unit } from './vec';
+import { clamp, cross, length, sub, unit } from '../package/src/vec';
 
 export interface SurfaceStyle {
   color: string; // #rrggbb
   opacity: number; // 0 to 1
 }
-
-export type SurfaceName = 'alpha' | 'beta' | 'box';
-export const kSurfaces: readonly SurfaceName[] = ['alpha', 'beta', 'box']; // the order of the groups in a SurfacePiece
 
 export type Styles = Record<SurfaceName, SurfaceStyle>; // of a range
 
@@ -29,9 +27,6 @@ export interface StyledRange {
   range: [number, number]; // of values, ascending
   style: SurfaceStyle;
 }
-
-// Blue, orange, green and purple: told apart also by people who see few colours.
-export const kRangeColors: readonly string[] = ['#3d7fd6', '#e69f00', '#009e73', '#cc79a7'];
 
 export type ColorBy = 'surface' | 'value';
 export type Render = 'surface' | 'volume';
@@ -58,9 +53,9 @@ export class ViewState {
   span: [number, number] | null = null; // of values with colours of their own, ascending; null: see spanOf()
   render: Render = 'surface'; // volume: all tetrahedra, as a cloud
   opacity: OpacityCurve | null = null; // of values, in volume rendering; null: see defaultOpacity()
-  alpha: SurfaceStyle = { color: '#3d7fd6', opacity: 1 };
-  beta: SurfaceStyle = { color: '#f0862a', opacity: 1 };
-  box: SurfaceStyle = { color: '#d8c49a', opacity: 1 };
+  alpha: SurfaceStyle = { color: kSurfaceColors.alpha, opacity: 1 };
+  beta: SurfaceStyle = { color: kSurfaceColors.beta, opacity: 1 };
+  box: SurfaceStyle = { color: kSurfaceColors.box, opacity: 1 };
 }
 
 export const kDefaults: Readonly<ViewState> = { ...new ViewState() };

@@ -1,6 +1,6 @@
 // The status of the page: what it knows of the server and the mesh. Not part of the address.
-import type { Dataset, Statistics } from './datasets';
-import type { ConnectionState, MeshFormat, Progress } from './messages';
+import type { Dataset, Statistics } from '../package/src/datasets';
+import type { ConnectionState, MeshFormat, Progress } from '../package/src/messages';
 import type { NamedColors } from './palette';
 
 export class Status {

@@ -2,7 +2,7 @@
 // several frames and shown once it is complete.
 import { BufferAttribute, BufferGeometry, Group, InterleavedBuffer, InterleavedBufferAttribute, type Material, type Mesh } from 'three';
 import { tetsDepthMaterial, tetsMaterial, tetsPickMaterial } from './materials';
-import type { Tets } from './messages';
+import type { Tets } from '../package/src/messages';
 import { staticMesh } from './static_mesh';
 import { setValues, type Uploader } from './upload';
 

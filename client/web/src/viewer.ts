@@ -1,14 +1,15 @@
 // Schedules the picture: uploads what the worker sends between frames, draws when something has changed, and reports
 // which version of the boundary surface is shown.
-import { fitted, type Pose } from './camera';
-import type { Dataset } from './datasets';
-import { type Frame, frameOf } from './frame';
+import { fitted, type Pose } from '../package/src/camera';
+import type { Dataset } from '../package/src/datasets';
+import { type Frame, frameOf } from '../package/src/frame';
 import { GpuFence } from './gpu_fence';
-import type { Cap, Report, Volume } from './messages';
+import type { LiveMesh } from '../package/src/live_mesh';
+import type { Cap, Volume } from '../package/src/messages';
 import { Picture, type Probed } from './picture';
 import type { ViewState } from './state';
 import type { Store } from './store';
-import { add, sub } from './vec';
+import { add, sub } from '../package/src/vec';
 
 export class Stats {
   frames = 0; // drawn
@@ -91,14 +92,17 @@ export class Viewer {
     if (pose) this.view.set({ pose: make(pose, clientWidth, clientHeight) });
   }
 
-  // What the worker sends to be drawn; other reports are ignored.
-  take(report: Report): void {
-    if (report.type === 'surface') this.picture.surface.take(report.change);
-    else if (report.type === 'cap') this.pendingCap = report.cap;
-    else if (report.type === 'tets') this.picture.tets.take(report.tets);
-    else if (report.type === 'volume') this.pendingVolume = report.volume;
-    else if (report.type === 'order') this.takeOrder(report.version, report.order);
-    else return;
+  // Shows what arrives of a mesh.
+  watch(mesh: LiveMesh): void {
+    mesh.addEventListener('surface', ({ detail }) => this.take(() => this.picture.surface.take(detail.change)));
+    mesh.addEventListener('cap', ({ detail }) => this.take(() => (this.pendingCap = detail.cap)));
+    mesh.addEventListener('tets', ({ detail }) => this.take(() => this.picture.tets.take(detail.tets)));
+    mesh.addEventListener('volume', ({ detail }) => this.take(() => (this.pendingVolume = detail.volume)));
+    mesh.addEventListener('order', ({ detail }) => this.take(() => this.takeOrder(detail.version, detail.order)));
+  }
+
+  private take(change: () => void): void {
+    change();
     this.schedule();
   }
 

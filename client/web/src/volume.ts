@@ -10,15 +10,15 @@ import {
   BufferAttribute, type Camera, type Color, DataTexture, FloatType, HalfFloatType, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, NearestFilter, RGBAFormat,
   RGBAIntegerFormat, Scene, Texture, UnsignedIntType, Vector2, Vector3, type WebGLRenderer, type WebGLRenderTarget,
 } from 'three';
-import { type Frame } from './frame';
+import { type Frame } from '../package/src/frame';
 import { canvasSizedTarget, fullScreenScene } from './full_screen';
 import { volumeCompositeMaterial, volumeMaterial } from './materials';
-import type { Volume } from './messages';
+import type { Volume } from '../package/src/messages';
 import { kCells, type Look, transferTable } from './opacity';
-import type { Range } from './range';
+import type { Range } from '../package/src/ranges';
 import { kMostRanges } from './state';
 import { kTetTriangles } from './tets';
-import { diagonal } from './vec';
+import { diagonal } from '../package/src/vec';
 
 const kWidth = 4096; // of textures; the same number as in kVolumeVertex
 

@@ -4,12 +4,12 @@ import type { ColorMap } from './color_maps';
 import { create, createSvg, element, input, onClick, setText } from './dom';
 import { count, short } from './format';
 import { defaultOpacity, type OpacityCurve, opacityAt, pointAdded, pointMoved, pointRemoved } from './opacity';
-import { spanOf } from './palette';
-import { type Range, rounded } from './range';
+import { type Range, spanOf } from '../package/src/ranges';
+import { rounded } from './range';
 import { exclusive, type ViewState } from './state';
 import type { Status } from './status';
 import type { Store } from './store';
-import { clamp } from './vec';
+import { clamp } from '../package/src/vec';
 import type { Viewer } from './viewer';
 
 export const kMostVolumeTets = 2e6; // drawn

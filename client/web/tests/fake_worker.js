@@ -1,4 +1,4 @@
-// A fake of the page's worker, for tests without a server: speaks src/messages.ts. Its mesh is the part of a gyroid
+// A fake of the page's worker, for tests without a server: speaks package/src/messages.ts. Its mesh is the part of a gyroid
 // field between two values, clipped from the tetrahedra of successively finer grids. It has one mesh for each range if
 // the page asks for several; else the range is always the same. The data set's name selects a fault: "lost" loses its
 // connection, "broken" fails to open, "full" reaches its memory limit.
@@ -239,6 +239,7 @@ const toSamples = (p) => p.map((x) => x + kSide / 2); // the origin of the world
 function postProgress(done) {
   const updates = [0, 900, 6200, 48000][step + 1];
   post({ type: 'progress', progress: {
+    view: viewNumber,
     bytes: updates * 2.1 + 900, updates, updatesInMesh: updates, updatesShown: updates, tets: sum((mesh) => mesh.tets.length), triangles: 0, updatesToGo: done ? 0 : 48000 - updates,
     remainingError: done ? 0.0123 : 0.4 / (step + 2), remainingPixels: done ? 0.92 : 60 / (step + 2), done, full: name === 'full',
     volumes: meshes.map((mesh) => mesh.tets.reduce((volume, tet) => volume + mesh.volume(tet), 0)), volumeBound: 900 / 4 ** (step + 1), memory: 12.4e6,
@@ -310,10 +311,12 @@ function open(dataset) {
 const palette = (name, color) => ({ name, colours: Uint8Array.from({ length: 768 }, (_, i) => color(Math.floor(i / 3))[i % 3]).buffer });
 post({ type: 'palettes', palettes: [palette('warm', (x) => [x, 0, 255 - x]), palette('green', (x) => [0, x, 0])] });
 
+let viewNumber = 0;
 self.onmessage = ({ data }) => {
   if (data.type === 'open') {
     open(data.dataset);
   } else if (data.type === 'view') {
+    viewNumber = data.number;
     look(data.view);
   } else if (data.type === 'shown' && data.version === version && name !== 'lost') {
     timer = setTimeout(refine, 30);

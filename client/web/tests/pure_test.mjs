@@ -7,12 +7,18 @@ const server = await createServer({
   root: new URL('..', import.meta.url).pathname,
   configFile: false,
   logLevel: 'error',
+  optimizeDeps: { noDiscovery: true },
   server: { middlewareMode: true, hmr: false, ws: false, watch: null },
   appType: 'custom',
 });
-const load = (name) => server.ssrLoadModule(`/src/${name}.ts`);
-const kModules = ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette', 'opacity'];
-const [{ exclusive, fromHash, toHash, kDefaults, stylesOf }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette, opacity] = await Promise.all(kModules.map(load));
+const kOfPackage = ['camera', 'vec', 'frame', 'preview_pace', 'ranges', 'live_mesh', 'pieces'];
+const load = (name) => server.ssrLoadModule(kOfPackage.includes(name) ? `/package/src/${name}.ts` : `/src/${name}.ts`);
+const [
+  { exclusive, fromHash, toHash, kDefaults, stylesOf }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette, opacity, ranges,
+  { addressOf }, { arraysOf },
+] = await Promise.all(
+  ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette', 'opacity', 'ranges', 'live_mesh', 'pieces'].map(load),
+);
 after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
@@ -81,12 +87,12 @@ test('a range is that of the data set, or one within it', () => {
   const every = { range: [-Infinity, Infinity], values: [-1, 5], hasEveryRange: true, hasRangesWithin: true };
   const uniform = { range: [0, 4], values: [-1, 5], hasEveryRange: false, hasRangesWithin: true };
   const one = { ...uniform, hasRangesWithin: false };
-  assert.deepEqual(values.rangeOf(every, null), [2, 5], 'the upper half');
-  assert.deepEqual(values.rangeOf(every, [-9, 1]), [-9, 1]);
-  assert.equal(values.rangeOf(uniform, null), null);
-  assert.deepEqual(values.rangeOf(uniform, [-9, 1]), [0, 1]);
-  assert.deepEqual(values.rangeOf(uniform, [7, 9]), [4, 4]);
-  assert.equal(values.rangeOf(one, [1, 2]), null);
+  assert.deepEqual(ranges.rangeOf(every, null), [2, 5], 'the upper half');
+  assert.deepEqual(ranges.rangeOf(every, [-9, 1]), [-9, 1]);
+  assert.equal(ranges.rangeOf(uniform, null), null);
+  assert.deepEqual(ranges.rangeOf(uniform, [-9, 1]), [0, 1]);
+  assert.deepEqual(ranges.rangeOf(uniform, [7, 9]), [4, 4]);
+  assert.equal(ranges.rangeOf(one, [1, 2]), null);
   assert.deepEqual(values.boundMoved([1, 2], 0, 3), [3, 3]);
   assert.deepEqual(values.boundMoved([1, 2], 1, 0), [0, 0]);
   assert.deepEqual(values.boundMoved([1, 2], 1, Infinity), [1, Infinity]);
@@ -116,13 +122,13 @@ test('one more range lies in the middle of the widest part that no range has', (
 test('the span of colours is the part of the range that the values reach, unless it is set', () => {
   const every = { range: [-Infinity, Infinity], values: [-1, 5], hasEveryRange: true, hasRangesWithin: true };
   const one = { range: [2, Infinity], values: [-1, 5], hasEveryRange: false, hasRangesWithin: false };
-  assert.deepEqual(palette.spanOf(every, [[2, 5]], null), [2, 5]);
-  assert.deepEqual(palette.spanOf(every, [[-3, 1]], null), [-1, 1]);
-  assert.deepEqual(palette.spanOf(every, [[-Infinity, Infinity]], null), [-1, 5]);
-  assert.deepEqual(palette.spanOf(every, [[8, 9]], null), [5, 5]);
-  assert.deepEqual(palette.spanOf(every, [[3, 4], [0, 1]], null), [0, 4], 'of all ranges');
-  assert.deepEqual(palette.spanOf(one, [], null), [2, 5], 'this one shows its own range only');
-  assert.deepEqual(palette.spanOf(every, [[1, 2]], [-7, 99]), [-7, 99]);
+  assert.deepEqual(ranges.spanOf(every, [[2, 5]], null), [2, 5]);
+  assert.deepEqual(ranges.spanOf(every, [[-3, 1]], null), [-1, 1]);
+  assert.deepEqual(ranges.spanOf(every, [[-Infinity, Infinity]], null), [-1, 5]);
+  assert.deepEqual(ranges.spanOf(every, [[8, 9]], null), [5, 5]);
+  assert.deepEqual(ranges.spanOf(every, [[3, 4], [0, 1]], null), [0, 4], 'of all ranges');
+  assert.deepEqual(ranges.spanOf(one, [], null), [2, 5], 'this one shows its own range only');
+  assert.deepEqual(ranges.spanOf(every, [[1, 2]], [-7, 99]), [-7, 99]);
   for (const channel of [null, 'heat', 'T & v=1, é']) assert.equal(fromHash(toHash({ ...kDefaults, channel })).channel, channel);
   for (const span of [[0, 0], [1 / 3, 1e-9 + 1 / 3], [-1e30, 5e-324]]) assert.deepEqual(fromHash(toHash({ ...kDefaults, span })).span, span);
 });
@@ -339,4 +345,29 @@ test('a transfer table has rates and their integrals; what is hidden has none', 
   // The integral of -log(1 - x / 2) from 0 to 1
   assertNear(sum(table, cells)[3], 1 - Math.log(2));
   assert.deepEqual([sum(half, cells / 2), rate(half, cells / 2), rate(half, cells)], [[0, 0, 0, 0], [0, 0, 0, 0], rate(table, cells)]);
+});
+
+test('the address of a data set has a server and a name', () => {
+  const parts = (text) => {
+    const { base, name } = addressOf(text);
+    return [base.href, name];
+  };
+  assert.deepEqual(parts('ws://h:8080/scan'), ['http://h:8080/', 'scan']);
+  assert.deepEqual(parts('wss://h/below/a%20b'), ['https://h/below/', 'a b']);
+  assert.deepEqual(parts('https://h/scan?x=1#y'), ['https://h/', 'scan']);
+  for (const wrong of ['h', 'ftp://h/scan', 'ws://h', 'ws://h/below/', 'ws://h/%zz', 'ws://h/%ff', '']) assert.throws(() => addressOf(wrong), TypeError, wrong);
+});
+
+test('arrays of a piece are in the world, relative to the origin', () => {
+  const vertices = new ArrayBuffer(32);
+  new Float32Array(vertices).set([1, 2, 3, 0, -4, 5, 6]);
+  new Int8Array(vertices).set([127, 0, -127, 200], 12);
+  new Int8Array(vertices).set([-1, 2, 3, 7], 28);
+  const affine = [0, 2, 0, 10, 3, 0, 0, 20, 0, 0, -1, 30];
+  const indices = Uint32Array.of(0, 1, 0).buffer;
+  const arrays = arraysOf({ vertices, indices, values: null, triangles: [0, 1, 0] }, affine, [1, 1, 1]);
+  assert.deepEqual([...arrays.positions], [13, 22, 26, 19, 7, 23]);
+  assert.deepEqual([...arrays.normals], [127, 0, -127, 0, -1, 2, 3, 0]);
+  assert.deepEqual([...arrays.levels], [200, 7]);
+  assert.deepEqual([[...arrays.indices], arrays.values, arrays.groups], [[0, 1, 0], null, [0, 1, 0]]);
 });

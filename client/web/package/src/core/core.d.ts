@@ -1,6 +1,5 @@
-// The client core as the module '@core/core.js': what core/bindings.cpp binds. INTERVALE_CORE_DIR says where it is when
-// the page is built; tsconfig.json gives it these types.
-import type { Box, Cap, Palette, Plane, Progress, SurfaceChange, Tets, Vec3, View, Volume } from './messages';
+// The client core, as client/web/core/bindings.cpp binds it. The build puts core.js and core.wasm beside this file.
+import type { Box, Cap, Palette, Plane, Progress, SurfaceChange, Tets, Vec3, View, Volume } from '../messages.js';
 
 // Times are milliseconds of performance.now(). A returned text is an error; an empty one means success.
 export interface Viewer {
@@ -18,7 +17,7 @@ export interface Viewer {
   faultCode(): number; // the close code of an error that the server reported; else 1000
   updates(): number;
   done(): boolean;
-  progress(): Omit<Progress, 'surfaceVersion' | 'memory' | 'busy'>;
+  progress(): Omit<Progress, 'view' | 'surfaceVersion' | 'memory' | 'busy'>;
   // Whether pieces, caps and tetrahedra have values, the field's or a channel's, from the next updateSurface() on; if so, that must be of all.
   wantValues(wanted: boolean, channel: string): void;
   // all: every piece, changed or not. isOtherMesh: tetrahedra changed, perhaps only some inside.

@@ -1,29 +1,42 @@
 // The worker: loads the client core and hands the page's requests to the open session.
-import createCore from '@core/core.js';
-import wasmUrl from '@core/core.wasm?url';
+import createCore, { type Core } from './core/core.js';
 
-import type { Report, Request, View } from './messages';
-import { type Extras, StreamSession } from './stream_session';
+import type { Report, Request, View } from './messages.js';
+import { type Extras, StreamSession } from './stream_session.js';
 
 const scope = self as unknown as DedicatedWorkerGlobalScope;
 const report = (message: Report, transfer: Transferable[] = []) => scope.postMessage(message, transfer);
 
-const core = createCore({ locateFile: () => wasmUrl });
+let core: Promise<Core> | null = null; // since the first request
 let session: StreamSession | null = null;
 let view: View | null = null;
+let viewNumber = 0; // of it
 const extras: Extras = { edges: false, values: false, plane: null, box: null, volume: false };
 
+function load(wasmUrl: string | null): Promise<Core> {
+  const loading = createCore({ locateFile: () => wasmUrl ?? new URL('./core/core.wasm', import.meta.url).href });
+  loading.then(
+    (loaded) => report({ type: 'palettes', palettes: loaded.palettes() }),
+    (error: unknown) => report({ type: 'error', text: `The client core cannot be loaded: ${String(error)}` }),
+  );
+  return loading;
+}
+
 async function handle(request: Request): Promise<void> {
+  core ??= load(request.type === 'load' ? request.wasmUrl : null);
   const loaded = await core;
   switch (request.type) {
+    case 'load':
+      return;
     case 'open':
       session?.close();
       session = new StreamSession(loaded, request, extras, report);
-      if (view) session.look(view);
+      if (view) session.look(view, viewNumber);
       return;
     case 'view':
       view = request.view;
-      return session?.look(view);
+      viewNumber = request.number;
+      return session?.look(view, viewNumber);
     case 'preview':
       return session ? session.preview(request.ranges) : report({ type: 'preview' });
     case 'clip':
@@ -59,7 +72,3 @@ scope.onmessage = ({ data }: MessageEvent<Request>) => {
   const failed = (error: unknown) => report({ type: 'error', text: `The client core failed: ${String(error)}` });
   last = last.then(() => handle(data)).catch(failed);
 };
-core.then(
-  (loaded) => report({ type: 'palettes', palettes: loaded.palettes() }),
-  (error: unknown) => report({ type: 'error', text: `The client core cannot be loaded: ${String(error)}` }),
-);

@@ -1,5 +1,5 @@
 // Vectors of three doubles, and boxes: for cameras and planes.
-import type { Affine, Box, Vec3 } from './messages';
+import type { Affine, Box, Vec3 } from './messages.js';
 
 export const kAxes: readonly Vec3[] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 export const clamp = (x: number, least: number, greatest: number): number => Math.min(greatest, Math.max(least, x));

@@ -1,8 +1,8 @@
 // The coordinate frame of the graphics card ("drawing space"): world coordinates relative to the centre of the data, so
 // that float32 is precise enough wherever the data lies.
-import type { Dataset } from './datasets';
-import type { Affine, Box, Vec3 } from './messages';
-import { applied, boxAround, center, corners, length, sub } from './vec';
+import type { Dataset } from './datasets.js';
+import type { Affine, Box, Vec3 } from './messages.js';
+import { applied, boxAround, center, corners, length, sub } from './vec.js';
 
 export interface Frame {
   affine: Affine; // from samples to the world

@@ -1,6 +1,7 @@
-// The list of the server's data sets: GET api/datasets, relative to the page.
-import type { Affine, Vec3 } from './messages';
-import { cross, dot, scale } from './vec';
+// The list of a server's data sets, and what it tells of each. base: the server's address, "https://host:port/"; paths
+// below it may be given, too.
+import type { Affine, Vec3 } from './messages.js';
+import { cross, dot, scale } from './vec.js';
 
 export interface Dataset {
   name: string;
@@ -39,8 +40,8 @@ export interface Statistics {
 export type Listing = { datasets: Dataset[] } | { needsToken: true } | { error: string };
 
 // token: null if the user has given none.
-export async function listDatasets(token: string | null): Promise<Listing> {
-  const url = new URL('api/datasets', document.baseURI);
+export async function listDatasets(base: string | URL, token: string | null = null): Promise<Listing> {
+  const url = new URL('api/datasets', base);
   try {
     const response = await fetch(url, token === null ? {} : { headers: { Authorization: `Bearer ${token}` } });
     if (response.status === 401) return { needsToken: true };
@@ -64,8 +65,8 @@ export function boxVolume({ dims, affine }: Dataset): number {
 }
 
 // null: the data set has none, or the server did not send them.
-export async function fetchStatistics({ name, values }: Dataset, token: string | null): Promise<Statistics | null> {
-  const url = new URL(`api/datasets/${encodeURIComponent(name)}`, document.baseURI);
+export async function fetchStatistics(base: string | URL, { name, values }: Dataset, token: string | null = null): Promise<Statistics | null> {
+  const url = new URL(`api/datasets/${encodeURIComponent(name)}`, base);
   try {
     const response = await fetch(url, token === null ? {} : { headers: { Authorization: `Bearer ${token}` } });
     const body = response.ok ? ((await response.json()) as Record<string, unknown>) : {};
@@ -80,11 +81,11 @@ export async function fetchStatistics({ name, values }: Dataset, token: string |
   }
 }
 
-// The address of the WebSocket, relative to the page.
-export function streamUrl(): string {
-  const url = new URL('v1/stream', document.baseURI);
+// The address of the server's WebSocket.
+export function streamUrl(base: string | URL): string {
+  const url = new URL('v1/stream', base);
   url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
-  url.hash = '';
+  url.hash = url.search = '';
   return url.href;
 }
 

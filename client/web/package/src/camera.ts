@@ -1,6 +1,6 @@
 // Cameras and how they move: pure functions, world coordinates. Pixels are CSS pixels of the canvas.
-import type { Box, Vec3 } from './messages';
-import { add, along, center, corners, cross, dot, length, rotated, scale, sub, unit } from './vec';
+import type { Box, Vec3 } from './messages.js';
+import { add, along, center, corners, cross, dot, length, rotated, scale, sub, unit } from './vec.js';
 
 // A camera at eye that looks at lookAt; up need not be perpendicular to that direction.
 export interface Pose {

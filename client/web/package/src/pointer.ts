@@ -1,12 +1,16 @@
 // Mouse, pen and touch on the canvas: rotate, pan, zoom, roll.
-import { orbited, panned, rolled, zoomed } from './camera';
-import { clamp } from './vec';
-import type { Viewer } from './viewer';
+import { orbited, panned, type Pose, rolled, zoomed } from './camera.js';
+import { clamp } from './vec.js';
 
 const kRotation = Math.PI; // radians, for a drag across the canvas's shorter side
 const kWheel = 0.0016; // natural logarithm of the zoom factor, per pixel of the wheel
 
-export function watchPointers(canvas: HTMLCanvasElement, viewer: Viewer): void {
+export interface Moved {
+  move(make: (pose: Pose, width: number, height: number) => Pose): void; // from where the camera is, and the size of the canvas, CSS pixels
+  centerOn?(x: number, y: number): void; // makes what is drawn there, CSS pixels of the canvas, the centre of rotation
+}
+
+export function watchPointers(canvas: HTMLCanvasElement, viewer: Moved): void {
   const down = new Map<number, { x: number; y: number }>();
 
   const fromCenter = (x: number, y: number): [number, number] => {
@@ -65,6 +69,6 @@ export function watchPointers(canvas: HTMLCanvasElement, viewer: Viewer): void {
 
   canvas.addEventListener('dblclick', (event) => {
     const box = canvas.getBoundingClientRect();
-    viewer.centerOn(event.clientX - box.left, event.clientY - box.top);
+    viewer.centerOn?.(event.clientX - box.left, event.clientY - box.top);
   });
 }

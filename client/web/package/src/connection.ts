@@ -1,5 +1,5 @@
 // The WebSocket to the server: connects, and reconnects when the connection is lost or could not be made.
-import type { ConnectionState } from './messages';
+import type { ConnectionState } from './messages.js';
 
 // The wait before an attempt: doubles from the first to the longest; then between half and all of it, at random.
 const kFirstWaitMs = 100;

@@ -1,12 +1,12 @@
-// A data set that is streamed to the page: feeds the client core with messages, and sends the page the mesh's changes.
+// A data set that is streamed, in the worker: feeds the client core with messages, and sends the page the mesh's changes.
 //
 // All messages that have arrived are applied before a new version of the surface is made, and that only after the page
 // has shown the last one. Making versions takes at most about half of the time, so as not to slow down a fast stream.
-import type { Core, Viewer } from '@core/core.js';
+import type { Core, Viewer } from './core/core.js';
 
-import { Connection, kGoingAway } from './connection';
-import type { Box, MeshFormat, Plane, Report, Request, Vec3, View } from './messages';
-import { PreviewPace } from './preview_pace';
+import { Connection, kGoingAway } from './connection.js';
+import type { Box, MeshFormat, Plane, Report, Request, Vec3, View } from './messages.js';
+import { PreviewPace } from './preview_pace.js';
 
 const kSurfaceIntervalMs = 40; // least time between two versions
 const kProgressIntervalMs = 100;
@@ -45,6 +45,7 @@ export class StreamSession {
   private volume: { version: number; eye: Vec3 } | null = null; // the last one sent, and the eye of its last order
 
   private channel: string | null = null; // of the last view
+  private viewNumber = 0; // the same
   private progressTime = 0; // when it was last reported
   private progressTimer = 0;
   private busy = { updates: 0, seconds: 0 };
@@ -68,8 +69,9 @@ export class StreamSession {
     });
   }
 
-  // Connects with the first view.
-  look(view: View): void {
+  // Connects with the first view. number: for the progress.
+  look(view: View, number: number): void {
+    this.viewNumber = number;
     this.endPreview();
     const ranges = JSON.stringify(view.ranges);
     const isOtherRange = ranges !== this.ranges;
@@ -253,8 +255,8 @@ export class StreamSession {
     const progress = this.viewer.progress();
     const done = progress.done && !this.isChanged; // not before the complete surface was sent
     const memory = this.core.HEAPU8.byteLength;
-    const { version: surfaceVersion, busy } = this;
-    this.report({ type: 'progress', progress: { ...progress, done, surfaceVersion, memory, busy: { ...busy } } });
+    const { version: surfaceVersion, busy, viewNumber: view } = this;
+    this.report({ type: 'progress', progress: { ...progress, view, done, surfaceVersion, memory, busy: { ...busy } } });
   }
 
   private scheduleSurface(): void {

@@ -3,7 +3,7 @@
 //
 // Positions are in samples (0 at the first, dims - 1 at the last) unless said otherwise, so that float32 is precise
 // enough; the data set's affine takes them to the world. Cameras, planes and boxes are in world coordinates.
-import type { Pose } from './camera';
+import type { Pose } from './camera.js';
 
 export type Vec3 = [number, number, number];
 
@@ -26,11 +26,12 @@ export type MeshFormat = 'vtu' | 'stl' | 'glb';
 
 // From the page to the worker.
 export type Request =
+  | { type: 'load'; wasmUrl: string | null } // the first: loads the core; null: from where it lies beside the worker
   // Connects and streams; an open session is closed first. url: of the WebSocket, "ws://host:port/v1/stream".
   | { type: 'open'; url: string; dataset: string; token?: string }
   // The view that is wanted from now on. With a region: that at full detail. Without: everything, until the error is at
   // most pixelError on the camera's screen. Before the first 'open': the view that the session starts with.
-  | { type: 'view'; view: View }
+  | { type: 'view'; view: View; number: number } // number: for Progress.view
   // Shown until the next 'view', of what was received; the server is not asked. If all of it would take too long, the
   // ranges that differ from the view's are coarser. Answered by a report of the same type once its surface was sent, which the page's showing of the last one
   // precedes; or without one where there is no mesh, or a 'view' came before.
@@ -85,6 +86,7 @@ export type ConnectionState =
   | { state: 'closed' };
 
 export interface Progress {
+  view: number; // the number of the last 'view'; 0: it had none
   bytes: number; // received, of messages
   updates: number; // received
   updatesInMesh: number; // those that change the surfaces, and their ancestors
