@@ -49,7 +49,7 @@ inline constexpr float kMaxFarDeviation = 64;
 [[nodiscard]] double diamond_width(const Grid& grid);
 
 // Slopes: how much squared deviation an update takes away from the surface, together with the descendants that it makes
-// way for, for each of these updates (server/builder/update_slopes.h). In squares of the least spacing of samples, on a
+// way for, for each of these updates (common/ranges/update_slopes.h). In squares of the least spacing of samples, on a
 // scale of logarithms: 1 to 14 are 2^(1.5 (slope - 7)), the nearest of them; 0 is nothing, and kMaxSlope is not measured
 // and comes before all others.
 inline constexpr unsigned kMaxSlope = 15;

@@ -14,9 +14,9 @@
 #include "common/api/mesh_request.h"
 #include "common/ivm/value_histogram.h"
 #include "common/mesh/mesh.h"
+#include "common/patch/volume.h"
 #include "common/util/export.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

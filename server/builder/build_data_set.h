@@ -8,9 +8,9 @@
 
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/value_volume.h"
+#include "common/patch/volume.h"
 #include "common/util/result.h"
 #include "server/builder/field_hierarchy.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

@@ -7,8 +7,8 @@
 #include "common/diamond/supercube.h"
 #include "common/ivm/value_keys.h"
 #include "common/patch/channel.h"
+#include "common/patch/volume.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

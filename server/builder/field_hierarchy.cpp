@@ -12,17 +12,17 @@
 #include "common/ivm/saturate.h"
 #include "common/ivm/value_page.h"
 #include "common/patch/tet_cases.h"
+#include "common/patch/visit_samples.h"
+#include "common/ranges/error_to_distance.h"
+#include "common/ranges/interpolation_error.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
 #include "server/builder/all_cores.h"
 #include "server/builder/error_steps.h"
-#include "server/builder/error_to_distance.h"
 #include "server/builder/find_keys.h"
-#include "server/builder/interpolation_error.h"
 #include "server/builder/relevance.h"
 #include "server/builder/supercube_family.h"
 #include "server/builder/value_steps.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -16,8 +16,8 @@
 #include "common/ivm/interval_volume.h"
 #include "common/patch/description.h"
 #include "common/patch/range.h"
-#include "server/builder/border_shape.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
+#include "common/ranges/border_shape.h"
 
 namespace intervale {
 

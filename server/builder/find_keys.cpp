@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "common/diamond/domain.h"
+#include "common/patch/visit_samples.h"
 #include "common/util/bits.h"
 #include "server/builder/value_steps.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

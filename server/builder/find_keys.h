@@ -5,7 +5,7 @@
 
 #include "common/diamond/supercube.h"
 #include "common/ivm/value_keys.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale {
 

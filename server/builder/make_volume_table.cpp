@@ -13,10 +13,10 @@
 #include <span>
 #include <utility>
 
+#include "common/patch/visit_samples.h"
 #include "server/builder/cell_tets.h"
 #include "server/builder/sample_range.h"
 #include "server/builder/volume_positions.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

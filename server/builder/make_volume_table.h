@@ -2,7 +2,7 @@
 #pragma once
 
 #include "common/ivm/volume_table.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale {
 

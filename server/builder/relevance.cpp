@@ -12,8 +12,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/patch/visit_samples.h"
 #include "common/util/bits.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -15,8 +15,8 @@
 #include "common/diamond/domain.h"
 #include "common/diamond/supercube.h"
 #include "common/patch/range.h"
-#include "server/builder/border_shape.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
+#include "common/ranges/border_shape.h"
 
 namespace intervale {
 

@@ -7,7 +7,7 @@
 #include <array>
 #include <cstddef>
 
-#include "server/volume/visit_samples.h"
+#include "common/patch/visit_samples.h"
 
 namespace intervale {
 SampleRange sample_range(const Volume& volume) {

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale {
 

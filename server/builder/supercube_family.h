@@ -6,7 +6,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/diamond/supercube.h"
-#include "server/builder/border_shape.h"
+#include "common/ranges/border_shape.h"
 
 namespace intervale {
 

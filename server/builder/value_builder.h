@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "common/ivm/value_volume.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale {
 

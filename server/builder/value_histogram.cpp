@@ -10,9 +10,9 @@
 #include <functional>
 #include <span>
 
+#include "common/patch/visit_samples.h"
 #include "server/builder/sample_range.h"
 #include "server/builder/value_steps.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

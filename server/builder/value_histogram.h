@@ -2,7 +2,7 @@
 #pragma once
 
 #include "common/ivm/value_volume.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale {
 

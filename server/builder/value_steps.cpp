@@ -15,10 +15,10 @@
 #include <type_traits>
 #include <utility>
 
+#include "common/patch/visit_samples.h"
 #include "common/util/decimal.h"
 #include "server/builder/exact_step.h"
 #include "server/builder/sample_range.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/patch/value_format.h"
+#include "common/patch/volume.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/patch/visit_samples.h"
 #include "server/builder/cell_tets.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

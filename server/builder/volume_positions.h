@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale {
 

@@ -13,6 +13,7 @@
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/value_file.h"
+#include "common/patch/visit_samples.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
@@ -21,7 +22,6 @@
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"
-#include "server/volume/visit_samples.h"
 #include "server/volume/volume_header.h"
 
 namespace intervale {

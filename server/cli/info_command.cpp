@@ -11,10 +11,10 @@
 #include "common/ivm/verify.h"
 #include "common/mesh/mesh.h"
 #include "common/program/range_option.h"
+#include "common/ranges/find_relevant_updates.h"
 #include "common/util/printable.h"
 #include "common/view/lod.h"
 #include "server/builder/all_cores.h"
-#include "server/builder/find_relevant_updates.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"
@@ -47,7 +47,7 @@ Result<double> enclosed_volume(const std::shared_ptr<const ValueVolume>& set, co
 Result<double> enclosed_volume(const std::shared_ptr<const IntervalVolume>& set, const Range& range) {
   const ShownRange shown = resolve(set->description(), range, {});
   if (auto held = check_held(set->description(), shown); !held) return tl::unexpected(held.error());
-  const auto extracted = extract(*set, *find_relevant_updates(set, {shown}, Distances::none), {}, on_all_cores);
+  const auto extracted = extract(*set, *find_relevant_updates(set, {shown}, Distances::none, on_all_cores), {}, on_all_cores);
   if (!extracted) return tl::unexpected(extracted.error());
   return volume_of(extracted->front.mesh(on_all_cores));
 }

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/patch/visit_samples.h"
 #include "common/util/printable.h"
 #include "server/readers/dicom_series.h"
 #include "server/readers/reader_program.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include "common/patch/visit_samples.h"
 #include "server/volume/header_bytes.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/program/describe.h"
+#include "protocol/session/data_set_json.h"
 
 namespace intervale {
 namespace {
@@ -29,18 +30,6 @@ std::string datasets_json(const Catalogue& catalogue, const Scope& scope) {
     if (scope.allows(name)) datasets.push_back(to_json(volume->description()));
   }
   return nlohmann::ordered_json{{"datasets", std::move(datasets)}}.dump() + "\n";
-}
-
-// As in the list, and what there is of statistics.
-std::string dataset_json(const IntervalVolume& volume) {
-  nlohmann::ordered_json json = to_json(volume.description());
-  if (const FieldStatistics* statistics = volume.statistics()) {
-    json["histogram"] = statistics->histogram.count;
-    json["histogram_width"] = statistics->histogram.width;
-    const VolumeTable& volumes = statistics->volumes;
-    json["volumes"] = {{"values", volumes.position}, {"below", volumes.below}, {"not_above", volumes.not_above}};
-  }
-  return json.dump() + "\n";
 }
 
 std::string front_page(const Catalogue& catalogue, const Scope* scope) {
@@ -119,7 +108,7 @@ HttpResponse datasets_response(const HttpRequest& request, const HttpState& stat
   if (path.size() == kList.size()) return ok(kJson, datasets_json(state.catalogue, *request.scope));
   const std::string name(path.substr(kList.size() + 1));
   const auto volume = request.scope->allows(name) ? state.catalogue.find(name) : nullptr;
-  return volume ? ok(kJson, dataset_json(*volume)) : text_response(404, "no such data set; see /api/datasets");
+  return volume ? ok(kJson, data_set_json(*volume)) : text_response(404, "no such data set; see /api/datasets");
 }
 
 bool is_known(std::string_view path, const HttpState& state) {

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
-#include "server/builder/find_relevant_updates.h"
+#include "protocol/session/session_worker.h"
 #include "server/serve/fair_scheduler.h"
 #include "server/serve/memory.h"
 
@@ -29,7 +29,7 @@ namespace intervale {
 class RangeCache {
  public:
   using Volume = std::shared_ptr<const IntervalVolume>;
-  using Relevant = std::shared_ptr<const RelevantUpdates>;
+  using Relevant = RangeAnswer::Relevant;
   using Find = std::function<Relevant(PartFinder& finder, const RangePart& part)>;
 
   using Payer = std::shared_ptr<FairScheduler::Account>;
@@ -41,14 +41,11 @@ class RangeCache {
   RangeCache& operator=(const RangeCache&) = delete;
   ~RangeCache() { stop(); }
 
-  // What one range needs, once it is found.
-  class Answer {
+  class Answer : public RangeAnswer {
    public:
-    [[nodiscard]] bool is_ready() const { return result_.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }
-    // No distances have to be measured for it.
-    [[nodiscard]] bool is_soon() const { return is_soon_; }
-    // Waits for it. Throws what prevented it, for example that memory is exhausted.
-    [[nodiscard]] Relevant result() const { return result_.get(); }
+    [[nodiscard]] bool is_ready() const override { return result_.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }
+    [[nodiscard]] bool is_soon() const override { return is_soon_; }
+    [[nodiscard]] Relevant result() const override { return result_.get(); }
 
    private:
     friend class RangeCache;
@@ -68,9 +65,7 @@ class RangeCache {
     std::shared_future<Relevant> result_ = promise_.get_future().share();
     std::function<void()> on_ready_;
   };
-  // shown: as distinct() gives them, one at least. Some distances may be better known than asked for. Nothing is found for
-  // answers that are released before their turn. on_ready: called once an answer that was not ready is, on another thread,
-  // without any lock held.
+  // As SessionWorker::ask(). on_ready: called once an answer that was not ready is, on another thread, without any lock held.
   [[nodiscard]] std::shared_ptr<const Answer> ask(const Volume& volume, const ShownRanges& shown, Distances distances, Payer payer,
                                                   std::function<void()> on_ready);
 

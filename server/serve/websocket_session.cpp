@@ -16,7 +16,7 @@
 #include "protocol/transport/await.h"
 #include "server/serve/admission.h"
 #include "server/serve/log.h"
-#include "server/serve/session_state.h"
+#include "server/serve/session_threads.h"
 #include "server/serve/view_timing.h"
 
 namespace intervale {
@@ -54,7 +54,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         read_delay_(ws_.get_executor()),
         context_(context),
         peer_(std::move(peer)),
-        state_(context.catalogue, context.ranges, context.background, peer_.scope, peer_.account),
+        threads_(context.ranges, context.background, peer_.account),
+        state_(find_granted(context.catalogue, peer_.scope), threads_),
         flow_(peer_.account),
         messages_(context.options.messages_per_second),
         views_(context.options.views_per_second),
@@ -80,7 +81,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     const auto endpoint = beast::get_lowest_layer(ws_).socket().remote_endpoint(ignored);
     log_session(id_, spdlog::level::info, "from {}:{}", endpoint.address().to_string(), endpoint.port());
     registration_ = context_.connections.add(shared_from_this());
-    state_.set_wake([weak = weak_from_this()] {
+    threads_.set_wake([weak = weak_from_this()] {
       if (const auto self = weak.lock()) asio::post(self->ws_.get_executor(), [self] { self->writer_wakeup_.cancel(); });
     });
     spawn(run(shared_from_this(), request));
@@ -372,6 +373,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   asio::steady_timer read_delay_;  // the reader waits on it
   ServerContext& context_;
   Peer peer_;
+  SessionThreads threads_;
   SessionState state_;
   FairScheduler::Flow flow_;
   Clock::duration unscheduled_{0};                                                        // work of the reader since it had a worker

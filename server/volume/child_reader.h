@@ -12,8 +12,8 @@
 #include <optional>
 #include <string>
 
+#include "common/patch/volume.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 #include "server/volume/volume_header.h"
 
 namespace intervale {

@@ -8,8 +8,8 @@
 #include <span>
 #include <string>
 
+#include "common/patch/volume.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

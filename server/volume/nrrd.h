@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
+#include "common/patch/volume.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

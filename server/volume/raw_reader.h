@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <string_view>
 
+#include "common/patch/volume.h"
 #include "common/util/export.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

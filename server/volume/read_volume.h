@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
+#include "common/patch/volume.h"
 #include "common/util/export.h"
 #include "common/util/result.h"
 #include "server/volume/raw_reader.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

@@ -4,9 +4,9 @@
 #include <span>
 #include <string_view>
 
+#include "common/patch/volume.h"
 #include "common/util/export.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

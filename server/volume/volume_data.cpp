@@ -12,8 +12,8 @@
 #include <system_error>
 #include <utility>
 
+#include "common/patch/visit_samples.h"
 #include "server/volume/decoder.h"
-#include "server/volume/visit_samples.h"
 #include "server/volume/volume_header.h"
 
 namespace intervale {

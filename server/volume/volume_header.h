@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "common/patch/volume.h"
 #include "common/util/result.h"
 #include "server/volume/input_file.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

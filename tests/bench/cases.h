@@ -9,8 +9,8 @@
 
 #include "common/patch/description.h"
 #include "common/patch/value_format.h"
+#include "common/patch/volume.h"
 #include "common/util/result.h"
-#include "server/volume/volume.h"
 
 namespace intervale::bench {
 

@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "common/diamond/supercube.h"
+#include "common/patch/visit_samples.h"
+#include "common/ranges/border_shape.h"
+#include "common/ranges/interpolation_error.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
-#include "server/builder/border_shape.h"
 #include "server/builder/find_keys.h"
-#include "server/builder/interpolation_error.h"
-#include "server/volume/visit_samples.h"
 #include "tests/bench/cases.h"
 
 namespace intervale::bench {

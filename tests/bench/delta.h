@@ -16,7 +16,7 @@
 
 #include "common/front/front.h"
 #include "common/patch/description.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale::bench {
 

@@ -13,9 +13,9 @@
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
 #include "common/mesh/io/mesh_writer.h"
+#include "common/patch/visit_samples.h"
 #include "common/program/program.h"
 #include "server/builder/field_hierarchy.h"
-#include "server/volume/visit_samples.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/timing.h"
 

@@ -13,10 +13,10 @@
 
 #include "client/view/boundary_surface.h"
 #include "common/front/front.h"
+#include "common/patch/visit_samples.h"
+#include "common/ranges/border_shape.h"
 #include "common/util/bits.h"
-#include "server/builder/border_shape.h"
 #include "server/builder/relevance.h"
-#include "server/volume/visit_samples.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/timing.h"
 

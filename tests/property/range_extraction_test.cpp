@@ -8,8 +8,8 @@
 
 #include "common/ivm/every_range.h"
 #include "common/mesh/mesh_digest.h"
+#include "common/ranges/find_relevant_updates.h"
 #include "server/builder/field_hierarchy.h"
-#include "server/builder/find_relevant_updates.h"
 #include "server/builder/value_builder.h"
 #include "tests/support/coverage.h"
 #include "tests/support/mesh_laws.h"

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "server/volume/visit_samples.h"
-#include "server/volume/volume.h"
+#include "common/patch/visit_samples.h"
+#include "common/patch/volume.h"
 
 namespace intervale::testing {
 

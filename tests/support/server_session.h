@@ -20,7 +20,7 @@
 #include "server/serve/background.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/range_cache.h"
-#include "server/serve/session_state.h"
+#include "server/serve/session_threads.h"
 
 namespace intervale::testing {
 
@@ -42,8 +42,9 @@ struct SharedByServer {
 class ServerSession {
  public:
   explicit ServerSession(SharedByServer& shared)
-      : state_(shared.catalogue, shared.ranges, shared.background, Scope::everything(), std::make_shared<FairScheduler::Account>()) {
-    state_.set_wake([wake = wake_] {
+      : threads_(shared.ranges, shared.background, std::make_shared<FairScheduler::Account>()),
+        state_(find_granted(shared.catalogue, Scope::everything()), threads_) {
+    threads_.set_wake([wake = wake_] {
       const std::lock_guard lock(wake->mutex);
       ++wake->count;
       wake->changed.notify_one();
@@ -118,6 +119,7 @@ class ServerSession {
   }
 
   std::shared_ptr<Wake> wake_ = std::make_shared<Wake>();
+  SessionThreads threads_;
   SessionState state_;
   std::uint64_t updates_ = 0, sequence_ = 0;
 };

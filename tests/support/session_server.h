@@ -15,7 +15,7 @@
 #include "server/serve/access.h"
 #include "server/serve/atomic_shared_ptr.h"
 #include "server/serve/catalogue.h"
-#include "server/serve/session_state.h"
+#include "server/serve/session_threads.h"
 
 namespace intervale::testing {
 
@@ -29,7 +29,7 @@ class SessionServer {
     Catalogue catalogue;
     EXPECT_TRUE(catalogue.add(volume));
     catalogue_.store(std::make_shared<const Catalogue>(std::move(catalogue)));
-    state_.set_wake([this] {
+    threads_.set_wake([this] {
       const std::lock_guard lock(mutex_);
       ++wakes_;
       woken_.notify_one();
@@ -85,7 +85,8 @@ class SessionServer {
   FairScheduler scheduler_{1};
   RangeCache ranges_;
   Background background_{scheduler_, memory_, 1};
-  SessionState state_{catalogue_, ranges_, background_, Scope::everything(), std::make_shared<FairScheduler::Account>()};
+  SessionThreads threads_{ranges_, background_, std::make_shared<FairScheduler::Account>()};
+  SessionState state_{find_granted(catalogue_, Scope::everything()), threads_};
   Client& client_;
   std::vector<protocol::ClientMessage> received_;
   bool resumed_ = false;

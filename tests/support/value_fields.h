@@ -15,7 +15,7 @@
 #include "common/diamond/domain.h"
 #include "common/front/front.h"
 #include "common/patch/value_format.h"
-#include "server/volume/visit_samples.h"
+#include "common/patch/visit_samples.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/special_values.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale::testing {
 

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "common/ivm/value_bounds.h"
+#include "common/ranges/surface_deviation.h"
 #include "server/builder/field_hierarchy.h"
-#include "server/builder/surface_deviation.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/parents.h"
 #include "tests/support/parts.h"

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "common/patch/visit_samples.h"
 #include "server/volume/header_line.h"
 #include "server/volume/read_volume.h"
-#include "server/volume/visit_samples.h"
 #include "server/volume/volume_header.h"
 #include "tests/support/library_files.h"
 #include "tests/support/temp_dir.h"

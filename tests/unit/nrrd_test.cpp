@@ -4,9 +4,9 @@
 #include <random>
 #include <string>
 
+#include "common/patch/visit_samples.h"
 #include "server/volume/nrrd.h"
 #include "server/volume/read_volume.h"
-#include "server/volume/visit_samples.h"
 #include "server/volume/volume_header.h"
 #include "tests/support/affines.h"
 #include "tests/support/temp_dir.h"

@@ -12,7 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/builder/find_relevant_updates.h"
+#include "common/ranges/find_relevant_updates.h"
+#include "server/builder/all_cores.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/special_values.h"
 

@@ -10,8 +10,8 @@
 #include <random>
 #include <vector>
 
+#include "common/ranges/find_relevant_updates.h"
 #include "common/util/bits.h"
-#include "server/builder/find_relevant_updates.h"
 #include "tests/support/interval_volumes.h"
 
 namespace intervale {

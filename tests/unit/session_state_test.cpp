@@ -1,5 +1,5 @@
 // The server's side of a session; its client's side and what both do together: client_session_test.cpp.
-#include "server/serve/session_state.h"
+#include "protocol/session/session_state.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +7,7 @@
 #include <semaphore>
 
 #include "client/core/client_session.h"
+#include "protocol/session/local_worker.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/session_server.h"
 
@@ -16,12 +17,7 @@ namespace {
 using protocol::CloseCode;
 
 TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
-  const AtomicSharedPtr<Catalogue> catalogue;
-  Memory memory;
-  FairScheduler scheduler(1);
-  RangeCache ranges(memory, scheduler);
-  Background background(scheduler, memory, 1);
-  const auto account = std::make_shared<FairScheduler::Account>();
+  LocalWorker worker;
   const struct {
     std::uint32_t payload;
     const char* text;
@@ -29,7 +25,7 @@ TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
                {1, "the client reads batches of version 1, and this server sends version 3: update the client"},
                {4, "the client reads batches of version 4, and this server sends version 3: update the server"}};
   for (const auto& c : cases) {
-    SessionState state(catalogue, ranges, background, Scope::everything(), account);
+    SessionState state([](const std::string&) { return tl::unexpected(protocol::Fault{CloseCode::no_such_dataset, ""}); }, worker);
     const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});
     ASSERT_TRUE(fault);
     EXPECT_EQ(fault->code, CloseCode::other_version);

@@ -1,4 +1,4 @@
-#include "server/builder/surface_deviation.h"
+#include "common/ranges/surface_deviation.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 
 #include "common/ivm/interval_volume.h"
 #include "common/patch/range.h"
+#include "common/patch/visit_samples.h"
 #include "server/builder/field_hierarchy.h"
-#include "server/volume/visit_samples.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/bisection.h"
 #include "tests/support/special_values.h"

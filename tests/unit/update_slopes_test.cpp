@@ -1,4 +1,4 @@
-#include "server/builder/update_slopes.h"
+#include "common/ranges/update_slopes.h"
 
 #include <gtest/gtest.h>
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "common/patch/visit_samples.h"
 #include "server/builder/value_steps.h"
-#include "server/volume/visit_samples.h"
 #include "tests/support/analytic_fields.h"
 
 namespace intervale {

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/volume/visit_samples.h"
+#include "common/patch/visit_samples.h"
 #include "tests/support/analytic_fields.h"
 
 namespace intervale {

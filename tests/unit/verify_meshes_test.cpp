@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
+#include "common/ranges/find_relevant_updates.h"
 #include "common/selection/stream_plan.h"
 #include "server/builder/field_hierarchy.h"
-#include "server/builder/find_relevant_updates.h"
 #include "tests/support/interval_volumes.h"
 
 namespace intervale {

@@ -1,6 +1,6 @@
 // Every format that volumes are read from, by the same laws.
 #include "tests/support/volume_files.h"
-#include "server/volume/visit_samples.h"
+#include "common/patch/visit_samples.h"
 
 #include <gtest/gtest.h>
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "common/patch/visit_samples.h"
 #include "server/volume/read_volume.h"
-#include "server/volume/visit_samples.h"
 #include "tests/support/temp_dir.h"
 #include "tests/support/volume_files.h"
 

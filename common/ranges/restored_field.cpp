@@ -1,4 +1,4 @@
-#include "server/builder/restored_field.h"
+#include "common/ranges/restored_field.h"
 
 #include <algorithm>
 #include <atomic>

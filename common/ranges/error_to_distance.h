@@ -6,8 +6,8 @@
 
 #include "common/diamond/domain.h"
 #include "common/ivm/relevant_updates.h"
+#include "common/patch/volume.h"
 #include "common/util/parallel.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

@@ -1,4 +1,4 @@
-#include "server/builder/find_relevant_updates.h"
+#include "common/ranges/find_relevant_updates.h"
 
 #include <cmath>
 #include <limits>
@@ -6,9 +6,9 @@
 
 #include "common/ivm/relevant_slots.h"
 #include "common/patch/key_sides.h"
+#include "common/ranges/error_to_distance.h"
+#include "common/ranges/estimate_distances.h"
 #include "common/util/bits.h"
-#include "server/builder/error_to_distance.h"
-#include "server/builder/estimate_distances.h"
 
 namespace intervale {
 namespace {
@@ -104,8 +104,8 @@ std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_p
 }
 
 std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,
-                                                             Distances distances) {
-  PartFinder finder(*volume);
+                                                             Distances distances, const ParallelFor& parallel) {
+  PartFinder finder(*volume, parallel);
   return find_relevant_updates(volume, shown, distances, [&](const RangePart& part) { return finder.find(part); });
 }
 

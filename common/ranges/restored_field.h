@@ -2,8 +2,8 @@
 #pragma once
 
 #include "common/ivm/interval_volume.h"
+#include "common/patch/volume.h"
 #include "common/util/parallel.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

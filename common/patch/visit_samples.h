@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "common/patch/sample_type.h"
-#include "server/volume/volume.h"
+#include "common/patch/volume.h"
 
 namespace intervale {
 

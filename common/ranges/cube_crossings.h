@@ -10,8 +10,8 @@
 
 #include "common/diamond/diamond.h"
 #include "common/patch/range.h"
+#include "common/ranges/interpolation_error.h"
 #include "common/util/vec3.h"
-#include "server/builder/interpolation_error.h"
 
 namespace intervale {
 

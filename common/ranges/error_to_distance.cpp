@@ -1,11 +1,11 @@
-#include "server/builder/error_to_distance.h"
+#include "common/ranges/error_to_distance.h"
 
 #include <algorithm>
 #include <bit>
 
 #include "common/ivm/saturate.h"
-#include "server/builder/surface_deviation.h"
-#include "server/builder/update_slopes.h"
+#include "common/ranges/surface_deviation.h"
+#include "common/ranges/update_slopes.h"
 
 namespace intervale {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
-#include "server/builder/all_cores.h"
-#include "server/builder/restored_field.h"
+#include "common/ranges/restored_field.h"
+#include "common/util/parallel.h"
 
 namespace intervale {
 
@@ -39,7 +39,7 @@ struct RangePart {
 class PartFinder {
  public:
   // The volume was refined uniformly and must outlive this. What `parallel` throws, find() throws.
-  explicit PartFinder(const IntervalVolume& volume, ParallelFor parallel = on_all_cores) : volume_(volume), parallel_(std::move(parallel)) {}
+  explicit PartFinder(const IntervalVolume& volume, ParallelFor parallel = serial) : volume_(volume), parallel_(std::move(parallel)) {}
 
   // The first part with measured distances restores the field, which is kept for the next ones: 1, 2 or 8 bytes a sample.
   [[nodiscard]] std::shared_ptr<const RelevantUpdates> find(const RangePart& part);
@@ -59,8 +59,8 @@ using FindPart = std::function<std::shared_ptr<const RelevantUpdates>(const Rang
 // range has measured distances in any case.
 [[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume,
                                                                            const ShownRanges& shown, Distances distances, const FindPart& find);
-// Uses all cores that oneTBB may.
 [[nodiscard]] std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume,
-                                                                           const ShownRanges& shown, Distances distances);
+                                                                           const ShownRanges& shown, Distances distances,
+                                                                           const ParallelFor& parallel = serial);
 
 }  // namespace intervale

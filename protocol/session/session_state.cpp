@@ -1,4 +1,4 @@
-#include "server/serve/session_state.h"
+#include "protocol/session/session_state.h"
 
 #include <algorithm>
 #include <bit>
@@ -35,11 +35,9 @@ std::optional<Fault> SessionState::receive(const protocol::ClientMessage& messag
 std::optional<Fault> SessionState::on(const protocol::Open& open) {
   if (opened()) return Fault{CloseCode::out_of_order, "a second Open"};
   if (open.payload != protocol::kPayloadVersion) return other_version(open.payload);
-  // Before the lookup: the client must not learn whether a data set exists that its token does not grant.
-  if (!scope_ || !scope_->allows(open.dataset)) return Fault{CloseCode::forbidden, "the token does not grant this data set"};
-  const auto catalogue = catalogue_.load();
-  if (catalogue) volume_ = catalogue->find(open.dataset);
-  if (!volume_) return Fault{CloseCode::no_such_dataset, "no such data set; see /api/datasets"};
+  auto found = find_(open.dataset);
+  if (!found) return std::move(found).error();
+  volume_ = *std::move(found);
   dataset_ = open.dataset;
   plan_.emplace(volume_);
   planned_ = {volume_->description().whole()};
@@ -82,6 +80,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   lod_ = view.lod;
   if (shown_ != shown || !lod_.camera) measurement_.reset();
   if (shown_ != shown) estimate_.reset();
+  search_.reset();  // of another view; if it is done, it would say that nothing is waited for
   shown_ = std::move(shown);
   is_early_ = view.early;
   is_new_ = true;
@@ -103,7 +102,7 @@ std::optional<Fault> SessionState::grant(std::uint64_t bytes) {
   return {};
 }
 
-void SessionState::set_relevant(const RangeCache::Relevant& relevant, bool is_measured) {
+void SessionState::set_relevant(const RangeAnswer::Relevant& relevant, bool is_measured) {
   plan_->set_relevant(relevant);
   planned_ = shown_;
   is_measured_ = is_measured;
@@ -128,7 +127,7 @@ bool SessionState::begin_view() {
 
 // Whether distances of the view's ranges are estimated: the plan has them then.
 bool SessionState::estimate() {
-  if (!estimate_) estimate_ = ranges_.ask(volume_, shown_, Distances::estimated, payer_, wake_);
+  if (!estimate_) estimate_ = worker_.ask(volume_, shown_, Distances::estimated);
   if (!estimate_->is_ready()) return false;
   set_relevant(std::exchange(estimate_, nullptr)->result(), shown_ == ShownRanges{volume_->description().whole()});
   return true;
@@ -136,7 +135,7 @@ bool SessionState::estimate() {
 
 // The same for measured distances.
 bool SessionState::measure() {
-  if (!measurement_) measurement_ = ranges_.ask(volume_, shown_, Distances::measured, payer_, wake_);
+  if (!measurement_) measurement_ = worker_.ask(volume_, shown_, Distances::measured);
   if (!measurement_->is_ready()) return false;
   estimate_.reset();
   set_relevant(std::exchange(measurement_, nullptr)->result(), true);
@@ -164,14 +163,7 @@ void SessionState::begin_ahead() {
 bool SessionState::is_searching() {
   if (search_ != plan_->search()) {
     search_ = plan_->search();
-    const auto go_on = [weak = std::weak_ptr(search_)](Memory::Share& held) {
-      const auto search = weak.lock();
-      if (!search) return false;
-      const bool has_more = search->go_on();
-      if (has_more) held.resize(search->memory_bytes());  // the session takes what is done
-      return has_more;
-    };
-    if (search_) background_.run(payer_, go_on, wake_);
+    if (search_) worker_.search(search_);
   }
   return search_ && !search_->is_done();
 }

@@ -1,4 +1,4 @@
-#include "server/builder/surface_deviation.h"
+#include "common/ranges/surface_deviation.h"
 
 #include <algorithm>
 #include <array>
@@ -10,13 +10,13 @@
 #include <span>
 
 #include "common/ivm/interval_volume.h"
+#include "common/patch/visit_samples.h"
+#include "common/ranges/bisection.h"
+#include "common/ranges/cube_crossings.h"
+#include "common/ranges/interpolation_error.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
 #include "common/util/vec3.h"
-#include "server/builder/bisection.h"
-#include "server/builder/cube_crossings.h"
-#include "server/builder/interpolation_error.h"
-#include "server/volume/visit_samples.h"
 
 namespace intervale {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/builder/interpolation_error.h"
+#include "common/ranges/interpolation_error.h"
 
 #include <cassert>
 

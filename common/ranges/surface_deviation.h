@@ -19,8 +19,8 @@
 #include "common/diamond/domain.h"
 #include "common/diamond/supercube.h"
 #include "common/patch/description.h"
+#include "common/patch/volume.h"
 #include "common/util/parallel.h"
-#include "server/volume/volume.h"
 
 namespace intervale {
 

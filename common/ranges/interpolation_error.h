@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "common/diamond/domain.h"
+#include "common/ranges/border_shape.h"
 #include "common/util/bits.h"
 #include "common/util/tetrahedron.h"
 #include "common/util/vec3.h"
-#include "server/builder/border_shape.h"
 
 namespace intervale {
 

@@ -1,4 +1,4 @@
-#include "server/builder/estimate_distances.h"
+#include "common/ranges/estimate_distances.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,5 @@
-// The state of a streaming session: messages in, messages out, as PROTOCOL.md says. No I/O.
+// The sending side of a streaming session: messages in, messages out, as PROTOCOL.md says. No I/O. A server has one for
+// each connection; where a data set is read from a file and shown in the same place, the client's side is connected to it.
 #pragma once
 
 #include <cstdint>
@@ -11,27 +12,19 @@
 #include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
 #include "protocol/messages.h"
-#include "server/serve/access.h"
-#include "server/serve/atomic_shared_ptr.h"
-#include "server/serve/background.h"
-#include "server/serve/catalogue.h"
-#include "server/serve/range_cache.h"
+#include "protocol/session/session_worker.h"
 
 namespace intervale {
 
-// One thread at a time. `catalogue` must outlive the session, which keeps the data set that it opened when the
-// catalogue changes.
+// One thread at a time.
 class SessionState {
  public:
-  // scope: the data sets that may be opened; nullptr: none. payer: of what ranges and background do for it; both must
-  // outlive the session, too.
-  SessionState(const AtomicSharedPtr<Catalogue>& catalogue, RangeCache& ranges, Background& background, std::shared_ptr<const Scope> scope,
-               Background::Payer payer)
-      : catalogue_(catalogue), ranges_(ranges), background_(background), scope_(std::move(scope)), payer_(std::move(payer)) {}
+  using Volume = std::shared_ptr<const IntervalVolume>;
+  // The data set of a name, or why the client does not get it. The session keeps what it opened.
+  using Find = std::function<tl::expected<Volume, protocol::Fault>(const std::string& name)>;
 
-  // Before the first message. wake: called on another thread when a session that waits() should go on; perhaps also
-  // later, even after the session.
-  void set_wake(std::function<void()> wake) { wake_ = std::move(wake); }
+  // worker: must outlive the session. Where waits() says so, it must be called again when the worker has done something.
+  SessionState(Find find, SessionWorker& worker) : find_(std::move(find)), worker_(worker) {}
 
   // Handles a client's message. A fault ends the session: call nothing afterwards.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
@@ -72,30 +65,26 @@ class SessionState {
   bool measure();
   [[nodiscard]] bool goes_ahead() const;
   void begin_ahead();
-  void set_relevant(const RangeCache::Relevant& relevant, bool is_measured);
+  void set_relevant(const RangeAnswer::Relevant& relevant, bool is_measured);
 
-  const AtomicSharedPtr<Catalogue>& catalogue_;
-  RangeCache& ranges_;
-  Background& background_;
-  std::shared_ptr<const Scope> scope_;
-  Background::Payer payer_;
-  Catalogue::Volume volume_;
+  Find find_;
+  SessionWorker& worker_;
+  Volume volume_;
   std::string dataset_;
   std::optional<StreamPlan> plan_;
-  Lod lod_;                                                           // of the last view
-  ShownRanges shown_;                                                 // of the last view, as distinct() gives them
-  std::uint64_t may_have_ = 0;                                        // updates, and values of channels, that Have may still name
-  std::uint64_t room_ = 0;                                            // of the last view
-  std::optional<double> coarse_percent_;                              // likewise
-  std::optional<double> ahead_percent_;                               // the client has every range down to this error
-  bool is_early_ = false;                                             // the last view takes estimates
-  bool is_new_ = false;                                               // the plan does not have the last view yet, or what goes ahead
-  ShownRanges planned_;                                               // that the plan has; none while it goes ahead
-  bool is_measured_ = true;                                           // how far surfaces move, of those
-  std::shared_ptr<const RangeCache::Answer> estimate_, measurement_;  // of shown_; nullptr if there is no need
-  std::shared_ptr<BudgetSearch> search_;                              // of the plan; nullptr: none is under way
-  bool waits_ = false;                                                // nothing more can be sent before one of them is ready
-  std::function<void()> wake_ = [] {};
+  Lod lod_;                                                    // of the last view
+  ShownRanges shown_;                                          // of the last view, as distinct() gives them
+  std::uint64_t may_have_ = 0;                                 // updates, and values of channels, that Have may still name
+  std::uint64_t room_ = 0;                                     // of the last view
+  std::optional<double> coarse_percent_;                       // likewise
+  std::optional<double> ahead_percent_;                        // the client has every range down to this error
+  bool is_early_ = false;                                      // the last view takes estimates
+  bool is_new_ = false;                                        // the plan does not have the last view yet, or what goes ahead
+  ShownRanges planned_;                                        // that the plan has; none while it goes ahead
+  bool is_measured_ = true;                                    // how far surfaces move, of those
+  std::shared_ptr<const RangeAnswer> estimate_, measurement_;  // of shown_; nullptr if there is no need
+  std::shared_ptr<BudgetSearch> search_;                       // of the plan; nullptr: none is under way
+  bool waits_ = false;                                         // nothing more can be sent before one of them is ready
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding
   std::uint64_t last_grant_ = 0;
