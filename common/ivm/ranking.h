@@ -13,12 +13,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <limits>
 #include <optional>
 
 #include "common/ivm/interval_volume.h"
+#include "common/util/bits.h"
 #include "common/view/lod.h"
 #include "common/view/screen_error.h"
 #include "common/view/seen_box.h"
@@ -50,7 +50,7 @@ class Ranking {
     // The least importance of this rank, 1 or more; and the rank of an importance.
     [[nodiscard]] float least(Rank rank) const {
       if (!ranking_->screen_) return float(rank);
-      return rank <= 1 ? kLeastImportance : std::bit_cast<float>(std::uint32_t(rank + kRankFrom) << kRankShift);
+      return rank <= 1 ? kLeastImportance : bits_as<float>(std::uint32_t(rank + kRankFrom) << kRankShift);
     }
     [[nodiscard]] Rank rank(float importance) const {
       if (importance == 0) return 0;
@@ -118,7 +118,7 @@ class Ranking {
   // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1.
   static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 32;
   [[nodiscard]] static Rank rank_of(float importance) {
-    const int rank = int(std::bit_cast<std::uint32_t>(importance < kMostImportance ? importance : kMostImportance) >> kRankShift) - kRankFrom;
+    const int rank = int(bits_as<std::uint32_t>(importance < kMostImportance ? importance : kMostImportance) >> kRankShift) - kRankFrom;
     return Rank(std::max(rank, 1));
   }
   [[nodiscard]] float pixels_per_unit(const ScreenError::Region& region) const;

@@ -1,8 +1,6 @@
 // The error of a diamond: how far linear interpolation in its tetrahedra is from the samples inside them.
 #pragma once
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +13,7 @@
 #include "common/diamond/domain.h"
 #include "common/ranges/border_shape.h"
 #include "common/util/bits.h"
+#include "common/util/parallel.h"
 #include "common/util/tetrahedron.h"
 #include "common/util/vec3.h"
 
@@ -73,10 +72,11 @@ struct Extremes {
   std::array<std::int32_t, 3> size{};
   std::vector<std::array<T, 2>> block;
 
-  explicit Extremes(const Field<T>& field)
+  Extremes(const Field<T>& field, const ParallelFor& parallel)
       : size{field.last.x / kSide + 1, field.last.y / kSide + 1, field.last.z / kSide + 1},
         block(std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2])) {
-    tbb::parallel_for(0, size[2], [&](std::int32_t k) {
+    parallel(std::size_t(size[2]), [&](std::size_t slice) {
+      const auto k = std::int32_t(slice);
       std::vector<T> least(std::size_t(field.last.x) + 1), most(least.size());  // of a column of rows
       for (std::int32_t j = 0; j < size[1]; ++j) {
         const Vertex first{0, j * kSide, k * kSide};

@@ -1,11 +1,11 @@
 #include "common/ranges/restored_field.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdint>
 
 #include "common/patch/key_sides.h"
+#include "common/util/atomic_ref.h"
 
 namespace intervale {
 namespace {
@@ -20,7 +20,7 @@ void fill(const IntervalVolume& from, std::vector<std::byte>& bytes, const Paral
   // Where the box clamps several centres to a sample, all of them have its key.
   const auto put = [&](Vertex v, ValueKey key) {
     const Vertex s = domain.clamp(v);
-    std::atomic_ref<T>(samples[std::size_t(s.z) * slice + std::size_t(s.y) * row + std::size_t(s.x)]).store(number(key), std::memory_order_relaxed);
+    AtomicRef<T>(samples[std::size_t(s.z) * slice + std::size_t(s.y) * row + std::size_t(s.x)]).store(number(key), std::memory_order_relaxed);
   };
   const Diamond root(domain.root());
   for (int v = 0; v < kRootVertices; ++v) put(root.vertex(v), from.description().corners[std::size_t(v)]);

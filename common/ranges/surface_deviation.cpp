@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "common/ranges/bisection.h"
 #include "common/ranges/cube_crossings.h"
 #include "common/ranges/interpolation_error.h"
+#include "common/util/atomic_ref.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
 #include "common/util/vec3.h"
@@ -36,7 +36,7 @@ using Tet = BisectionTet;
 
 // Sets a shared number to the larger of it and `value`.
 void raise(float& to, float value) {
-  std::atomic_ref<float> shared(to);
+  AtomicRef<float> shared(to);
   float seen = shared.load(std::memory_order_relaxed);
   while (seen < value && !shared.compare_exchange_weak(seen, value, std::memory_order_relaxed)) {
   }
@@ -49,7 +49,7 @@ class Mean {
   // Fewer than 2^kCountBits times; from any thread.
   void add(double fraction) {
     const double capped = fraction < 1 ? fraction : 1;
-    std::atomic_ref<std::uint64_t>(bits_).fetch_add(std::uint64_t(capped * kOne) << kCountBits | 1, std::memory_order_relaxed);
+    AtomicRef<std::uint64_t>(bits_).fetch_add(std::uint64_t(capped * kOne) << kCountBits | 1, std::memory_order_relaxed);
   }
   [[nodiscard]] double value() const { return bits_ == 0 ? 0 : double(bits_ >> kCountBits) / double(bits_ & ((1u << kCountBits) - 1)) / kOne; }
 
@@ -93,7 +93,7 @@ class Descent {
         count += found[t][k].size();
       }
       if (count == 0) continue;
-      const auto spare = std::make_unique_for_overwrite<Crossing[]>(count * std::size_t(3 * (d.scale + 1)));
+      const std::unique_ptr<Crossing[]> spare(new Crossing[count * std::size_t(3 * (d.scale + 1))]);  // not initialised
       Cursor cursor{{}, spare.get(), is_inside};
       descend<0>(tet_of(cube, kPaths[t]), crossings, {unknown, unknown}, cursor);
     }
@@ -250,7 +250,7 @@ class Descent {
     const double before = record(tet, centre, *update, crossings, nearest, cursor);
     double after = 0;
     if (tet.scale > 0 || kClass < 2) after = descend_into_halves<kClass>(tet, {centre, float(value(centre))}, crossings, nearest, cursor);
-    std::atomic_ref<std::int64_t>(removed_[*update]).fetch_add(whole((before - after) * kRemovedOne), std::memory_order_relaxed);
+    AtomicRef<std::int64_t>(removed_[*update]).fetch_add(whole((before - after) * kRemovedOne), std::memory_order_relaxed);
     return before;
   }
 

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -21,6 +20,7 @@
 #include "common/ivm/budget_search.h"
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ranking.h"
+#include "common/util/bits.h"
 #include "common/view/lod.h"
 
 namespace intervale {
@@ -114,8 +114,8 @@ class StreamPlan {
   struct Up16 {
     std::uint16_t bits = 0;
     Up16() = default;
-    explicit Up16(float value) : bits(std::uint16_t((std::bit_cast<std::uint32_t>(value) + 0xffff) >> 16)) {}
-    explicit operator float() const { return std::bit_cast<float>(std::uint32_t(bits) << 16); }
+    explicit Up16(float value) : bits(std::uint16_t((bits_as<std::uint32_t>(value) + 0xffff) >> 16)) {}
+    explicit operator float() const { return bits_as<float>(std::uint32_t(bits) << 16); }
   };
   // The unsent relevant updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
   struct Pending {

@@ -1,12 +1,23 @@
-// Sets of small numbers as the bits of one word.
+// The bits of words: as sets of small numbers, and of one type as another.
 #pragma once
 
 #include <bit>
 #include <concepts>
 #include <cstddef>
+#include <cstring>
 #include <iterator>
+#include <type_traits>
 
 namespace intervale {
+
+// std::bit_cast, which Emscripten's library lacks.
+template <class To, class From>
+[[nodiscard]] To bits_as(const From& from) {
+  static_assert(sizeof(To) == sizeof(From) && std::is_trivially_copyable_v<To> && std::is_trivially_copyable_v<From>);
+  To to;
+  std::memcpy(&to, &from, sizeof to);
+  return to;
+}
 
 // The positions of the bits that are set, ascending: for (const int i : set_bits(word)), or set_bits<Slot>(word), which
 // makes each a Slot.

@@ -1,9 +1,19 @@
 // A long computation in slices: a coroutine that suspends itself now and then.
 #pragma once
 
-#include <coroutine>
 #include <exception>
 #include <utility>
+#if __has_include(<coroutine>)
+#include <coroutine>
+namespace intervale::coroutines {
+using std::coroutine_handle, std::suspend_always;
+}
+#else  // Emscripten's library has them by an older name
+#include <experimental/coroutine>
+namespace intervale::coroutines {
+using std::experimental::coroutine_handle, std::experimental::suspend_always;
+}
+#endif
 
 namespace intervale {
 
@@ -11,12 +21,12 @@ namespace intervale {
 // to must outlive it. One thread at a time.
 class Slices {
  public:
-  static constexpr std::suspend_always kPause{};
+  static constexpr coroutines::suspend_always kPause{};
   struct promise_type {  // NOLINT(readability-identifier-naming): the language's name
     std::exception_ptr failure;
-    Slices get_return_object() { return Slices(std::coroutine_handle<promise_type>::from_promise(*this)); }
-    static std::suspend_always initial_suspend() noexcept { return {}; }
-    static std::suspend_always final_suspend() noexcept { return {}; }
+    Slices get_return_object() { return Slices(coroutines::coroutine_handle<promise_type>::from_promise(*this)); }
+    static coroutines::suspend_always initial_suspend() noexcept { return {}; }
+    static coroutines::suspend_always final_suspend() noexcept { return {}; }
     void return_void() noexcept {}
     void unhandled_exception() noexcept { failure = std::current_exception(); }
   };
@@ -38,8 +48,8 @@ class Slices {
   }
 
  private:
-  explicit Slices(std::coroutine_handle<promise_type> coroutine) : coroutine_(coroutine) {}
-  std::coroutine_handle<promise_type> coroutine_;
+  explicit Slices(coroutines::coroutine_handle<promise_type> coroutine) : coroutine_(coroutine) {}
+  coroutines::coroutine_handle<promise_type> coroutine_;
 };
 
 }  // namespace intervale

@@ -123,7 +123,7 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
   errors_.assign(set_.size(), 0);
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain_.last()};
-    const Extremes<T> extremes(field);
+    const Extremes<T> extremes(field, on_all_cores);
     for (int scale = 0; scale < domain_.levels(); ++scale) {
       const DiamondErrors<T> error_of(field, extremes, domain_, scale);
       const auto [begin, end] = set_.of_scale(scale);

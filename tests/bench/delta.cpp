@@ -19,6 +19,7 @@
 #include "common/ranges/interpolation_error.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
+#include "server/builder/all_cores.h"
 #include "server/builder/find_keys.h"
 #include "tests/bench/cases.h"
 
@@ -46,7 +47,7 @@ class TypedDelta final : public Delta {
     }
     nodes_.resize(samples.size());
     find_outside();
-    const Extremes<T> extremes(field_);
+    const Extremes<T> extremes(field_, on_all_cores);
     for (int scale = 0; scale < domain_.levels(); ++scale) {
       const DiamondErrors<T> error_of(field_, extremes, domain_, scale);
       for (int cls = 2; cls >= 0; --cls) measure(scale, cls, error_of);

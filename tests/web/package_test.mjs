@@ -39,7 +39,7 @@ function build() {
   writeFileSync(join(project, 'package.json'), JSON.stringify({ name: 'project', private: true, type: 'module' }));
   run('npm', 'install', '--offline', '--no-audit', '--no-fund', '--ignore-scripts', process.env.INTERVALE_PACKAGE);
   assert.deepEqual(readdirSync(join(project, 'node_modules')).filter((name) => !name.startsWith('.')), ['@intervale'], 'it needs no others');
-  assert.ok(statSync(process.env.INTERVALE_PACKAGE).size < 400_000);
+  assert.ok(statSync(process.env.INTERVALE_PACKAGE).size < 600_000); // two modules, of which one is loaded for files only
   const packages = join(process.env.INTERVALE_VIEWER_PAGE, 'node_modules');
   mkdirSync(join(project, 'node_modules/@types'), { recursive: true });
   for (const name of ['three', 'vite', 'typescript', '@types/three']) symlinkSync(join(packages, name), join(project, 'node_modules', name));
@@ -68,7 +68,9 @@ before(async () => {
   build();
   files = await serveFiles();
   const origin = `http://127.0.0.1:${files.address().port}`;
-  server = await serve(makeData(kAny, kOne), 0, '--allow-origin', origin);
+  const folder = makeData(kAny, kOne);
+  cpSync(join(folder, 'any.ivm'), join(project, 'dist/any.ivm'));
+  server = await serve(folder, 0, '--allow-origin', origin);
   browser = await launch();
   page = await browser.newPage({ viewport: { width: 400, height: 600 } });
   page.setDefaultTimeout(60_000);
@@ -105,6 +107,16 @@ test('arrays are those of the mesh, of each range', async () => {
   }
   const { events } = await page.evaluate(() => window.arrays.shown());
   assert.deepEqual(events, ['load-start', 'load-end', 'load-start', 'load-end', 'load-start', 'load-end']);
+});
+
+test('a file is a data set without a server', async () => {
+  const found = await page.evaluate(async (ranges) => {
+    const arrays = await window.consumer.fileArrays('any.ivm', ranges);
+    await arrays.ended();
+    return arrays.shown();
+  }, kRanges);
+  assert.equal(found.digest, fetched(server, 'any', '--range', '128', '188').digest);
+  assert.match(await page.evaluate(() => window.consumer.refusal('no data set')), /^text\.ivm: [^\n]+$/);
 });
 
 // Of an element, which is kept as NAME.png, too.

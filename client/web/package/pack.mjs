@@ -47,7 +47,7 @@ writeFileSync(join(to, 'package.json'), JSON.stringify({ ...description, version
 
 const run = (program, ...args) => execFileSync(program, args, { cwd: to, stdio: ['ignore', 'ignore', 'inherit'] });
 for (const project of ['tsconfig.json', 'tsconfig.worker.json']) run(process.execPath, join(page, 'node_modules/typescript/bin/tsc'), '-p', project);
-for (const name of ['core/core.js', 'core/core.wasm']) {
+for (const name of ['core/core.js', 'core/core.wasm', 'core/local.js', 'core/local.wasm']) {
   mkdirSync(dirname(join(to, 'dist', name)), { recursive: true });
   copyFileSync(join(from, 'src', name), join(to, 'dist', name));
 }

@@ -5,12 +5,13 @@ import { watchBanner } from './banner';
 import { ClipControls } from './clip';
 import { type Dataset, fetchStatistics, listDatasets, streamUrl } from '../package/src/datasets';
 import { element, input, onClick } from './dom';
+import { Files, watchFiles } from './files';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
 import { showLegend } from './legend';
 import { watchMesh } from './mesh_status';
 import { channelOf } from './palette';
-import { watchPanel } from './panel';
+import { kReset, watchPanel } from './panel';
 import { watchPointers } from '../package/src/pointer';
 import { Probe } from './probe';
 import { watchProgress } from './progress';
@@ -41,6 +42,8 @@ class Page {
   private readonly valueColors: ValueColors;
   private readonly probe: Probe;
   private volume: VolumeControls | null = null;
+  private readonly files = new Files();
+  private isOpening = false; // the view is that of another data set than the mesh
 
   constructor(private readonly viewer: Viewer, private readonly mesh: LiveMesh) {
     this.handles = new Handles(viewer);
@@ -74,9 +77,10 @@ class Page {
       return status.set({ needsToken: true });
     }
     if ('error' in listing) return status.set({ error: listing.error });
-    status.set({ datasets: listing.datasets, needsToken: false });
+    const datasets = [...listing.datasets, ...this.files.datasets];
+    status.set({ datasets, needsToken: false });
     const { dataset: name } = view.value;
-    const chosen = name === null ? listing.datasets[0] : listing.datasets.find((dataset) => dataset.name === name);
+    const chosen = name === null ? datasets[0] : datasets.find((dataset) => dataset.name === name);
     if (chosen) this.open(chosen);
     else if (name !== null) status.set({ error: `The server has no data set “${name}”, which the address names. Choose another.` });
   }
@@ -114,6 +118,7 @@ class Page {
       this.valueColors.preview(ranges);
     });
     watchSaving(status, viewer, this.mesh);
+    watchFiles((file) => void this.openFile(file));
     watchTheme(() => {
       viewer.picture.setBackground(getComputedStyle(element('stage')).backgroundColor);
       viewer.picture.outlines.setColor(getComputedStyle(element('handles')).color);
@@ -177,7 +182,7 @@ class Page {
 
   private updateMesh(): void {
     const wanted = this.wanted();
-    if (wanted && status.value.dataset) this.mesh.update(wanted);
+    if (wanted && status.value.dataset && !this.isOpening) this.mesh.update(wanted);
   }
 
   private async loadStatistics(dataset: Dataset): Promise<void> {
@@ -185,17 +190,37 @@ class Page {
     if (status.value.dataset === dataset) status.set({ statistics });
   }
 
-  private open(dataset: Dataset): void {
-    status.set({ dataset, statistics: null, surfaceVersion: 0 });
-    if (dataset.hasEveryRange) void this.loadStatistics(dataset);
+  private async openFile(file: File): Promise<void> {
+    const notice = `Reading ${file.name}…`;
+    status.set({ notice, error: null });
+    try {
+      const old = this.files.datasets;
+      const ofServer = (status.value.datasets ?? []).filter((dataset) => !old.includes(dataset));
+      const dataset = await this.files.open(file, ofServer.map(({ name }) => name));
+      status.set({ datasets: [...ofServer, ...this.files.datasets] });
+      this.open(dataset, kReset);
+    } catch (error) {
+      status.set({ error: error instanceof Error ? error.message : String(error) });
+    } finally {
+      if (status.value.notice === notice) status.set({ notice: null });
+    }
+  }
+
+  // change: of the view, with it.
+  private open(dataset: Dataset, change: Partial<ViewState> = {}): void {
+    const file = this.files.of(dataset);
+    this.isOpening = true;
+    status.set({ dataset, statistics: file?.statistics ?? null, surfaceVersion: 0 });
+    if (dataset.hasEveryRange && !file) void this.loadStatistics(dataset);
     this.viewer.open(dataset);
     this.clip.opened();
     this.region.opened();
-    view.set({ dataset: dataset.name, ...(dataset.hasEveryRange ? {} : { ranges: kDefaults.ranges }) });
+    view.set({ dataset: dataset.name, ...change, ...(dataset.hasEveryRange ? {} : { ranges: kDefaults.ranges }) });
+    this.isOpening = false;
     const wanted = this.wanted();
     if (!wanted) return;
     status.set({ error: null, progress: null, tets: null, connection: { state: 'connecting' } });
-    this.mesh.open(streamUrl(document.baseURI), dataset.name, wanted, status.value.token);
+    this.mesh.open(file?.connect() ?? streamUrl(document.baseURI), dataset.name, wanted, status.value.token);
   }
 }
 

@@ -13,7 +13,7 @@ const kTetBudgets = [null, 10e3, 20e3, 50e3, 100e3, 200e3, 500e3, 1e6, 2e6, 5e6,
 const kMemoryBudgets = [null, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]; // MB
 
 // What is reset when another data set is chosen: values of the last one, and coordinates in its box.
-const kReset: Partial<ViewState> = { range: null, ranges: [], span: null, opacity: null, pose: null, clip: null, region: null, tets: false };
+export const kReset: Partial<ViewState> = { range: null, ranges: [], span: null, opacity: null, pose: null, clip: null, region: null, tets: false };
 
 // The slider of the screen-space error: from 0.5 pixels, ten positions per doubling.
 const kLeastPixels = 0.5;

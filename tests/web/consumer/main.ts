@@ -1,5 +1,5 @@
 // A page of somebody else, built with Vite from the packed package. package_test.mjs calls what it puts in `window`.
-import { addressOf, arraysOf, type Dataset, describe, frameOf, LiveMesh, type Range, streamUrl, type SurfaceChange, surfacesOf, viewOf } from '@intervale/client';
+import { addressOf, arraysOf, type Dataset, describe, frameOf, LiveMesh, LocalDataset, type Range, streamUrl, type SurfaceChange, surfacesOf, viewOf } from '@intervale/client';
 import '@intervale/client/element';
 import { IntervalVolume } from '@intervale/client/three';
 import { DirectionalLight, Mesh, PerspectiveCamera, Raycaster, Scene, Vector2, WebGLRenderer } from 'three';
@@ -20,13 +20,12 @@ class Arrays {
   private readonly mesh: LiveMesh;
   private readonly pieces = new Map<number, { range: number; triangles: number; volume: number; levels: number }>();
 
-  constructor(private readonly dataset: Dataset, address: string, ranges: Range[]) {
+  constructor(private readonly dataset: Dataset, to: string | MessagePort, ranges: Range[]) {
     this.mesh = new LiveMesh();
     for (const type of ['load-start', 'load-end'] as const) this.mesh.addEventListener(type, () => this.events.push(type));
     this.mesh.addEventListener('load-error', ({ detail }) => this.events.push(detail.text));
     this.mesh.addEventListener('surface', ({ detail }) => this.apply(detail.change));
-    const { base, name } = addressOf(address);
-    this.mesh.open(streamUrl(base), name, surfacesOf(viewOf(dataset, [400, 300], { ranges, region: frameOf(dataset).box })));
+    this.mesh.open(to, dataset.name, surfacesOf(viewOf(dataset, [400, 300], { ranges, region: frameOf(dataset).box })));
   }
 
   setRanges(ranges: Range[]): void {
@@ -111,7 +110,14 @@ class Three {
 }
 
 const consumer = {
-  arrays: async (address: string, ranges: Range[]) => new Arrays(await describe(address), address, ranges),
+  arrays: async (address: string, ranges: Range[]) => new Arrays(await describe(address), streamUrl(addressOf(address).base), ranges),
+  // Of a file that is fetched, without the server of its data set.
+  fileArrays: async (url: string, ranges: Range[]) => {
+    const local = await LocalDataset.open(await (await fetch(url)).blob(), 'any.ivm');
+    return new Arrays(local.dataset, local.connect(), ranges);
+  },
+  // Why a file is refused.
+  refusal: (text: string) => LocalDataset.open(new Blob([text]), 'text.ivm').then(() => '', (error: Error) => error.message),
   three: (address: string, ranges: Range[]) => new Three(address, ranges),
 };
 declare global {

@@ -50,7 +50,7 @@ export async function listDatasets(base: string | URL, token: string | null = nu
     const body: unknown = await response.json();
     const list = (body as { datasets?: unknown }).datasets;
     if (!Array.isArray(list)) return { error: 'The list of data sets cannot be read: the server may have another version than this page.' };
-    return { datasets: list.map(parsed).filter((d) => d !== null) };
+    return { datasets: list.map(datasetOf).filter((d) => d !== null) };
   } catch {
     return { error: 'The server does not respond. It may be stopped, or the network may be down.' };
   }
@@ -65,17 +65,11 @@ export function boxVolume({ dims, affine }: Dataset): number {
 }
 
 // null: the data set has none, or the server did not send them.
-export async function fetchStatistics(base: string | URL, { name, values }: Dataset, token: string | null = null): Promise<Statistics | null> {
-  const url = new URL(`api/datasets/${encodeURIComponent(name)}`, base);
+export async function fetchStatistics(base: string | URL, dataset: Dataset, token: string | null = null): Promise<Statistics | null> {
+  const url = new URL(`api/datasets/${encodeURIComponent(dataset.name)}`, base);
   try {
     const response = await fetch(url, token === null ? {} : { headers: { Authorization: `Bearer ${token}` } });
-    const body = response.ok ? ((await response.json()) as Record<string, unknown>) : {};
-    const volumes = (body['volumes'] ?? {}) as Record<string, unknown>;
-    const counts = numbers(body['histogram']);
-    const width = number(body['histogram_width']);
-    if (counts.length === 0 || !(width > 0)) return null;
-    const table = { values: numbers(volumes['values']), below: numbers(volumes['below']), notAbove: numbers(volumes['not_above']) };
-    return { least: values[0], width, counts, volumes: table };
+    return response.ok ? statisticsOf(await response.json(), dataset) : null;
   } catch {
     return null; // the range has number fields, too
   }
@@ -103,8 +97,19 @@ function channel(entry: unknown): ChannelInfo {
   return { name: text(c['name']), unit: text(c['unit']), values: [number(values['least']), number(values['greatest'])] };
 }
 
-// null: not a data set.
-function parsed(entry: unknown): Dataset | null {
+// Of what a server tells of a data set. null: there are none.
+export function statisticsOf(entry: unknown, { values }: Dataset): Statistics | null {
+  const body = (entry ?? {}) as Record<string, unknown>;
+  const volumes = (body['volumes'] ?? {}) as Record<string, unknown>;
+  const counts = numbers(body['histogram']);
+  const width = number(body['histogram_width']);
+  if (counts.length === 0 || !(width > 0)) return null;
+  const table = { values: numbers(volumes['values']), below: numbers(volumes['below']), notAbove: numbers(volumes['not_above']) };
+  return { least: values[0], width, counts, volumes: table };
+}
+
+// The same. null: not a data set.
+export function datasetOf(entry: unknown): Dataset | null {
   const d = entry as Record<string, unknown>;
   if (typeof d?.['name'] !== 'string') return null;
   const full = (d['full'] ?? {}) as Record<string, unknown>;

@@ -98,12 +98,13 @@ export class LiveMesh extends (EventTarget as new () => Target) {
     this.worker.terminate();
   }
 
-  // Connects to the data set of this name; a session before it ends. url: of the WebSocket (streamUrl()).
-  open(url: string, dataset: string, wanted: Wanted, token: string | null = null): void {
+  // Connects to the data set of this name; a session before it ends. to: the address of the WebSocket (streamUrl()), or the
+  // connection to a file (LocalDataset.connect()).
+  open(to: string | MessagePort, dataset: string, wanted: Wanted, token: string | null = null): void {
     this.wanted = wanted;
     this.sentView = null;
     this.sendView();
-    this.send({ type: 'open', url, dataset, ...(token === null ? {} : { token }) });
+    this.send({ type: 'open', to, dataset, ...(token === null ? {} : { token }) }, typeof to === 'string' ? [] : [to]);
     this.sentPlane = wanted.plane;
     this.isAwaitingCap = this.isAwaitingPreview = false;
     this.send({ type: 'clip', plane: wanted.plane });
@@ -159,8 +160,8 @@ export class LiveMesh extends (EventTarget as new () => Target) {
   }
 
   // To the worker: for what has no function here.
-  send(request: Request): void {
-    this.worker.postMessage(request);
+  send(request: Request, transfer: Transferable[] = []): void {
+    this.worker.postMessage(request, transfer);
   }
 
   // The next report of this type.

@@ -27,8 +27,9 @@ export type MeshFormat = 'vtu' | 'stl' | 'glb';
 // From the page to the worker.
 export type Request =
   | { type: 'load'; wasmUrl: string | null } // the first: loads the core; null: from where it lies beside the worker
-  // Connects and streams; an open session is closed first. url: of the WebSocket, "ws://host:port/v1/stream".
-  | { type: 'open'; url: string; dataset: string; token?: string }
+  // Connects and streams; an open session is closed first. to: the address of the WebSocket, "ws://host:port/v1/stream", or
+  // the port of a LocalDataset.
+  | { type: 'open'; to: string | MessagePort; dataset: string; token?: string }
   // The view that is wanted from now on. With a region: that at full detail. Without: everything, until the error is at
   // most pixelError on the camera's screen. Before the first 'open': the view that the session starts with.
   | { type: 'view'; view: View; number: number } // number: for Progress.view
@@ -45,6 +46,12 @@ export type Request =
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
   | { type: 'save'; format: MeshFormat }
   | { type: 'digest' }; // answered by a report of the same type
+
+// To the worker of a file, and its answer to the first, which is loading. Each port is that of a session.
+export type LocalRequest =
+  | { type: 'load'; file: Blob; name: string; wasmUrl: string | null } // name: the data set's; wasmUrl: of local.wasm; null: from where it lies beside the worker
+  | { type: 'connect'; port: MessagePort };
+export type LocalReply = { type: 'loaded'; description: string } | { type: 'error'; text: string };
 
 export interface View {
   camera: Pose & { viewport: [number, number] }; // viewport: device pixels

@@ -4,8 +4,9 @@
 // has shown the last one. Making versions takes at most about half of the time, so as not to slow down a fast stream.
 import type { Core, Viewer } from './core/core.js';
 
-import { Connection, kGoingAway } from './connection.js';
+import { Connection, type ConnectionHandler, kGoingAway } from './connection.js';
 import type { Box, MeshFormat, Plane, Report, Request, Vec3, View } from './messages.js';
+import { PortConnection } from './port_connection.js';
 import { PreviewPace } from './preview_pace.js';
 
 const kSurfaceIntervalMs = 40; // least time between two versions
@@ -26,7 +27,7 @@ export interface Extras {
 
 export class StreamSession {
   private viewer: Viewer;
-  private connection: Connection;
+  private connection: Connection | PortConnection;
   private isEnded = false;
   private isOpen = false; // there is a mesh; stays true while the connection is lost
 
@@ -57,7 +58,7 @@ export class StreamSession {
     private readonly report: SendReport,
   ) {
     this.viewer = new core.Viewer(request.dataset);
-    this.connection = new Connection(request.url, request.token, {
+    const handler: ConnectionHandler = {
       connected: () => {
         this.viewer.connected(performance.now());
         this.send();
@@ -66,7 +67,9 @@ export class StreamSession {
       disconnected: () => this.viewer.disconnected(),
       changed: (state) => report({ type: 'connection', state }),
       failed: (text) => this.fail(text),
-    });
+    };
+    const { to, token } = request;
+    this.connection = typeof to === 'string' ? new Connection(to, token, handler) : new PortConnection(to, handler);
   }
 
   // Connects with the first view. number: for the progress.

@@ -7,6 +7,7 @@ import {
 import { kRangeColors, kSurfaceColors, kSurfaces } from './colors.js';
 import { type Dataset, streamUrl } from './datasets.js';
 import { type Frame, frameOf } from './frame.js';
+import type { LocalDataset } from './local_dataset.js';
 import { addressOf, describe, LiveMesh, type LiveMeshOptions, surfacesOf, viewOf } from './live_mesh.js';
 import type { Palette, Progress, SurfaceChange, SurfacePiece, Vec3, View } from './messages.js';
 import { arraysOf } from './pieces.js';
@@ -50,8 +51,9 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
   private readonly viewport = new Vector2(1280, 800); // pixels
   private options: IntervalVolumeOptions;
 
-  // address: "wss://host:port/name" or "https://host:port/name".
-  constructor(readonly address: string, options: IntervalVolumeOptions = {}) {
+  // source: the address "wss://host:port/name" or "https://host:port/name", or a file that was opened, which this does not
+  // close.
+  constructor(readonly source: string | LocalDataset, options: IntervalVolumeOptions = {}) {
     super();
     this.options = { ...options };
     this.mesh = new LiveMesh({ ...options, isShownLater: true });
@@ -147,7 +149,8 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
 
   private async find(): Promise<void> {
     try {
-      const dataset = await describe(this.address, this.options.token ?? null);
+      const { source } = this;
+      const dataset = typeof source === 'string' ? await describe(source, this.options.token ?? null) : source.dataset;
       this.dataset = dataset;
       this.frame = frameOf(dataset);
       this.content.position.set(...this.frame.center);
@@ -168,7 +171,9 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
     if (this.isOpen) return this.mesh.updateView(this.view(dataset));
     this.isOpen = true;
     const wanted = surfacesOf({ ...viewOf(dataset), ...this.view(dataset) });
-    this.mesh.open(streamUrl(addressOf(this.address).base), dataset.name, { ...wanted, values: this.isByValue }, this.options.token ?? null);
+    const { source } = this;
+    const to = typeof source === 'string' ? streamUrl(addressOf(source).base) : source.connect();
+    this.mesh.open(to, dataset.name, { ...wanted, values: this.isByValue }, this.options.token ?? null);
   }
 
   private get isByValue(): boolean {

@@ -1,0 +1,125 @@
+// Files that are shown by the page itself, in a real browser: their meshes are those of a server, which the page's own has
+// never seen.
+import assert from 'node:assert/strict';
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+
+import { digestOf, fetched, kBlock, kGyroid, killServers, launch, makeData, matches, open, progressOf, serve, set, settled } from './support.mjs';
+
+const kAny = { name: 'any', sample: 'buckyball', size: 33 }; // of every range
+const kWhole = { min: [-100, -100, -100], max: [100, 100, 100] };
+const kSmall = { width: 900, height: 600 };
+const kStyle = { color: '#009e73', opacity: 1 };
+
+let server; // of the page
+let peer; // of the files
+let folder; // of the files
+let browser;
+before(async () => {
+  server = await serve(makeData(kBlock));
+  folder = makeData(kAny, kGyroid);
+  peer = await serve(folder);
+  browser = await launch();
+});
+after(async () => {
+  await browser.close();
+  killServers();
+});
+
+const pathOf = (name) => join(folder, `${name}.ivm`);
+const nativeOf = (name, ...ranges) => fetched(peer, name, ...ranges.flatMap((range) => ['--range', ...range.map(String)]));
+
+// Chooses a file, as the button's dialog does, and waits until it is shown.
+async function choose(page, path, name) {
+  await page.setInputFiles('#file', path);
+  await page.waitForFunction((name) => window.intervale.live.dataset?.name === name, name);
+  await settled(page);
+}
+
+async function drop(page, name, bytes) {
+  const transfer = await page.evaluateHandle(([name, base64]) => {
+    const transfer = new DataTransfer();
+    transfer.items.add(new File([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], name));
+    return transfer;
+  }, [name, bytes.toString('base64')]);
+  await page.dispatchEvent('#stage', 'dragenter', { dataTransfer: transfer });
+  assert.ok(await page.isVisible('#drop'), 'says where to drop it');
+  await page.dispatchEvent('#stage', 'drop', { dataTransfer: transfer });
+  assert.ok(!(await page.isVisible('#drop')));
+}
+
+const bannerOf = async (page, text) => {
+  await page.waitForFunction((text) => !document.getElementById('banner').hidden && document.getElementById('banner-text').textContent.includes(text), text);
+  return page.textContent('#banner-text');
+};
+
+test('a file is shown in any range, beside the data sets of the server, and without it', async () => {
+  const { page, errors, close } = await open(browser, server.url, kSmall);
+  await settled(page);
+  const block = await digestOf(page);
+  await choose(page, pathOf('any'), 'any');
+  assert.ok(await page.isVisible('#histogram'), 'its statistics are shown');
+  await set(page, { region: kWhole });
+  for (const ranges of [[[128, 188]], [[20, 60]], [[128, 188], [20, 50], [200, 255]], [[90, 100]]]) {
+    await set(page, ranges.length > 1 ? { ranges: ranges.map((range) => ({ range, style: kStyle })) } : { range: ranges[0], ranges: [] });
+    assert.equal((await digestOf(page)).digest, nativeOf('any', ...ranges).digest, JSON.stringify(ranges));
+  }
+  await page.click('.dataset:has-text("block")');
+  await page.waitForFunction(() => window.intervale.live.dataset?.name === 'block');
+  await settled(page);
+  assert.equal((await digestOf(page)).digest, block.digest, 'the server\'s data set is back');
+  await page.click('.dataset:has-text("any")');
+  await page.waitForFunction(() => window.intervale.live.dataset?.name === 'any');
+  await settled(page);
+  await set(page, { range: [128, 188], region: null, pixelError: 0.5 });
+  await matches(page, 'files-any');
+  assert.equal((await progressOf(page)).reconnects, 0);
+  assert.deepEqual(errors, []);
+  await close();
+});
+
+test('a dropped file goes on when the server is gone; budgets and cameras are obeyed', async () => {
+  const mine = await serve(makeData(kBlock));
+  const { page, close } = await open(browser, mine.url, kSmall);
+  await settled(page);
+  await drop(page, 'gyroid.ivm', readFileSync(pathOf('gyroid')));
+  await page.waitForFunction(() => window.intervale.live.dataset?.name === 'gyroid');
+  await settled(page);
+  await mine.kill();
+  await set(page, { region: kWhole });
+  assert.equal((await digestOf(page)).digest, nativeOf('gyroid').digest);
+  const all = await progressOf(page);
+  await set(page, { region: null, pixelError: 8 });
+  await set(page, { memory: 1e-3 * 30 }); // 1,000 updates
+  const few = await progressOf(page);
+  assert.ok(few.updates <= 1000 && few.updates > 500 && few.updates < all.updates, `${few.updates} updates`);
+  await close();
+});
+
+test('what is no such file is refused in one line, and what is shown stays', async () => {
+  const { page, errors, close } = await open(browser, server.url, kSmall);
+  await settled(page);
+  const before = await digestOf(page);
+  const good = readFileSync(pathOf('any'));
+  const changed = Buffer.from(good);
+  changed[good.length >> 1] ^= 1;
+  for (const [name, bytes, text] of [
+    ['notes.txt', Buffer.from('This is not a data set.'), 'notes.txt: '],
+    ['empty.ivm', Buffer.alloc(0), 'empty.ivm: '],
+    ['cut.ivm', good.subarray(0, good.length >> 1), 'cut.ivm: '],
+    ['changed.ivm', changed, 'changed.ivm: '],
+  ]) {
+    const path = join(folder, name);
+    writeFileSync(path, bytes);
+    await page.setInputFiles('#file', path);
+    const line = await bannerOf(page, text);
+    assert.ok(line.length < 200 && !line.includes('\n'), line);
+    assert.equal((await digestOf(page)).digest, before.digest);
+    await page.click('#dismiss');
+  }
+  await choose(page, pathOf('any'), 'any');
+  assert.ok(!(await page.isVisible('#banner')), 'the error is gone');
+  assert.deepEqual(errors, []);
+  await close();
+});
