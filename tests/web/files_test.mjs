@@ -2,7 +2,8 @@
 // never seen.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
-import { join } from 'node:path';
+import { createServer } from 'node:http';
+import { extname, join, normalize } from 'node:path';
 import { after, before, test } from 'node:test';
 
 import { digestOf, fetched, kBlock, kGyroid, killServers, launch, makeData, matches, open, progressOf, serve, set, settled } from './support.mjs';
@@ -76,6 +77,37 @@ test('a file is shown in any range, beside the data sets of the server, and with
   await matches(page, 'files-any');
   assert.equal((await progressOf(page)).reconnects, 0);
   assert.deepEqual(errors, []);
+  await close();
+});
+
+// The page and a file on a server that knows neither. Returns its address.
+async function serveFolders() {
+  const types = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.svg': 'image/svg+xml', '.wasm': 'application/wasm' };
+  const files = createServer((request, response) => {
+    const path = normalize(decodeURIComponent(new URL(request.url, 'http://x').pathname));
+    try {
+      const body = readFileSync(path.startsWith('/data/') ? join(folder, path.slice(6)) : join(process.env.INTERVALE_VIEWER_OUT, path));
+      response.writeHead(200, { 'content-type': types[extname(path)] ?? 'application/octet-stream' }).end(body);
+    } catch {
+      response.writeHead(404).end();
+    }
+  });
+  await new Promise((resolve) => files.listen(0, '127.0.0.1', resolve));
+  files.unref();
+  return `http://127.0.0.1:${files.address().port}`;
+}
+
+test('a plain web server is enough: the address names the file, and the view of it', async () => {
+  const address = await serveFolders();
+  const { page, errors, close } = await open(browser, `${address}/index.html?file=data/any.ivm#data=any&range=20,60&roi=${[...kWhole.min, ...kWhole.max]}`, kSmall);
+  await settled(page);
+  assert.equal((await digestOf(page)).digest, nativeOf('any', [20, 60]).digest);
+  await set(page, { range: [128, 188] });
+  await page.waitForFunction(() => location.search === '?file=data/any.ivm' && location.hash.includes('range=128,188'));
+  assert.deepEqual(errors, []);
+  await page.goto(`${address}/index.html?file=data/none.ivm`);
+  assert.match(await bannerOf(page, 'none.ivm'), /was not received: the server responded with status 404/);
+  await choose(page, pathOf('gyroid'), 'gyroid');
   await close();
 });
 

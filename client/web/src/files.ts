@@ -5,6 +5,8 @@ import { element, input, onClick } from './dom';
 
 const kMostBytes = 2 ** 30; // the browser holds the file, and the core what it decodes to
 
+const tooLarge = (name: string) => new Error(`${name} is too large to be shown by the page itself: serve it with intervale serve.`);
+
 export class Files {
   private opened = new Map<Dataset, LocalDataset>();
 
@@ -20,7 +22,7 @@ export class Files {
   // Rejects, with a text for the user. taken: names of other data sets, which it does not get. A file of the same name as
   // another file takes its place.
   async open(file: File, taken: string[]): Promise<Dataset> {
-    if (file.size > kMostBytes) throw new Error(`${file.name} is too large to be shown by the page itself: serve it with intervale serve.`);
+    if (file.size > kMostBytes) throw tooLarge(file.name);
     const local = await LocalDataset.open(file, file.name);
     const { name } = local.dataset;
     const dataset = { ...local.dataset, name: taken.includes(name) ? `${name} (file)` : name };
@@ -32,6 +34,28 @@ export class Files {
     this.opened.set(dataset, local);
     return dataset;
   }
+}
+
+// The file at an address, relative to the page's. Rejects, with a text for the user. told: called with the bytes received.
+export async function download(address: string, told: (bytes: number) => void): Promise<File> {
+  const url = new URL(address, document.baseURI);
+  const name = decodeURIComponent(url.pathname.slice(url.pathname.lastIndexOf('/') + 1));
+  const response = await fetch(url).catch(() => null);
+  if (!response) throw new Error(`${url.href} cannot be reached, or its server does not allow this page to read it.`);
+  if (!response.ok || !response.body) throw new Error(`${url.href} was not received: the server responded with status ${response.status}.`);
+  const chunks: Uint8Array<ArrayBuffer>[] = [];
+  let bytes = 0;
+  const reader = response.body.getReader();
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    chunks.push(part.value);
+    bytes += part.value.length;
+    if (bytes > kMostBytes) {
+      await reader.cancel();
+      throw tooLarge(name);
+    }
+    told(bytes);
+  }
+  return new File(chunks, name);
 }
 
 const hasFiles = (event: DragEvent): boolean => event.dataTransfer?.types.includes('Files') ?? false;

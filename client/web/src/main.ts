@@ -3,9 +3,10 @@ import { automation } from './automation';
 import { showAxes } from './axes';
 import { watchBanner } from './banner';
 import { ClipControls } from './clip';
-import { type Dataset, fetchStatistics, listDatasets, streamUrl } from '../package/src/datasets';
+import { type Dataset, fetchStatistics, listDatasets, type Listing, streamUrl } from '../package/src/datasets';
 import { element, input, onClick } from './dom';
-import { Files, watchFiles } from './files';
+import { download, Files, watchFiles } from './files';
+import { bytes } from './format';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
 import { showLegend } from './legend';
@@ -30,6 +31,7 @@ import { LiveMesh, updatesIn, type Wanted } from '../package/src/live_mesh';
 
 const kNoWebGl = 'The viewer needs WebGL 2, which this browser does not provide: it may be outdated, or hardware acceleration may be disabled.';
 const kContextLost = 'The WebGL context was lost. The picture returns when the browser restores the context; the mesh is kept.';
+const kFile = new URLSearchParams(location.search).get('file'); // the address of one to show; null: what the server has
 const kHashDelayMs = 300; // after the last change of the view
 
 const view = new Store<ViewState>(fromHash(location.hash));
@@ -65,8 +67,13 @@ class Page {
     watchAddress();
   }
 
+  // What the address asks for. listing: if it was requested already.
+  begin(listing?: Promise<Listing>): Promise<void> {
+    return kFile === null ? this.load(listing) : this.loadFile(kFile);
+  }
+
   // Opens the data set that the address names, or else the first.
-  async load(request = listDatasets(document.baseURI, status.value.token)): Promise<void> {
+  private async load(request = listDatasets(document.baseURI, status.value.token)): Promise<void> {
     status.set({ error: null });
     const listing = await request;
     element('token-form').hidden = !('needsToken' in listing);
@@ -137,7 +144,7 @@ class Page {
     watchBanner(status, () => {
       const { dataset, datasets } = status.value;
       if (dataset && datasets) this.open(dataset);
-      else void this.load();
+      else void this.begin();
     });
   }
 
@@ -190,7 +197,19 @@ class Page {
     if (status.value.dataset === dataset) status.set({ statistics });
   }
 
-  private async openFile(file: File): Promise<void> {
+  // The file at an address is all that there is to see then: its server need not be one of ours.
+  private async loadFile(address: string): Promise<void> {
+    const tell = (notice: string) => status.set({ notice });
+    try {
+      const file = await download(address, (received) => tell(`Receiving ${address}: ${bytes(received)}…`));
+      await this.openFile(file, {});
+    } catch (error) {
+      status.set({ notice: null, error: textOf(error) });
+    }
+  }
+
+  // change: of the view, with it.
+  private async openFile(file: File, change: Partial<ViewState> = kReset): Promise<void> {
     const notice = `Reading ${file.name}…`;
     status.set({ notice, error: null });
     try {
@@ -198,9 +217,9 @@ class Page {
       const ofServer = (status.value.datasets ?? []).filter((dataset) => !old.includes(dataset));
       const dataset = await this.files.open(file, ofServer.map(({ name }) => name));
       status.set({ datasets: [...ofServer, ...this.files.datasets] });
-      this.open(dataset, kReset);
+      this.open(dataset, change);
     } catch (error) {
-      status.set({ error: error instanceof Error ? error.message : String(error) });
+      status.set({ error: textOf(error) });
     } finally {
       if (status.value.notice === notice) status.set({ notice: null });
     }
@@ -223,6 +242,8 @@ class Page {
     this.mesh.open(file?.connect() ?? streamUrl(document.baseURI), dataset.name, wanted, status.value.token);
   }
 }
+
+const textOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
 const resetView = () => view.set({ pose: null });
 
@@ -256,7 +277,7 @@ function start(): void {
   const mesh = new LiveMesh({ isShownLater: true });
   watchMesh(mesh, status);
   mesh.addEventListener('saved', ({ detail }) => downloadMesh(detail));
-  const listing = listDatasets(document.baseURI);
+  const listing = kFile === null ? listDatasets(document.baseURI) : undefined;
   try {
     viewer = new Viewer(element<HTMLCanvasElement>('canvas'), view);
   } catch {
@@ -267,7 +288,7 @@ function start(): void {
   }
   window.intervale = automation(view, status, viewer, mesh);
   viewer.watch(mesh);
-  void new Page(viewer, mesh).load(listing);
+  void new Page(viewer, mesh).begin(listing);
 }
 
 start();
