@@ -116,7 +116,7 @@ Result<ClientSession::Event> ClientSession::take(const protocol::Done& done, Clo
 Result<ClientSession::Event> ClientSession::take(const protocol::Fault& fault, Clock::time_point /*now*/) {
   fault_ = fault;
   if (may_reconnect(fault.code)) disconnected();
-  if (fault.code == protocol::CloseCode::no_such_range) return misuse("--range: " + printable(fault.text));
+  if (fault.code == protocol::CloseCode::no_such_range) return misuse(printable(fault.text));
   return fail(options_.server + " ended the session: " + printable(fault.text) + " (code " + std::to_string(unsigned(fault.code)) + ")");
 }
 

@@ -97,7 +97,7 @@ tl::unexpected<Error> StreamConnection::Socket::lost(beast::error_code error) {
 // Some faults are the user's to correct: the error says how.
 Error StreamConnection::Socket::faulted(const protocol::Fault& fault, const Error& error) const {
   if (fault.code == CloseCode::no_such_dataset) {
-    return {"no data set '" + url.name + "' at " + url.server() + "; see intervale-client list " + url.server()};
+    return {"no data set '" + url.name + "' at " + url.server() + "; http" + url.server().substr(2) + "/api/datasets lists them"};
   }
   if (fault.code == CloseCode::unauthorized) return unauthorized(url);
   if (fault.code == CloseCode::forbidden) return {"the token does not grant '" + url.name + "' at " + url.server()};
