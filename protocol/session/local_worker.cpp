@@ -12,7 +12,7 @@ class LocalWorker::Answer : public RangeAnswer {
       : volume_(std::move(volume)), shown_(std::move(shown)), distances_(distances) {
     for (const ShownRange& one : shown_) {
       if (one == volume_->description().whole()) continue;
-      for (RangePart& part : parts_of(volume_->description().format, one, distances_)) parts_.push_back({std::move(part), nullptr});
+      for (const RangePart& part : parts_of(volume_->description().format, one, distances_)) parts_.push_back({part, nullptr});
     }
   }
   [[nodiscard]] bool is_ready() const override { return whole_ != nullptr; }
