@@ -248,7 +248,7 @@ std::vector<Lie> other_messages() {
       {"DoneBeforeAnything", after_opened(Done{1, 0, false}), {}, State::idle},
       {"FullOfNothing", after_opened(Done{1, 0, true}), {}, State::idle},
       {"FaultOfEscapes", fault(4400, escapes), "code 4400"},
-      {"FaultOfARangeWithEscapes", fault(4416, escapes), "--range"},
+      {"FaultOfARangeWithEscapes", fault(4416, escapes), "gone"},
       {"FaultWithoutText", fault(4409, ""), "code 4409"},
       {"FaultWithTooMuchText", fault(4400, std::string(201, 'x')), "text is too long"},
       {"FaultOfCode0", fault(0, "x"), "code 0"},
