@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <functional>
+#include <memory>
 
 namespace intervale {
 
@@ -39,8 +40,8 @@ void Progress::note(const std::string& line) {
 
 ParallelFor with_progress(Progress& progress, const ParallelFor& parallel) {
   if (!progress.is_seen()) return parallel;
-  return [&progress, parallel, step = 0](std::size_t count, const std::function<void(std::size_t)>& piece) mutable {
-    ++step;
+  return [&progress, parallel, steps = std::make_shared<int>(0)](std::size_t count, const std::function<void(std::size_t)>& piece) {
+    const int step = ++*steps;  // of all copies
     std::atomic<std::size_t> done = 0;
     parallel(count, [&](std::size_t i) {
       piece(i);

@@ -11,7 +11,7 @@
 
 namespace intervale {
 
-// For sessions over one data set after the other. One thread at a time. What is not measured is found at once: estimates
+// For one session. One thread at a time. What is not measured is found at once: estimates
 // take some 15 ns for each relevant update.
 class LocalWorker : public SessionWorker {
  public:

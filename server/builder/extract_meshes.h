@@ -22,7 +22,7 @@ struct ExtractedMesh {
 };
 
 // A mesh for each range, with these channels. shown: as check_held() accepts it. Fails as extract() does (extraction.h). Errors on the screen are
-// exact. Uses all cores that oneTBB may.
+// exact. Throws what `parallel` throws.
 [[nodiscard]] Result<std::vector<ExtractedMesh>> extract_meshes(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,
                                                                 const Lod& lod, std::span<const std::size_t> channels, const ParallelFor& parallel);
 

@@ -59,6 +59,10 @@ test('a file is shown in any range, beside the data sets of the server, and with
   const { page, errors, close } = await open(browser, server.url, kSmall);
   await settled(page);
   const block = await digestOf(page);
+  await page.evaluate(() => {
+    window.failures = [];
+    void window.intervale.next('error').then(({ text }) => window.failures.push(text));
+  });
   await choose(page, pathOf('any'), 'any');
   assert.ok(await page.isVisible('#histogram'), 'its statistics are shown');
   await set(page, { region: kWhole });
@@ -76,6 +80,7 @@ test('a file is shown in any range, beside the data sets of the server, and with
   await set(page, { range: [128, 188], region: null, pixelError: 0.5 });
   await matches(page, 'files-any');
   assert.equal((await progressOf(page)).reconnects, 0);
+  assert.deepEqual(await page.evaluate(() => window.failures), [], 'views are for the data set that is open');
   assert.deepEqual(errors, []);
   await close();
 });

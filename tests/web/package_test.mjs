@@ -109,13 +109,14 @@ test('arrays are those of the mesh, of each range', async () => {
   assert.deepEqual(events, ['load-start', 'load-end', 'load-start', 'load-end', 'load-start', 'load-end']);
 });
 
-test('a file is a data set without a server', async () => {
-  const found = await page.evaluate(async (ranges) => {
-    const arrays = await window.consumer.fileArrays('any.ivm', ranges);
-    await arrays.ended();
-    return arrays.shown();
+test('a file is a data set without a server, for several meshes at once', async () => {
+  const [first, second] = await page.evaluate(async (ranges) => {
+    const meshes = await window.consumer.fileArrays('any.ivm', ranges, [[20, 60]]);
+    await Promise.all(meshes.map((arrays) => arrays.ended()));
+    return Promise.all(meshes.map((arrays) => arrays.shown()));
   }, kRanges);
-  assert.equal(found.digest, fetched(server, 'any', '--range', '128', '188').digest);
+  assert.equal(first.digest, fetched(server, 'any', '--range', '128', '188').digest);
+  assert.equal(second.digest, fetched(server, 'any', '--range', '20', '60').digest);
   assert.match(await page.evaluate(() => window.consumer.refusal('no data set')), /^text\.ivm: [^\n]+$/);
 });
 

@@ -53,20 +53,17 @@ class LocalDataSet {
   // What a server's /api/datasets/NAME tells.
   [[nodiscard]] std::string describe() const { return data_set_json(*volume_); }
   [[nodiscard]] const std::shared_ptr<const IntervalVolume>& volume() const { return volume_; }
-  [[nodiscard]] LocalWorker& worker() { return worker_; }
 
  private:
   Inbox inbox_;
   std::shared_ptr<const IntervalVolume> volume_;
-  LocalWorker worker_;
 };
 
 // Of a data set that was loaded, and outlives it.
 class LocalSession {
  public:
-  explicit LocalSession(LocalDataSet& set)
-      : worker_(set.worker()),
-        state_([&set](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return set.volume(); }, worker_) {}
+  explicit LocalSession(const LocalDataSet& set)
+      : state_([&set](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return set.volume(); }, worker_) {}
 
   // For one message.
   val inbox(std::size_t size) { return inbox_.of(size); }
@@ -94,7 +91,7 @@ class LocalSession {
   }
 
   Inbox inbox_;
-  LocalWorker& worker_;
+  LocalWorker worker_;
   SessionState state_;
   std::optional<protocol::Fault> fault_;  // why the session ended
   bool is_fault_sent_ = false;
@@ -109,7 +106,7 @@ EMSCRIPTEN_BINDINGS(intervale_local) {
       .function("load", &LocalDataSet::load)
       .function("describe", &LocalDataSet::describe);
   emscripten::class_<LocalSession>("LocalSession")
-      .constructor<LocalDataSet&>()
+      .constructor<const LocalDataSet&>()
       .function("inbox", &LocalSession::inbox)
       .function("receive", &LocalSession::receive)
       .function("step", &LocalSession::step)

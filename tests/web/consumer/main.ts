@@ -111,10 +111,10 @@ class Three {
 
 const consumer = {
   arrays: async (address: string, ranges: Range[]) => new Arrays(await describe(address), streamUrl(addressOf(address).base), ranges),
-  // Of a file that is fetched, without the server of its data set.
-  fileArrays: async (url: string, ranges: Range[]) => {
+  // Of a file that is fetched, without the server of its data set: a mesh for each of these.
+  fileArrays: async (url: string, ...each: Range[][]) => {
     const local = await LocalDataset.open(await (await fetch(url)).blob(), 'any.ivm');
-    return new Arrays(local.dataset, local.connect(), ranges);
+    return each.map((ranges) => new Arrays(local.dataset, local.connect(), ranges));
   },
   // Why a file is refused.
   refusal: (text: string) => LocalDataset.open(new Blob([text]), 'text.ivm').then(() => '', (error: Error) => error.message),

@@ -103,8 +103,8 @@ export class LiveMesh extends (EventTarget as new () => Target) {
   open(to: string | MessagePort, dataset: string, wanted: Wanted, token: string | null = null): void {
     this.wanted = wanted;
     this.sentView = null;
-    this.sendView();
     this.send({ type: 'open', to, dataset, ...(token === null ? {} : { token }) }, typeof to === 'string' ? [] : [to]);
+    this.sendView(); // to this session, not to the last one, whose data set may lack these ranges
     this.sentPlane = wanted.plane;
     this.isAwaitingCap = this.isAwaitingPreview = false;
     this.send({ type: 'clip', plane: wanted.plane });

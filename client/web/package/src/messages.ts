@@ -27,11 +27,11 @@ export type MeshFormat = 'vtu' | 'stl' | 'glb';
 // From the page to the worker.
 export type Request =
   | { type: 'load'; wasmUrl: string | null } // the first: loads the core; null: from where it lies beside the worker
-  // Connects and streams; an open session is closed first. to: the address of the WebSocket, "ws://host:port/v1/stream", or
+  // Ends an open session; the next 'view' connects. to: the address of the WebSocket, "ws://host:port/v1/stream", or
   // the port of a LocalDataset.
   | { type: 'open'; to: string | MessagePort; dataset: string; token?: string }
   // The view that is wanted from now on. With a region: that at full detail. Without: everything, until the error is at
-  // most pixelError on the camera's screen. Before the first 'open': the view that the session starts with.
+  // most pixelError on the camera's screen. Nothing before 'open'.
   | { type: 'view'; view: View; number: number } // number: for Progress.view
   // Shown until the next 'view', of what was received; the server is not asked. If all of it would take too long, the
   // ranges that differ from the view's are coarser. Answered by a report of the same type once its surface was sent, which the page's showing of the last one

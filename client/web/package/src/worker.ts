@@ -1,7 +1,7 @@
 // The worker: loads the client core and hands the page's requests to the open session.
 import createCore, { type Core } from './core/core.js';
 
-import type { Report, Request, View } from './messages.js';
+import type { Report, Request } from './messages.js';
 import { type Extras, StreamSession } from './stream_session.js';
 
 const scope = self as unknown as DedicatedWorkerGlobalScope;
@@ -9,8 +9,6 @@ const report = (message: Report, transfer: Transferable[] = []) => scope.postMes
 
 let core: Promise<Core> | null = null; // since the first request
 let session: StreamSession | null = null;
-let view: View | null = null;
-let viewNumber = 0; // of it
 const extras: Extras = { edges: false, values: false, plane: null, box: null, volume: false };
 
 function load(wasmUrl: string | null): Promise<Core> {
@@ -31,12 +29,9 @@ async function handle(request: Request): Promise<void> {
     case 'open':
       session?.close();
       session = new StreamSession(loaded, request, extras, report);
-      if (view) session.look(view, viewNumber);
       return;
     case 'view':
-      view = request.view;
-      viewNumber = request.number;
-      return session?.look(view, viewNumber);
+      return session?.look(request.view, request.number);
     case 'preview':
       return session ? session.preview(request.ranges) : report({ type: 'preview' });
     case 'clip':
@@ -46,16 +41,10 @@ async function handle(request: Request): Promise<void> {
       extras.box = request.box;
       return session?.sendTets();
     case 'edges':
-      if (extras.edges === request.wanted) return;
-      extras.edges = request.wanted;
-      return session?.remake();
     case 'values':
-      if (extras.values === request.wanted) return;
-      extras.values = request.wanted;
-      return session?.remake();
     case 'volume':
-      if (extras.volume === request.wanted) return;
-      extras.volume = request.wanted;
+      if (extras[request.type] === request.wanted) return;
+      extras[request.type] = request.wanted;
       return session?.remake();
     case 'shown':
       return session?.pageShows(request.version);
