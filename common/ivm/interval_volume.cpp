@@ -32,7 +32,8 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
   if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.surface.to_distance.size() != parts.set.supercubes() ||
-      (!parts.surface.slopes.empty() && parts.surface.slopes.size() != parts.set.size()))
+      (!parts.surface.slopes.empty() && parts.surface.slopes.size() != parts.set.size()) ||
+      (!parts.surface.distances.empty() && parts.surface.distances.size() != parts.set.size()))
     return fail("the numbers of values, errors or supercubes do not match the set");
   if (std::any_of(parts.surface.slopes.begin(), parts.surface.slopes.end(), [](std::uint8_t slope) { return slope > kMaxSlope; }))
     return fail("a slope is out of range");

@@ -41,9 +41,10 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
   }
   b.pixels_ = pixels_per_unit(region);
   b.near_ = screen_->is_near(region);
-  b.weight_ = weight_of(region, b.scale_, b.pixels_, !b.near_);
   const float pixels = object_error * b.pixels_;
-  if (pixels > pixel_error_) b.bound_ = rank_of(importance_of(pixels, slope, b.weight_));
+  if (!(pixels > pixel_error_)) return b;
+  b.weight_ = weight_of(region, b.scale_, b.pixels_, !b.near_);
+  b.bound_ = rank_of(importance_of(pixels, slope, b.weight_));
   return b;
 }
 

@@ -38,13 +38,12 @@ class Ranking {
   // Ranks the updates of one supercube.
   class Supercube {
    public:
-    // The importance of an update with this error step and slope, with which it grows: 0 if it is not wanted for its own
-    // sake.
-    // The region of interest is not considered.
-    [[nodiscard]] float importance(unsigned step, unsigned slope) const {
+    // The importance of an update with this error step, distance and slope, with which it grows: 0 if it is not wanted for
+    // its own sake. The region of interest is not considered.
+    [[nodiscard]] float importance(unsigned step, std::uint8_t distance, unsigned slope) const {
       if (step < ranking_->least_step_) return 0;
       if (!ranking_->screen_) return float(step + 1);
-      const float pixels = ranking_->relevant_.object_error(supercube_, scale_, step) * pixels_;
+      const float pixels = ranking_->relevant_.object_error(supercube_, scale_, step, distance) * pixels_;
       return pixels > ranking_->pixel_error_ ? ranking_->importance_of(pixels, slope, weight_) : 0;
     }
     // The least importance of this rank, 1 or more; and the rank of an importance.
@@ -56,15 +55,16 @@ class Ranking {
       if (importance == 0) return 0;
       return ranking_->screen_ ? rank_of(importance) : Rank(importance);
     }
-    // No lower than the rank of any update here whose error step and slope are no higher.
-    [[nodiscard]] Rank bound(unsigned step, unsigned slope) const { return rank(importance(step, slope)); }
+    // No lower than the rank of any update here whose error step, distance and slope are no higher.
+    [[nodiscard]] Rank bound(unsigned step, std::uint8_t distance, unsigned slope) const { return rank(importance(step, distance, slope)); }
     // Whether the diamond in a slot meets the region of interest.
     [[nodiscard]] bool meets_roi(Slot slot) const {
       return !ranking_->roi_ || ranking_->roi_->meets(centre_of(key_, slot), std::int32_t(1) << scale_);
     }
     // The rank of update i, in this slot.
     [[nodiscard]] Rank operator()(UpdateIndex i, Slot slot) const {
-      return meets_roi(slot) ? rank(importance(ranking_->volume_.error_step(i), ranking_->relevant_.slope(i))) : Rank(0);
+      const RelevantUpdates& relevant = ranking_->relevant_;
+      return meets_roi(slot) ? rank(importance(ranking_->volume_.error_step(i), relevant.distance(i), relevant.slope(i))) : Rank(0);
     }
 
    private:

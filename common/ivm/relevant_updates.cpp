@@ -17,6 +17,8 @@ namespace {
 constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
 constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
 
+constexpr int kDistanceSteps = 8;  // an octave
+
 constexpr double kSlopeStep = 1.5;  // octaves
 constexpr int kSlopeOfOne = 7;
 
@@ -71,6 +73,15 @@ double diamond_width(const Grid& grid) {
   return 2 * longest;
 }
 
+std::uint8_t distance_at_least(double distance, double width) {
+  if (!(distance > 0)) return 0;
+  return std::uint8_t(std::clamp(std::ceil(kDistanceSteps * std::log2(distance / width / double(kMaxFarDeviation)) - 1e-4) + 255, 1.0, 255.0));
+}
+
+float distance_of(std::uint8_t distance, double width) {
+  return distance == 0 ? 0 : float(width * double(kMaxFarDeviation) * std::exp2((distance - 255.0) / kDistanceSteps));
+}
+
 unsigned slope_of(double removed) {
   // The least numbers that are nearer to the slopes from 2 on than to the one before.
   static const auto kFrom = [] {
@@ -90,6 +101,8 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
       slots_(std::move(slots)),
       error_to_distance_(std::move(surface.to_distance)),
       supercube_step_(set.supercubes()),
+      distances_(std::move(surface.distances)),
+      supercube_distance_(distances_.empty() ? 0 : set.supercubes()),
       slopes_(in_halves(surface.slopes)),
       supercube_slope_(set.supercubes()),
       brick_slope_(set.bricks().size()),
@@ -99,7 +112,10 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
       error_(errors.values.begin(), errors.values.end()),
       reach_(float(diamond_width(grid) / 2)) {
   const auto unit = float(error_to_distance_unit(grid, error_.empty() ? 0.0 : double(error_.back())));
-  for (unsigned code = 0; code < factor_.size(); ++code) factor_[code] = ErrorToDistance(std::uint8_t(code)).ratio(unit);
+  for (unsigned code = 0; code < factor_.size(); ++code) {
+    factor_[code] = ErrorToDistance(std::uint8_t(code)).ratio(unit);
+    distance_of_[code] = distance_of(std::uint8_t(code), diamond_width(grid));
+  }
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const UpdateIndex first = set.first(b, s);
@@ -119,15 +135,19 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
           supercube_slope_[s] = std::max(supercube_slope_[s], std::uint8_t(slope(first + count_below(occupancy, slot))));
         brick_slope_[b] = std::max(brick_slope_[b], supercube_slope_[s]);
       }
-      brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most));
+      if (has_distances()) {
+        for (const Slot slot : set_bits<Slot>(relevant))
+          supercube_distance_[s] = std::max(supercube_distance_[s], distances_[first + count_below(occupancy, slot)]);
+      }
+      brick_object_error_[b] = std::max(brick_object_error_[b], object_error(s, scale_of_key(key), most, supercube_distance(s)));
     });
   }
 }
 
 std::size_t RelevantUpdates::memory_bytes() const {
-  return slots_.size() * sizeof(std::uint64_t) + error_to_distance_.size() + supercube_step_.size() + brick_step_.size() + slopes_.size() +
-         supercube_slope_.size() + brick_slope_.size() + brick_updates_.size() * sizeof(std::uint16_t) + brick_object_error_.size() * sizeof(float) +
-         error_.size() * sizeof(float);
+  return slots_.size() * sizeof(std::uint64_t) + error_to_distance_.size() + supercube_step_.size() + brick_step_.size() + distances_.size() +
+         supercube_distance_.size() + slopes_.size() + supercube_slope_.size() + brick_slope_.size() + brick_updates_.size() * sizeof(std::uint16_t) +
+         brick_object_error_.size() * sizeof(float) + error_.size() * sizeof(float);
 }
 
 RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown) {
@@ -140,11 +160,25 @@ RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared
       for (UpdateIndex i{0}; i < volume.size(); ++i) surface.slopes[i] = std::max(surface.slopes[i], std::uint8_t(one->slope(i)));
     }
   }
+  const double width = diamond_width(volume.description().grid);
+  const bool has_distances = std::any_of(each.begin(), each.end(), [](const auto& one) { return one->has_distances(); });
+  if (has_distances) surface.distances.resize(volume.size());
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+      const std::uint64_t occupancy = set.occupancy()[s];
       for (const auto& one : each) {
-        slots[s] |= one->slots(s, set.occupancy()[s]);
+        slots[s] |= one->slots(s, occupancy);
         surface.to_distance[s] = ErrorToDistance::farther(surface.to_distance[s], one->error_to_distance()[s], scale_of_key(key));
+      }
+      for (const auto& one : each) {
+        for (const Slot slot : set_bits<Slot>(has_distances ? one->slots(s, occupancy) : 0)) {
+          const UpdateIndex i = set.first(b, s) + count_below(occupancy, slot);
+          const std::uint8_t distance =
+              one->has_distances()
+                  ? one->distance(i)
+                  : distance_at_least(double(one->object_error(surface.to_distance[s], scale_of_key(key), volume.error_step(i))), width);
+          surface.distances[i] = std::max(surface.distances[i], distance);
+        }
       }
     });
   }

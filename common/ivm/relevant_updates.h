@@ -56,10 +56,17 @@ inline constexpr unsigned kMaxSlope = 15;
 [[nodiscard]] unsigned slope_of(double removed);
 [[nodiscard]] float removed_of(unsigned slope);
 
+// Distances: how far, in world units, the surfaces can still move while an update's diamond is refined completely, for
+// each update. On a scale of logarithms, rounded up to one of eight steps an octave; 0: nothing moves. width: of a diamond
+// with h = 1.
+[[nodiscard]] std::uint8_t distance_at_least(double distance, double width);  // at most kMaxFarDeviation widths
+[[nodiscard]] float distance_of(std::uint8_t distance, double width);
+
 // What is known of how far surfaces move.
 struct SurfaceErrors {
   std::vector<ErrorToDistance> to_distance;  // by supercube
   std::vector<std::uint8_t> slopes = {};     // by number of the update, at most kMaxSlope; empty: not known
+  std::vector<std::uint8_t> distances = {};  // by number of the update; empty: not known, to_distance says what is
 };
 
 // The errors of an interval volume, by number of the update.
@@ -88,14 +95,20 @@ class RelevantUpdates {
   [[nodiscard]] std::span<const std::uint8_t> supercube_error_steps() const { return supercube_step_; }
   // How far the surfaces can still move, in world units, while an update's diamond is refined completely. An estimate:
   // 99 % of the surface should move no further, and nothing more than twice as far (FORMAT.md, "From errors to
-  // distances"). It depends on the update's supercube and scale, and grows with the error step. Not saturated.
-  [[nodiscard]] float object_error(SupercubeIndex supercube, int scale, unsigned step) const {
-    const ErrorToDistance to_distance = error_to_distance_[supercube];
-    const float distance = error_[step] * factor_[to_distance.code()];
-    return std::min(distance, reach_ * (to_distance.is_far() ? kMaxFarDeviation : float(1 << scale)));
+  // distances"). Where distances are known, that is what they say, and it grows with the distance. Otherwise it depends on
+  // the update's supercube and scale, and grows with the error step. Not saturated.
+  [[nodiscard]] float object_error(SupercubeIndex supercube, int scale, unsigned step, std::uint8_t distance) const {
+    return has_distances() ? distance_of_[distance] : object_error(error_to_distance_[supercube], scale, step);
+  }
+  [[nodiscard]] float object_error(ErrorToDistance to_distance, int scale, unsigned step) const {
+    return std::min(error_[step] * factor_[to_distance.code()], reach_ * (to_distance.is_far() ? kMaxFarDeviation : float(1 << scale)));
   }
   [[nodiscard]] float brick_object_error(BrickIndex brick) const { return brick_object_error_[brick]; }  // the largest of its relevant updates
   [[nodiscard]] std::span<const ErrorToDistance> error_to_distance() const { return error_to_distance_; }
+  // The distance of an update, and the largest of a supercube's relevant updates; 0 where they are not known.
+  [[nodiscard]] bool has_distances() const { return !distances_.empty(); }
+  [[nodiscard]] std::uint8_t distance(UpdateIndex i) const { return distances_.empty() ? std::uint8_t(0) : distances_[i]; }
+  [[nodiscard]] std::uint8_t supercube_distance(SupercubeIndex s) const { return distances_.empty() ? std::uint8_t(0) : supercube_distance_[s]; }
   // The slope of an update, and the highest of a brick's or a supercube's relevant updates; 0 where they are not known.
   [[nodiscard]] bool has_slopes() const { return !slopes_.empty(); }
   [[nodiscard]] unsigned slope(UpdateIndex i) const { return slopes_.empty() ? 0 : unsigned(slopes_[i / 2] >> (i % 2 * 4)) & 15U; }
@@ -108,6 +121,8 @@ class RelevantUpdates {
   std::vector<std::uint64_t> slots_;                // by supercube; empty: all
   std::vector<ErrorToDistance> error_to_distance_;  // by supercube
   std::vector<std::uint8_t> supercube_step_;        // by supercube
+  std::vector<std::uint8_t> distances_;             // by number of the update; empty: not known
+  std::vector<std::uint8_t> supercube_distance_;    // by supercube
   std::vector<std::uint8_t> slopes_;                // by two updates, the first in the lower half; empty: not known
   std::vector<std::uint8_t> supercube_slope_;       // by supercube
   std::vector<std::uint8_t> brick_slope_;           // by brick
@@ -116,12 +131,13 @@ class RelevantUpdates {
   std::vector<float> brick_object_error_;           // by brick
   std::vector<float> error_;                        // by error step
   std::array<float, 256> factor_;                   // by code of an ErrorToDistance
+  std::array<float, 256> distance_of_;              // by distance of an update
   float reach_ = 0;                                 // the largest object error for h = 1: half a diamond's width
 };
 
 // What several ranges, or the parts of one, need together: an update is relevant if it is to any of them, and the surfaces
-// around it can move as far as those that can move farthest. each: of this volume, one at least. shown: the ranges.
-// O(updates).
+// around it can move as far as those that can move farthest. Where some have distances, what is relevant to the others gets
+// them from errors: also inside, where values may show. each: of this volume, one at least. shown: the ranges. O(updates).
 [[nodiscard]] RelevantUpdates united(const IntervalVolume& volume, std::span<const std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown);
 
 }  // namespace intervale

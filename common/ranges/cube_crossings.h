@@ -10,7 +10,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/patch/range.h"
-#include "common/ranges/interpolation_error.h"
+#include "common/ranges/field.h"
 #include "common/util/vec3.h"
 
 namespace intervale {

@@ -11,9 +11,11 @@
 
 namespace intervale {
 
-// Of the set, the relevant diamonds; with slopes. Samples are finite. error: of an update, saturated; max_error: the
-// largest of the data set. range: as of surface_deviation(). Throws what `parallel` throws.
+// Of the set, the relevant diamonds; with slopes, and if they are wanted with distances. Samples are finite. error: of an
+// update, saturated; max_error: the largest of the data set. range: as of surface_deviation(). Throws what `parallel`
+// throws.
 [[nodiscard]] SurfaceErrors measure_error_to_distance(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
-                                                      const std::function<double(UpdateIndex)>& error, double max_error, const ParallelFor& parallel);
+                                                      const std::function<double(UpdateIndex)>& error, double max_error, bool with_distances,
+                                                      const ParallelFor& parallel);
 
 }  // namespace intervale

@@ -66,15 +66,18 @@ SurfaceErrors PartFinder::measure(const Range& range, const std::vector<std::uin
       }
     });
   }
-  SurfaceErrors result{std::vector<ErrorToDistance>(all.supercubes()), std::vector<std::uint8_t>(all.size())};
+  SurfaceErrors result{std::vector<ErrorToDistance>(all.supercubes()), std::vector<std::uint8_t>(all.size()), std::vector<std::uint8_t>(all.size())};
   if (keys.empty()) return result;
   const SupercubeSet relevant(keys, std::move(occupancy));
   if (!field_) field_.emplace(volume_, parallel_);
   const auto found = measure_error_to_distance(
       field_->samples(), field_->surface_of(range), volume_.domain(), relevant,
-      [&](UpdateIndex i) { return double(volume_.error_steps()[steps[i]]); }, volume_.description().max_error, parallel_);
+      [&](UpdateIndex i) { return double(volume_.error_steps()[steps[i]]); }, volume_.description().max_error, true, parallel_);
   for (std::size_t i = 0; i < number.size(); ++i) result.to_distance[number[i]] = found.to_distance[i];
-  for (std::size_t i = 0; i < update.size(); ++i) result.slopes[update[i]] = found.slopes[i];
+  for (std::size_t i = 0; i < update.size(); ++i) {
+    result.slopes[update[i]] = found.slopes[i];
+    result.distances[update[i]] = found.distances[i];
+  }
   return result;
 }
 

@@ -21,7 +21,7 @@ namespace intervale {
 enum class Distances {
   none,       // 0; levels of detail without a camera need no more
   estimated,  // estimate_distances.h: within a factor of 4 for most; some 15 ns for each relevant update
-  measured,   // error_to_distance.h; about a microsecond for each relevant update
+  measured,   // error_to_distance.h, for each update; one to two microseconds for each relevant update
 };
 
 // What is found of a range at once. Surfaces with the same values of keys on each side are one part, whichever end they

@@ -12,23 +12,13 @@
 
 #include "common/diamond/domain.h"
 #include "common/ranges/border_shape.h"
+#include "common/ranges/field.h"
 #include "common/util/bits.h"
 #include "common/util/parallel.h"
 #include "common/util/tetrahedron.h"
 #include "common/util/vec3.h"
 
 namespace intervale {
-
-// Samples of type T, indexed by vertices inside the box.
-template <class T>
-struct Field {
-  std::span<const T> samples;
-  Vertex last;
-  [[nodiscard]] std::size_t index(Vertex v) const {
-    return (std::size_t(v.z) * std::size_t(last.y + 1) + std::size_t(v.y)) * std::size_t(last.x + 1) + std::size_t(v.x);
-  }
-  [[nodiscard]] double at(Vertex v) const { return double(samples[index(v)]); }
-};
 
 // The largest |F - interpolation| over rows of samples, along which the interpolant grows linearly.
 template <class T, class Real>

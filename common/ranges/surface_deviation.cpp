@@ -4,15 +4,19 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <span>
 
 #include "common/ivm/interval_volume.h"
 #include "common/patch/visit_samples.h"
 #include "common/ranges/bisection.h"
+#include "common/ranges/crossing_measure.h"
 #include "common/ranges/cube_crossings.h"
-#include "common/ranges/interpolation_error.h"
+#include "common/ranges/field.h"
+#include "common/ranges/patch_measure.h"
 #include "common/util/atomic_ref.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
@@ -58,22 +62,26 @@ class Mean {
   std::uint64_t bits_ = 0;
 };
 
+// What is measured, as of SurfaceDeviation.
+struct Found {
+  std::span<float> largest, farthest;  // by update; farthest: empty if it is not wanted
+  std::span<Mean> means;               // by supercube: deviations in its tetrahedra over the diamonds' width
+  std::span<std::int64_t> removed;     // by update, in squares of the width of a diamond with h = 1, over kRemovedOne
+};
+
 // Takes the crossings of each cube down its bisection, and records how far each diamond's patches are from them.
 template <class T>
 class Descent {
  public:
-  Descent(const Field<T>& field, const Range& range, const Grid& grid, const Domain& domain, const SupercubeSet& set, std::vector<float>& largest,
-          std::vector<Mean>& means, std::vector<std::int64_t>& removed)
+  Descent(const Field<T>& field, const Isosurfaces& surfaces, const Grid& grid, const Domain& domain, const SupercubeSet& set, const Found& found)
       : field_(field),
         inverse_(grid.affine.inverse()),
-        affine_(grid.affine),
         domain_(domain),
         set_(set),
-        surfaces_(range),
+        surfaces_(surfaces),
         finder_(field, surfaces_),
-        largest_(largest),
-        means_(means),
-        removed_(removed),
+        measure_(field, grid.affine, domain),
+        found_(found),
         width_(diamond_width(grid)) {
     if (surfaces_.count > 0) zero_ = surfaces_.surface[0].value;
     for (int k = 0; k < surfaces_.count; ++k) isovalue_[k] = float(surfaces_.surface[k].value - zero_);
@@ -97,31 +105,6 @@ class Descent {
       Cursor cursor{{}, spare.get(), is_inside};
       descend<0>(tet_of(cube, kPaths[t]), crossings, {unknown, unknown}, cursor);
     }
-  }
-
-  // The distance from where a patch cuts a diamond's spine to the nearest crossing of the field on it, in world units.
-  [[nodiscard]] double measure_tip(const Diamond& d) const {
-    const Vertex a = d.vertex(0), b = d.vertex(1);
-    if (!domain_.contains(a) || !domain_.contains(b)) return 0;
-    const T* const samples = &field_.samples[field_.index(a)];
-    const T* const end = &field_.samples[field_.index(b)];
-    const int steps = 2 * d.h;
-    const double first = double(*samples), last = double(*end);
-    double far = 0;
-    for (int k = 0; k < surfaces_.count; ++k) {
-      const Isosurface& surface = surfaces_.surface[k];
-      if (!surface.separates(first, last)) continue;
-      const std::ptrdiff_t stride = (end - samples) / steps;
-      const double cut = steps * part_of(surface.value, first, last);
-      double nearest = steps;
-      for (int i = 0; i < steps; ++i) {
-        const double u = double(samples[i * stride]), w = double(samples[(i + 1) * stride]);
-        if (surface.separates(u, w)) nearest = std::min(nearest, std::abs(i + part_of(surface.value, u, w) - cut));
-      }
-      far = std::max(far, nearest);
-    }
-    if (far == 0) return 0;
-    return far * length(affine_.direction({double(b.x - a.x) / steps, double(b.y - a.y) / steps, double(b.z - a.z) / steps}));
   }
 
  private:
@@ -216,7 +199,8 @@ class Descent {
     const bool is_moved =
         !cursor.is_inside && !std::all_of(tet.corner.begin(), tet.corner.end(), [&](const Tet::Corner& c) { return domain_.contains(c.at); });
     const double squared_slope = is_moved ? 0 : dot(tet.gradient, tet.gradient), slope = std::sqrt(squared_slope);
-    double largest = 0, sum = 0, sum_of_squares = 0;
+    double largest = 0, farthest = found_.farthest.empty() ? 0 : double(AtomicRef<float>(found_.farthest[update]).load(std::memory_order_relaxed)),
+           sum = 0, sum_of_squares = 0;
     std::size_t all = 0;
     for (std::size_t k = 0; k < kMaxSurfaces; ++k) {
       if (crossings[k].empty()) continue;
@@ -226,17 +210,21 @@ class Descent {
       all += crossings[k].size();
       if (is_moved || has_patch(tet, centre, surfaces_.surface[k])) {
         nearest[k] = width;
+        if (!found_.farthest.empty())
+          farthest = is_moved ? width : measure_.distance_to_patches(tet, centre, surfaces_.surface[k], zero_, crossings[k], farthest, width);
         largest = std::max(largest, missed.largest < width * slope ? missed.largest / slope : width);
         const double most = count * width * width;
         sum_of_squares += missed.sum_of_squares < most * squared_slope ? missed.sum_of_squares / squared_slope : most;
       } else {
         const double far = nearest[k] > kFarWidths * width ? nearest[k] : width;
         largest = std::max(largest, far);
+        if (!found_.farthest.empty()) farthest = std::max(farthest, far);
         sum_of_squares += count * far * far;
       }
     }
-    if (largest > kLeastDeviation * width_) raise(largest_[update], round_up(largest));
-    if (!is_moved) means_[cursor.near[std::size_t(tet.scale)].supercube].add(sum / (double(all) * width * slope));
+    if (largest > kLeastDeviation * width_) raise(found_.largest[update], round_up(largest));
+    if (farthest > kLeastDeviation * width_) raise(found_.farthest[update], round_up(farthest));
+    if (!is_moved) found_.means[cursor.near[std::size_t(tet.scale)].supercube].add(sum / (double(all) * width * slope));
     return sum_of_squares / (width_ * width_);
   }
 
@@ -250,7 +238,7 @@ class Descent {
     const double before = record(tet, centre, *update, crossings, nearest, cursor);
     double after = 0;
     if (tet.scale > 0 || kClass < 2) after = descend_into_halves<kClass>(tet, {centre, float(value(centre))}, crossings, nearest, cursor);
-    AtomicRef<std::int64_t>(removed_[*update]).fetch_add(whole((before - after) * kRemovedOne), std::memory_order_relaxed);
+    AtomicRef<std::int64_t>(found_.removed[*update]).fetch_add(whole((before - after) * kRemovedOne), std::memory_order_relaxed);
     return before;
   }
 
@@ -298,40 +286,54 @@ class Descent {
   }
 
   const Field<T>& field_;
-  Affine inverse_, affine_;  // of the grid
+  Affine inverse_;  // of the grid's map
   const Domain& domain_;
   const SupercubeSet& set_;
   Isosurfaces surfaces_;
   CrossingFinder<T> finder_;
-  std::vector<float>& largest_;         // by update
-  std::vector<Mean>& means_;            // by supercube: deviations in its tetrahedra over the diamonds' width
-  std::vector<std::int64_t>& removed_;  // by update, in squares of width_ / kRemovedOne
-  double width_;                        // of a diamond with h = 1
-  BySurface<float> isovalue_{};         // counted from zero_
-  double zero_ = 0;                     // values in tetrahedra are counted from it, so that floats are precise enough
+  CrossingMeasure<T> measure_;
+  Found found_;
+  double width_;                 // of a diamond with h = 1
+  BySurface<float> isovalue_{};  // counted from zero_
+  double zero_ = 0;              // values in tetrahedra are counted from it, so that floats are precise enough
 };
 
 }  // namespace
 
-SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
+SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set, bool with_farthest,
                                    const ParallelFor& parallel) {
-  SurfaceDeviation result{std::vector<float>(set.size(), 0), std::vector<float>(set.supercubes()), std::vector<double>(set.size()), 0};
+  SurfaceDeviation result{std::vector<float>(set.size(), 0), std::vector<float>(with_farthest ? set.size() : 0), std::vector<float>(set.supercubes()),
+                          std::vector<double>(set.size()), 0};
   std::vector<std::int64_t> removed(set.size());
-  std::vector<float>& largest = result.largest;
+  std::vector<float>&largest = result.largest, &farthest = result.farthest;
   std::vector<Mean> means(set.supercubes());
   const int top = std::min(kTopScale, domain.levels() - 1);
   result.top_scale = top;
   const double width = diamond_width(volume.grid);
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain.last()};
-    const Descent<T> descent(field, range, volume.grid, domain, set, largest, means, removed);
+    const Isosurfaces surfaces(range);
+    const Descent<T> descent(field, surfaces, volume.grid, domain, set, {largest, farthest, means, removed});
+    // Two surfaces in the wrong order are the ends of many (restored_field.h): the patches of one of these do.
+    const PatchMeasure<T> patches(field, volume.grid.affine, domain);
+    // In the wrong order they are the ends of many (restored_field.h), of whose patches those of one will do.
+    const Isosurfaces one_of_each =
+        range.alpha > range.beta ? Isosurfaces({std::midpoint(range.alpha, range.beta), std::numeric_limits<double>::infinity()}) : surfaces;
     std::vector<Diamond> cubes;  // shared out one by one: they are few, and bricks even fewer
     set.for_each(top, 0, [&](const Place& p) { cubes.emplace_back(set.centre(p)); });
     parallel(cubes.size(), [&](std::size_t i) { descent.measure(cubes[i]); });
+    const auto at_least = [&](float& to, double distance) {
+      if (distance > kLeastDeviation * width) to = std::max(to, round_up(distance));
+    };
     parallel(set.bricks().size(), [&](std::size_t b) {
       set.for_each_in_brick(BrickIndex(std::uint32_t(b)), ~std::uint64_t(0), [&](const Place& p) {
-        const double tip = descent.measure_tip(Diamond(SupercubeSet::centre(p), scale_of_key(p.key), kTypeOfSlot[p.slot]));
-        if (tip > kLeastDeviation * width) largest[p.index] = std::max(largest[p.index], round_up(tip));
+        const Diamond d(SupercubeSet::centre(p), scale_of_key(p.key), kTypeOfSlot[p.slot]);
+        const double tip = patches.at_spine(d, surfaces);
+        at_least(largest[p.index], tip);
+        if (!with_farthest || d.scale > top) return;
+        at_least(farthest[p.index], tip);
+        at_least(farthest[p.index],
+                 patches.within_patches(d, one_of_each, std::max(double(farthest[p.index]), kLeastDeviation * width), width * d.h));
       });
     });
   });
@@ -341,7 +343,10 @@ SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, con
   for (int scale = top + 1; scale < domain.levels(); ++scale) {
     const auto [begin, end] = set.of_scale(scale);
     for (BrickIndex b = begin; b < end; ++b)
-      set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) { largest[p.index] = round_up(width * double(1 << scale)); });
+      set.for_each_in_brick(b, ~std::uint64_t(0), [&](const Place& p) {
+        largest[p.index] = round_up(width * double(1 << scale));
+        if (with_farthest) farthest[p.index] = largest[p.index];
+      });
   }
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     set.for_each_supercube(

@@ -12,6 +12,9 @@
 // That bounds the distance from the full mesh to the coarse one. In the other direction, tips of thin pieces slide
 // along an edge and stay near the plane all the while. Such an edge is the spine of the diamond that splits it, so that
 // diamond measures how far apart the two meshes cut it.
+//
+// Distances to first order are off where the nearest point of a patch's plane is not in the patch. Where that matters,
+// crossing_measure.h takes the distance to the patch, and patch_measure.h finds patches that cover holes.
 #pragma once
 
 #include <vector>
@@ -28,6 +31,9 @@ struct SurfaceDeviation {
   // By update: the largest deviation of any surface point in its diamond, not saturated. For diamonds of coarse scales,
   // and those with tetrahedra that the border moves: their width. More than the width where a small piece has no patch.
   std::vector<float> largest;
+  // By update, if it was asked for: like `largest`, but of distances that are not to first order; and the distances of some
+  // points of the patches to the surface.
+  std::vector<float> farthest;
   // By supercube: the mean over the surface points in its tetrahedra; 0 if it was not measured.
   std::vector<float> mean;
   // By update: the sum over the surface points in its tetrahedra of what its refinement takes off the square of their
@@ -40,6 +46,6 @@ struct SurfaceDeviation {
 // Of the diamonds of `set`, the relevant ones. Samples are finite. Of `range` only the surfaces count: alpha may be
 // greater than beta. Throws what `parallel` throws.
 [[nodiscard]] SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, const Domain& domain, const SupercubeSet& set,
-                                                 const ParallelFor& parallel = serial);
+                                                 bool with_farthest = false, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

@@ -84,10 +84,17 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   steps_.assign(kStepsPage, {});
 }
 
+StreamPlan::Highest StreamPlan::of_update(UpdateIndex i) const {
+  return {std::uint8_t(volume_->error_step(i)), relevant_->distance(i), std::uint8_t(relevant_->slope(i))};
+}
+
+StreamPlan::Highest StreamPlan::of_relevant(SupercubeIndex s) const {
+  return {relevant_->supercube_error_steps()[s], relevant_->supercube_distance(s), relevant_->supercube_slopes()[s]};
+}
+
 StreamPlan::Highest StreamPlan::highest(SupercubeIndex s) const {
   const std::uint32_t page = steps_page_[s / kStepsPage];
-  return page == 0 ? Highest{relevant_->supercube_error_steps()[s], relevant_->supercube_slopes()[s]}
-                   : steps_[std::size_t(page) * kStepsPage + s % kStepsPage];
+  return page == 0 ? of_relevant(s) : steps_[std::size_t(page) * kStepsPage + s % kStepsPage];
 }
 
 void StreamPlan::set_highest(SupercubeIndex s, Highest to) {
@@ -98,8 +105,7 @@ void StreamPlan::set_highest(SupercubeIndex s, Highest to) {
     const std::size_t first = std::size_t(s) - s % kStepsPage;
     const auto end = std::min<std::size_t>(relevant_->supercube_error_steps().size(), first + kStepsPage);
     steps_.resize((page + 1) * std::size_t(kStepsPage));
-    for (std::size_t i = first; i < end; ++i)
-      steps_[page * std::size_t(kStepsPage) + i - first] = {relevant_->supercube_error_steps()[i], relevant_->supercube_slopes()[i]};
+    for (std::size_t i = first; i < end; ++i) steps_[page * std::size_t(kStepsPage) + i - first] = of_relevant(SupercubeIndex(std::uint32_t(i)));
   }
   steps_[std::size_t(page) * kStepsPage + s % kStepsPage] = to;
 }
@@ -140,13 +146,13 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     if ((relevant_->slots(here.supercube, here.occupancy) >> slot & 1) == 0) return;
     Pending& pending = pending_[here.brick];
     ++pending.unsent;
-    const unsigned error_step = volume_->error_step(i);
-    const unsigned slope = relevant_->slope(i);
-    pending.error_step = std::max(pending.error_step, std::uint8_t(error_step));
-    pending.slope = std::max(pending.slope, std::uint8_t(slope));
-    pending.object_error = Up16(std::max(float(pending.object_error), relevant_->object_error(here.supercube, scale_of_key(g.key), error_step)));
+    const Highest again = of_update(i);
+    pending.error_step = std::max(pending.error_step, again.error_step);
+    pending.slope = std::max(pending.slope, again.slope);
+    pending.object_error =
+        Up16(std::max(float(pending.object_error), relevant_->object_error(here.supercube, scale_of_key(g.key), again.error_step, again.distance)));
     Highest highest = this->highest(here.supercube);
-    highest.raise(error_step, slope);
+    highest.raise(again);
     set_highest(here.supercube, highest);
   });
   return true;
@@ -285,8 +291,8 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
     if (full) return;
     rest.rank = std::max(rest.rank, here->rank);
     rest.wanted += here->wanted;
-    rest.highest.raise(here->highest.error_step, here->highest.slope);
-    object_error = std::max(object_error, relevant_->object_error(s, scale_of_key(key), here->highest.error_step));
+    rest.highest.raise(here->highest);
+    object_error = std::max(object_error, relevant_->object_error(s, scale_of_key(key), here->highest.error_step, here->highest.distance));
   });
   if (full) return false;
   set_pending(brick, rest.rank, rest.wanted);
@@ -308,7 +314,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   if (candidates == 0) return rest;
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
-  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.slope), budget_ ? Rank(1) : Rank(0));
+  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.distance, rest.highest.slope), budget_ ? Rank(1) : Rank(0));
   if (bound < band_) {
     rest.rank = bound;
     rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
@@ -317,10 +323,8 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   builder.visited += count;
   rest = {};
   if (!add_band(ranking, first, candidates, builder, rest)) return {};
-  for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1) {
-    const UpdateIndex i = first.index + std::countr_zero(others);
-    rest.highest.raise(volume_->error_step(i), relevant_->slope(i));
-  }
+  for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1)
+    rest.highest.raise(of_update(first.index + std::countr_zero(others)));
   set_highest(s, rest.highest);
   return rest;
 }
@@ -335,13 +339,13 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const Place& place,
   // Without branches on what is in the band: that is hard to foresee.
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
     const UpdateIndex i = first + count_below(occupancy, slot);
-    const unsigned error_step = volume_->error_step(i), slope = relevant_->slope(i);
-    float importance = ranking.importance(error_step, slope);
+    const Highest own = of_update(i);
+    float importance = ranking.importance(own.error_step, own.distance, own.slope);
     if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;
     importance = std::max(importance, least);
     const bool is_in_it = importance > 0 && importance >= in_band;
     in_it.slots |= std::uint64_t(is_in_it) << slot;
-    rest.highest.raise(is_in_it ? 0 : error_step, is_in_it ? 0 : slope);
+    rest.highest.raise(is_in_it ? Highest{} : own);
     rest.wanted += unsigned(importance > 0) & unsigned(!is_in_it);
     greatest = std::max(greatest, is_in_it ? 0 : importance);
   }

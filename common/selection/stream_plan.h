@@ -37,7 +37,7 @@ struct Batch {
 inline constexpr std::size_t kFirstPayload = 8 << 10;
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
-// brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and two
+// brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and three
 // bytes for each supercube.
 class StreamPlan {
  public:
@@ -127,15 +127,18 @@ class StreamPlan {
     Up16 pixels;  // on the camera's screen; 0 without one
   };
   void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
-  // Upper bounds on the error steps and slopes of unsent updates.
+  // Upper bounds on the error steps, distances and slopes of unsent updates.
   struct Highest {
-    std::uint8_t error_step = 0, slope = 0;
-    void raise(unsigned step, unsigned its_slope) {
-      error_step = std::max(error_step, std::uint8_t(step));
-      slope = std::max(slope, std::uint8_t(its_slope));
+    std::uint8_t error_step = 0, distance = 0, slope = 0;
+    void raise(const Highest& other) {
+      error_step = std::max(error_step, other.error_step);
+      distance = std::max(distance, other.distance);
+      slope = std::max(slope, other.slope);
     }
     friend bool operator==(const Highest&, const Highest&) = default;
   };
+  [[nodiscard]] Highest of_update(UpdateIndex i) const;
+  [[nodiscard]] Highest of_relevant(SupercubeIndex s) const;
   [[nodiscard]] Highest highest(SupercubeIndex s) const;
   void set_highest(SupercubeIndex s, Highest to);
   void rank_bricks();

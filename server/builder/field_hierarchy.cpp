@@ -248,7 +248,8 @@ Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>&
   for (const BrickPart& part : by_brick) d.coefficients += part.coefficients;
   d.full = full_mesh(by_brick);
   parts.surface = measure_error_to_distance(
-      volume_, range_, domain_, set_, [&parts](UpdateIndex i) { return double(parts.error_steps[parts.steps[i]]); }, d.max_error, on_all_cores);
+      volume_, range_, domain_, set_, [&parts](UpdateIndex i) { return double(parts.error_steps[parts.steps[i]]); }, d.max_error, false,
+      on_all_cores);
   return IntervalVolume::assemble(std::move(parts));
 }
 

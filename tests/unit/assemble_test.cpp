@@ -42,6 +42,7 @@ TEST_F(Assemble, PartsThatDoNotFitAreRefused) {
       {"too few steps", [](Parts& p) { p.steps.pop_back(); }},
       {"too few error_to_distance codes", [](Parts& p) { p.surface.to_distance.pop_back(); }},
       {"too few slopes", [](Parts& p) { p.surface.slopes.pop_back(); }},
+      {"too few distances", [](Parts& p) { p.surface.distances.resize(p.set.size() - 1); }},
       {"a slope out of range", [](Parts& p) { p.surface.slopes.back() = kMaxSlope + 1; }},
       {"too many steps", [](Parts& p) { p.steps.push_back(0); }},
       {"no steps", [](Parts& p) { p.steps.clear(); }},

@@ -139,7 +139,7 @@ class ObjectErrors : public ::testing::TestWithParam<unsigned> {
 TEST_P(ObjectErrors, AreNeverAboveHalfTheDiamondsWidthOrWhatIsFurthest) {
   sigma_->set().for_each_down([&](const Place& p) {
     const double width = diamond_width(volume_.grid) * Diamond(SupercubeSet::centre(p)).h;
-    const float error = sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index));
+    const float error = sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index), 0);
     const bool is_far = sigma_->relevant().error_to_distance()[p.supercube].is_far();
     ASSERT_LE(error, (is_far ? 64 * diamond_width(volume_.grid) : width) / 2 * (1 + 1e-6));
     ASSERT_GE(error, 0);
@@ -156,7 +156,7 @@ TEST_P(ObjectErrors, AreNoLessThanHalfOfWhatWasMeasuredAnywhereBelow) {
   std::size_t told = 0;
   set.for_each_down([&](const Place& p) {
     if (sigma_->error(p.index) == 0) return;  // no factor makes anything of that
-    ASSERT_GE(sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index)), moves[p.index] / 2 * (1 - 1e-5));
+    ASSERT_GE(sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index), 0), moves[p.index] / 2 * (1 - 1e-5));
     told += moves[p.index] > 0;
   });
   EXPECT_GT(told, 10u);
@@ -166,7 +166,7 @@ TEST_P(ObjectErrors, OfABrickAreThoseOfOneOfItsUpdates) {
   const SupercubeSet& set = sigma_->set();
   std::vector<float> largest(set.bricks().size());
   set.for_each_down([&](const Place& p) {
-    largest[p.brick] = std::max(largest[p.brick], sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index)));
+    largest[p.brick] = std::max(largest[p.brick], sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index), 0));
   });
   for (BrickIndex b{0}; b < largest.size(); ++b) EXPECT_EQ(sigma_->relevant().brick_object_error(b), largest[b]);
 }

@@ -108,7 +108,7 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
     const Ranking ranking(volume_, testing::random_lod(volume_.description().grid, random_));
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
       const unsigned level = volume_.relevant().supercube_error_steps()[p.supercube];
-      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, volume_.relevant().supercube_slopes()[p.supercube]), rank)
+      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, 0, volume_.relevant().supercube_slopes()[p.supercube]), rank)
           << "trial " << trial;
     });
   }
@@ -135,6 +135,33 @@ TEST_P(Ranks, WantedIsWhatTheNaiveModelWants) {
     });
   }
   EXPECT_GT(wanted, 100u);
+}
+
+// Of a range whose distances were measured by update: what moves too far is wanted, whatever its error, and bounds hold.
+TEST_P(Ranks, WhereDistancesAreKnownTheyTellWhatIsWanted) {
+  const Grid& g = volume_.description().grid;
+  auto parts = testing::parts_of(volume_);
+  for (UpdateIndex i{0}; i < volume_.size(); ++i) parts.surface.distances.push_back(std::uint8_t(random_() % 256));
+  const IntervalVolume volume = IntervalVolume::assemble(std::move(parts)).value();
+  for (int trial = 0; trial < 20; ++trial) {
+    Lod lod;
+    lod.camera = testing::random_camera(g, random_);
+    lod.camera->pixel_error = std::pow(2.0, testing::uniform(random_, -8, 6));
+    const ScreenError view(*lod.camera, g);
+    const Ranking ranking(volume, lod);
+    for_each_rank(volume, ranking, [&](const Place& p, Ranking::Rank rank) {
+      const Ranking::Brick brick = ranking.of_brick(p.brick);
+      const RelevantUpdates& relevant = volume.relevant();
+      ASSERT_GE(brick.bound(), rank);
+      ASSERT_GE(brick.supercube(p.supercube, p.key)
+                    .bound(relevant.supercube_error_steps()[p.supercube], relevant.supercube_distance(p.supercube),
+                           relevant.supercube_slopes()[p.supercube]),
+                rank);
+      const double pixels = double(distance_of(relevant.distance(p.index), diamond_width(g))) * pixels_per_unit(volume, view, p);
+      if (std::abs(pixels - lod.camera->pixel_error) < 1e-5 * pixels) return;
+      ASSERT_EQ(rank != 0, pixels > lod.camera->pixel_error) << "trial " << trial;
+    });
+  }
 }
 
 // What it is all for: no surface point in the picture is left further off than asked for, by any update that is not

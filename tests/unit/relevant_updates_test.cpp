@@ -53,6 +53,9 @@ TEST_P(United, IsWhatEachRangeNeeds) {
     const RelevantUpdates all = united(*volume_, each, shown_by(each));
     const bool has_slopes = std::all_of(each.begin(), each.end(), [](const auto& one) { return one->has_slopes(); });
     ASSERT_EQ(all.has_slopes(), has_slopes);
+    const bool has_distances = std::any_of(each.begin(), each.end(), [](const auto& one) { return one->has_distances(); });
+    ASSERT_EQ(all.has_distances(), has_distances);
+    const bool all_have_distances = std::all_of(each.begin(), each.end(), [](const auto& one) { return one->has_distances(); });
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
       unsigned brick_step = 0;
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
@@ -74,14 +77,29 @@ TEST_P(United, IsWhatEachRangeNeeds) {
         ASSERT_EQ(all.supercube_slopes()[s], steepest);
         ASSERT_GE(all.brick_slope(b), steepest);
         brick_step = std::max(brick_step, most);
-        for (unsigned step = 0; step < volume_->error_steps().size(); step += 7) {
+        std::uint8_t longest = 0;
+        for (const Slot slot : set_bits<Slot>(slots)) {
+          const UpdateIndex i = set.first(b, s) + count_below(occupancy, slot);
+          const auto error = [&](const RelevantUpdates& of) { return of.object_error(s, scale_of_key(key), volume_->error_step(i), of.distance(i)); };
           float farthest = 0;
-          for (const auto& one : each) farthest = std::max(farthest, one->object_error(s, scale_of_key(key), step));
-          ASSERT_GE(all.object_error(s, scale_of_key(key), step), farthest);
+          for (const auto& one : each) {
+            if ((one->slots(s, occupancy) >> slot & 1) != 0) farthest = std::max(farthest, error(*one));
+          }
+          ASSERT_GE(error(all), farthest * (1 - 1e-5F));
+          if (all_have_distances) {
+            ASSERT_LE(error(all), farthest * 1.0906F) << "more than one of its steps longer";
+          }
+          // What is refined inside has no distances of its own: it is wanted as far as errors tell.
+          const bool is_told_by_error = has_distances && std::any_of(each.begin(), each.end(), [&](const auto& one) {
+                                          return !one->has_distances() && (one->slots(s, occupancy) >> slot & 1) != 0;
+                                        });
+          if (is_told_by_error) {
+            ASSERT_GE(error(all), all.object_error(all.error_to_distance()[s], scale_of_key(key), volume_->error_step(i)) * (1 - 1e-5F));
+          }
+          ASSERT_GE(all.brick_object_error(b), error(all));
+          longest = std::max(longest, all.distance(i));
         }
-        if (slots != 0) {
-          ASSERT_GE(all.brick_object_error(b), all.object_error(s, scale_of_key(key), most));
-        }
+        ASSERT_EQ(all.supercube_distance(s), longest);
       });
       ASSERT_EQ(all.brick_error_step(b), brick_step);
     }
@@ -116,7 +134,8 @@ TEST(FindRelevantUpdates, EstimatesDistances) {
         ASSERT_EQ(estimated->slots(s, set.occupancy()[s]), measured->slots(s, set.occupancy()[s]));
         if (scale_of_key(key) != 0) return;
         const unsigned step = measured->supercube_error_steps()[s];
-        const float as_estimated = estimated->object_error(s, 0, step), as_measured = measured->object_error(s, 0, step);
+        const float as_estimated = estimated->object_error(s, 0, step, 0),
+                    as_measured = measured->object_error(s, 0, step, measured->supercube_distance(s));
         if (as_measured > 0 && as_estimated > 0) octaves.push_back(std::log2(as_estimated / as_measured));
       });
     }
@@ -125,6 +144,22 @@ TEST(FindRelevantUpdates, EstimatesDistances) {
   ASSERT_GT(octaves.size(), 1000u);
   EXPECT_NEAR(octaves[octaves.size() / 2], 0, 1);
   EXPECT_LT(octaves[octaves.size() * 99 / 100], 5);
+}
+
+// No step is below what it stands for, and none above by more than an eighth of an octave.
+TEST(DistanceOfAnUpdate, IsRoundedUpToTheNextStep) {
+  EXPECT_EQ(distance_at_least(0, 3), 0);
+  EXPECT_EQ(distance_of(0, 3), 0);
+  EXPECT_EQ(distance_at_least(1e300, 3), 255);
+  EXPECT_FLOAT_EQ(distance_of(255, 3), 3 * kMaxFarDeviation);
+  for (const double width : {1e-30, 2.0, 3e20}) {
+    for (double distance = 1e-6; distance < 64; distance *= 1.01) {
+      const std::uint8_t step = distance_at_least(distance * width, width);
+      EXPECT_GE(double(distance_of(step, width)), distance * width * (1 - 1e-4));
+      EXPECT_LT(double(distance_of(std::uint8_t(step - 1), width)), distance * width * (1 + 1e-4));
+    }
+    for (unsigned step = 1; step < 256; ++step) EXPECT_EQ(distance_at_least(double(distance_of(std::uint8_t(step), width)), width), step);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Random, United, ::testing::Range(0u, 8u));
