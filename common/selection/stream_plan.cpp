@@ -11,7 +11,6 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kSmallBatch = 8 << 10;  // the end of a band closes a batch of this size or more
 // Supercubes and updates visited in one call of next(), which ends its batch: some 2 ms. Much less would cut what a drag of
 // a range needs, a few updates in many places, into small batches that name the same supercubes again.
 constexpr std::uint32_t kMaxVisited = 1 << 18;
@@ -370,7 +369,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   BatchBuilder builder(*volume_, sent_, wanted_channels_, max_bytes);
   while (!done()) {
     if (next_brick_ == 0) {
-      if (builder.bytes >= kSmallBatch) break;
+      if (builder.bytes >= max_bytes / 4 * 3) break;  // little room for another band: it would pay for its names twice
       begin_band();
     }
     if (pending_[next_brick_ - 1].rank < band_) {
