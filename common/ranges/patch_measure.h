@@ -29,12 +29,12 @@ class FinestField {
         stride_{1, field.last.x + 1, std::ptrdiff_t(field.last.x + 1) * (field.last.y + 1)},
         last_{field.last.x, field.last.y, field.last.z} {}
 
-  // At a point in sample coordinates, or the point of the box that is nearest to it.
+  // At a point in sample coordinates, or the point of the box that is nearest to it. What is not a number counts as 0.
   [[nodiscard]] double at(const Vec3& p) const {
     const T* sample = field_.samples.data();
     std::array<std::pair<double, std::ptrdiff_t>, 3> step;  // how far along each axis, and to which sample
     for (int k = 0; k < 3; ++k) {
-      const double c = std::clamp(p[k], 0.0, double(last_[k]));
+      const double c = p[k] > 0 ? std::min(p[k], double(last_[k])) : 0;
       const std::int32_t cell = std::min(std::int32_t(c), last_[k] - 1);
       const bool is_back = (cell & 1) != 0;
       sample += stride_[k] * (is_back ? cell + 1 : cell);
@@ -148,7 +148,7 @@ class PatchMeasure {
     const Vec3 normal = cross(subtract(patch.corner[1], patch.corner[0]), subtract(patch.corner[2], patch.corner[0]));
     const Vec3 up = {dot(to_step_[0], normal), dot(to_step_[1], normal), dot(to_step_[2], normal)};
     const double square = dot(up, normal);
-    if (!(square > 0)) return known;
+    if (!(square > 0) || std::isinf(square)) return known;  // or the spacing is beyond what squares can tell
     const Vec3 spine = subtract(corner[1], corner[0]), middle = patch.middle();
     const std::array<Vec3, 2> steps{scaled(1 / std::sqrt(square), up), scaled(1 / length(affine_.direction(spine)), spine)};
     known = std::max(known, to_surface(middle, steps, surface, known, width));
@@ -168,8 +168,10 @@ class PatchMeasure {
     const double here = finest_.at(from);
     if (surface.separates(up, here)) return enough;
     std::array<double, 4> last{here, here, here, here};  // to both sides of each line
-    for (double before = 0; before < most; before += step_) {
-      const double distance = std::min(before + step_, most);
+    const double step = std::max(step_, most / kMostSteps);
+    double before = 0;
+    for (int i = 0; i < kMostSteps && before < most; ++i) {
+      const double distance = std::min(before + step, most);
       double nearest = kInfinity;
       for (int side = 0; side < 4; ++side) {
         const double next = value(side % 2 == 0 ? distance : -distance, steps[side / 2]);
@@ -177,10 +179,12 @@ class PatchMeasure {
         last[side] = next;
       }
       if (nearest < kInfinity) return before + nearest * (distance - before);
+      before = distance;
     }
     return most;
   }
 
+  static constexpr int kMostSteps = 64;  // along a line; enough for each sample in widths of diamonds of scale 4, if spacings are alike
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const Field<T>& field_;
   FinestField<T> finest_;

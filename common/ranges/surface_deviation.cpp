@@ -314,9 +314,8 @@ SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, con
     const Field<T> field{samples, domain.last()};
     const Isosurfaces surfaces(range);
     const Descent<T> descent(field, surfaces, volume.grid, domain, set, {largest, farthest, means, removed});
-    // Two surfaces in the wrong order are the ends of many (restored_field.h): the patches of one of these do.
     const PatchMeasure<T> patches(field, volume.grid.affine, domain);
-    // In the wrong order they are the ends of many (restored_field.h), of whose patches those of one will do.
+    // Two surfaces in the wrong order are the ends of many (restored_field.h): the patches of one of these will do.
     const Isosurfaces one_of_each =
         range.alpha > range.beta ? Isosurfaces({std::midpoint(range.alpha, range.beta), std::numeric_limits<double>::infinity()}) : surfaces;
     std::vector<Diamond> cubes;  // shared out one by one: they are few, and bricks even fewer

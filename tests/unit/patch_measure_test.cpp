@@ -137,5 +137,33 @@ TEST(PatchMeasure, APatchOverAHoleIsFar) {
   }
 }
 
+// No time without end, no place outside the field, whatever the spacing: squares of the numbers may not be any.
+TEST(PatchMeasure, SpacingsMayBeFarFromOneAndFromEachOther) {
+  std::mt19937 random(4);
+  constexpr int kSide = 9;
+  std::vector<std::uint8_t> samples(kSide * kSide * kSide);
+  for (auto& s : samples) s = std::uint8_t(random());
+  const Field<std::uint8_t> field{samples, {kSide - 1, kSide - 1, kSide - 1}};
+  const Domain domain({kSide, kSide, kSide});
+  const Isosurfaces surfaces({100, 200});
+  for (const Vec3& spacing : {Vec3{1, 1, 1e-12}, Vec3{1e-200, 1e-200, 1e-200}, Vec3{1e-160, 1e-155, 1e-150}, Vec3{1e150, 1e150, 1e150},
+                              Vec3{1, 1e-9, 1e9}, Vec3{1e-310, 1e-310, 1e-310}, Vec3{1e300, 1, 1e-300}}) {
+    const PatchMeasure<std::uint8_t> measure(field, Affine::of(spacing), domain);
+    const double width = 4 * std::max({spacing[0], spacing[1], spacing[2]});
+    for (int z = 0; z < kSide; ++z) {
+      for (int y = 0; y < kSide; ++y) {
+        for (int x = 0; x < kSide; ++x) {
+          if (scale_of({x, y, z}) > 2) continue;
+          const Diamond d(Vertex{x, y, z});
+          const double found = measure.within_patches(d, surfaces, 0, width * d.h);
+          ASSERT_GE(found, 0);
+          ASSERT_LE(found, width * d.h);
+        }
+      }
+    }
+  }
+  EXPECT_EQ(FinestField<std::uint8_t>(field).at({std::nan(""), 0, 0}), field.at({0, 0, 0}));
+}
+
 }  // namespace
 }  // namespace intervale
