@@ -88,7 +88,7 @@ Offset<fbs::Description> encode_description(FlatBufferBuilder& out, const Descri
   const fbs::Dims dims(d.grid.dims[0], d.grid.dims[1], d.grid.dims[2]);
   const auto affine = out.CreateVector(d.grid.affine.rows.data(), d.grid.affine.rows.size());
   const auto label = [&out](const std::string& text) { return text.empty() ? Offset<flatbuffers::String>() : out.CreateString(text); };
-  const auto unit = label(d.labels.unit), field = label(d.labels.field), field_unit = label(d.labels.field_unit);
+  const auto unit = label(d.labels.unit), field = label(d.labels.field), field_unit = label(d.labels.field_unit), space = label(d.labels.space);
   const ValueFormat& format = d.format;
   const auto table = format.table ? out.CreateVector(encode_value_table(*format.table)) : 0;
   std::vector<Offset<fbs::Channel>> each;
@@ -97,7 +97,7 @@ Offset<fbs::Description> encode_description(FlatBufferBuilder& out, const Descri
   const auto channels = each.empty() ? 0 : out.CreateVector(each);
   return fbs::CreateDescription(out, name, &dims, d.range.alpha, d.range.beta, std::uint8_t(d.refine), d.max_error, d.updates, d.coefficients,
                                 d.full.vertices, d.full.tets, d.content_hash, std::uint8_t(format.type), format.step, format.first, format.last,
-                                d.is_exact, corners, weights, d.has_every_range, affine, unit, field, field_unit, table, channels);
+                                d.is_exact, corners, weights, d.has_every_range, affine, unit, field, field_unit, table, channels, space);
 }
 
 Offset<fbs::Opened> encode_body(FlatBufferBuilder& out, const Opened& message) {
@@ -214,10 +214,11 @@ Result<void> decode_channels(const fbs::Description& wire, Description& d) {
 Result<void> decode_values(const fbs::Description& wire, Description& d) {
   if (VectorLength(wire.affine()) != d.grid.affine.rows.size()) return malformed("a description's affine does not have 12 numbers");
   std::copy(wire.affine()->begin(), wire.affine()->end(), d.grid.affine.rows.begin());
-  for (const auto* label : {wire.unit(), wire.field(), wire.field_unit()}) {
+  for (const auto* label : {wire.unit(), wire.field(), wire.field_unit(), wire.space()}) {
     if (VectorLength(label) > kMaxLabel) return malformed("a description's label is too long");
   }
-  d.labels = {flatbuffers::GetString(wire.unit()), flatbuffers::GetString(wire.field()), flatbuffers::GetString(wire.field_unit())};
+  d.labels = {flatbuffers::GetString(wire.unit()), flatbuffers::GetString(wire.field()), flatbuffers::GetString(wire.field_unit()),
+              flatbuffers::GetString(wire.space())};
   if (wire.type() >= kSampleTypes) return malformed("an unknown type of samples");
   if (VectorLength(wire.corners()) != d.corners.size()) return malformed("a description does not have 8 corners");
   const std::size_t weights = weight_count(d.grid);

@@ -138,7 +138,8 @@ void append_pages(const PagedValues& values, std::vector<std::byte>& index, std:
 }
 
 void append_labels(Streams& streams, const Labels& labels) {
-  for (const std::string* text : {&labels.unit, &labels.field, &labels.field_unit}) {
+  for (const std::string* text : {&labels.unit, &labels.field, &labels.field_unit, &labels.space}) {
+    if (text == &labels.space && text->empty()) break;
     const auto bytes = std::uint8_t(text->size());
     append(streams[StreamType::labels], std::span(&bytes, 1));
     append<char>(streams[StreamType::labels], *text);
@@ -147,7 +148,8 @@ void append_labels(Streams& streams, const Labels& labels) {
 
 Result<void> read_labels(const Container& file, Labels& to) {
   auto bytes = octets(file[StreamType::labels]);
-  for (std::string* text : {&to.unit, &to.field, &to.field_unit}) {
+  for (std::string* text : {&to.unit, &to.field, &to.field_unit, &to.space}) {
+    if (text == &to.space && bytes.empty()) break;
     if (bytes.empty() || bytes[0] > kMaxLabel || bytes[0] >= bytes.size()) return fail("the labels are damaged");
     text->assign(bytes.begin() + 1, bytes.begin() + 1 + bytes[0]);
     bytes = bytes.subspan(1 + std::size_t(bytes[0]));

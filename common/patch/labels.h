@@ -17,6 +17,7 @@ struct Labels {
   std::string unit;        // of length
   std::string field;       // the field's name
   std::string field_unit;  // of its values
+  std::string space{};     // directions of the world's axes: "RAS" is right, anterior, superior; "LPS" left, posterior, superior
   friend bool operator==(const Labels&, const Labels&) = default;
 };
 

@@ -1,6 +1,7 @@
 // A regular volume of samples, in the type of its file.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -21,6 +22,11 @@ struct Volume {
   std::vector<std::byte> bytes;
   Labels labels{};
   unsigned components = 1;  // numbers a sample, side by side: 1, or 3 of a vector
+};
+
+// Samples first to last on x, y and z, from 0; both count.
+struct SampleBox {
+  std::array<std::int64_t, 3> first{}, last{};
 };
 
 }  // namespace intervale

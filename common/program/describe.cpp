@@ -38,6 +38,7 @@ void add_grid(nlohmann::ordered_json& json, const Grid& grid, const Labels& labe
   json["unit"] = labels.unit;
   json["field"] = labels.field;
   json["field_unit"] = labels.field_unit;
+  json["space"] = labels.space;
 }
 
 nlohmann::ordered_json to_json(const Description& description) {

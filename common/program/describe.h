@@ -21,7 +21,7 @@ namespace intervale {
 [[nodiscard]] nlohmann::ordered_json to_json(const Range& range);
 
 // Adds dims, spacing (lengths of the affine's columns), origin (its last column), affine (12 numbers, row by row) and
-// the labels unit, field and field_unit.
+// the labels unit, field, field_unit and space.
 void add_grid(nlohmann::ordered_json& json, const Grid& grid, const Labels& labels);
 
 }  // namespace intervale

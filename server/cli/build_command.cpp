@@ -35,12 +35,13 @@ struct BuildCommand {
   unsigned threads = 0;
   std::vector<std::int64_t> dims;
   std::vector<double> spacing, origin, affine;
-  std::optional<std::string> unit, field, field_unit;
+  std::optional<std::string> unit, field, field_unit, space;
   std::vector<std::string> channels, channel_steps;  // NAME=FILE, NAME=S
   bool big_endian = false, json = false;
   std::uint64_t skip = 0;
   std::optional<std::uint64_t> time_point;
   std::optional<std::string> part;
+  std::vector<std::int64_t> crop;  // first and last on x, on y and on z
 };
 
 // A channel to be built.
@@ -83,6 +84,16 @@ Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
   return std::optional(layout);
 }
 
+std::optional<SampleBox> crop_of(const BuildCommand& options) {
+  if (options.crop.empty()) return {};
+  SampleBox box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.first[axis] = options.crop[2 * axis];
+    box.last[axis] = options.crop[2 * axis + 1];
+  }
+  return box;
+}
+
 // What the options say instead of the input.
 Result<void> set_labels(const BuildCommand& options, Labels& labels) {
   const auto set = [](const char* name, const std::optional<std::string>& text, std::string& label) -> Result<void> {
@@ -93,6 +104,7 @@ Result<void> set_labels(const BuildCommand& options, Labels& labels) {
   };
   if (auto ok = set("--unit", options.unit, labels.unit); !ok) return ok;
   if (auto ok = set("--field", options.field, labels.field); !ok) return ok;
+  if (auto ok = set("--space", options.space, labels.space); !ok) return ok;
   return set("--field-unit", options.field_unit, labels.field_unit);
 }
 
@@ -142,7 +154,7 @@ Result<BuiltChannels> build_channels(const std::vector<ChannelInput>& inputs, co
     const auto header = read_volume_header(named.path, named.part);
     const bool has_several = header && *header && (*header)->time_points > 1, has_parts = header && *header && !(*header)->parts.empty();
     if (has_parts && !named.part) named.part = options.part;
-    auto volume = read_volume(named.path, {}, has_several ? options.time_point : std::nullopt, named.part);
+    auto volume = read_volume(named.path, {}, has_several ? options.time_point : std::nullopt, named.part, crop_of(options));
     if (!volume) return tl::unexpected(volume.error());
     if (auto added = add_channel(built, *volume, input.name, input.step, options.nan, grid, set); !added) return tl::unexpected(added.error());
   }
@@ -226,9 +238,10 @@ Result<void> run(const BuildCommand& options) {
     if (auto output = check_output(named_volume(channel.file.string()).path, options.output); !output) return output;
   }
 
-  auto volume = read_volume(input.path, *layout, options.time_point, input.part);
+  auto volume = read_volume(input.path, *layout, options.time_point, input.part, crop_of(options));
   if (!volume) return tl::unexpected(volume.error());
-  if (volume->components != 1) return misuse("'" + options.input + "' has vectors: a field has one number a sample; vectors are read by --channel");
+  if (volume->components != 1)
+    return misuse("'" + options.input + "' has vectors: choose a component with --part 0, 1 or 2; --channel reads all of it");
   if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
   if (auto set = set_labels(options, volume->labels); !set) return set;
   volume->name = std::filesystem::path(options.output).stem().string();
@@ -283,8 +296,17 @@ void add_build_command(Program& program) {
   command.add_option("--time-point", o->time_point, "Which volume of a file with several, one for each time point; the first is 0")
       ->check([](const std::string& text) { return text.starts_with('-') ? std::string("the first time point is 0") : std::string(); }, "", "")
       ->type_name("N");
-  command.add_option("--part,--series", o->part, "Which volume of a file or folder with several, such as a DICOM series: its name, as info tells it")
+  command
+      .add_option("--part,--series", o->part,
+                  "Which volume of a file or folder with several, such as a DICOM series: its name, as info tells it. Of a file with several numbers "
+                  "a sample: which of them; the first is 0")
       ->type_name("NAME");
+  command
+      .add_option("--crop", o->crop,
+                  "Samples of the input to keep, first and last on x, y and z, both included; the first is 0. They stay where they are in the world. "
+                  "Only they are in memory")
+      ->expected(6)
+      ->type_name("I0 I1 J0 J1 K0 K1");
   command.add_option("--threads", o->threads, "Number of threads; 0: one for each core")->capture_default_str();
   command.add_option("--dims", o->dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
   command.add_option("--type", o->type, "Raw input: type of a sample: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");
@@ -301,6 +323,8 @@ void add_build_command(Program& program) {
   command.add_option("--unit", o->unit, "Unit of length, such as mm; default: what the input says")->type_name("UNIT");
   command.add_option("--field", o->field, "What the values are, such as density; default: what the input says")->type_name("NAME");
   command.add_option("--field-unit", o->field_unit, "Unit of the values, such as HU; default: what the input says")->type_name("UNIT");
+  command.add_option("--space", o->space, "Where the axes of the world point to, such as RAS or LPS; default: what the input says")
+      ->type_name("AXES");
   add_json_flag(command, o->json);
 }
 

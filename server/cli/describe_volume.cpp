@@ -48,6 +48,7 @@ std::string place_of(const Grid& grid, const Labels& labels) {
     text += fmt::format("axes ({:g}), ({:g}), ({:g})", fmt::join(a.column(0), ", "), fmt::join(a.column(1), ", "), fmt::join(a.column(2), ", "));
   }
   text += fmt::format(", origin ({:g}){}{}\n", fmt::join(a.origin(), ", "), labels.unit.empty() ? "" : ", in ", labels.unit);
+  if (!labels.space.empty()) text += "space " + printable(labels.space) + "\n";
   if (!labels.field.empty() || !labels.field_unit.empty())
     text += fmt::format("field {}{}{}\n", labels.field, labels.field.empty() ? "in " : labels.field_unit.empty() ? "" : ", in ", labels.field_unit);
   return text;

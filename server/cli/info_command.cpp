@@ -121,7 +121,7 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header,
                        {"spacing", spacing},
                        {"origin", origin},
                        {"affine", affine.rows},
-                       {"space", header.space},
+                       {"space", header.labels.space},
                        {"unit", header.labels.unit},
                        {"field", header.labels.field},
                        {"field_unit", header.labels.field_unit},
@@ -135,7 +135,9 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header,
     for (const VolumePart& part : header.parts) text += fmt::format("  {}  {}\n", printable(part.name), printable(part.about));
   }
   text += fmt::format("samples   {} x {} x {}, {}{}\n", dims[0], dims[1], dims[2], name_of(header.type),
-                      header.components == 1 ? "" : fmt::format(", vectors of {}", header.components));
+                      header.components == 1 ? "" : fmt::format(", {} numbers a sample", header.components));
+  if (header.components > 1 && !header.component)
+    text += fmt::format("numbers   {}: choose one with build --part, 0 to {}\n", header.components, header.components - 1);
   if (header.time_points > 1)
     text += fmt::format("times     {}: choose one with build --time-point, 0 to {}\n", header.time_points, header.time_points - 1);
   if (header.slope != 1 || header.intercept != 0)
@@ -150,7 +152,7 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header,
                           affine.rows[4 * k + 2], affine.rows[4 * k + 3]);
     }
   }
-  if (!header.space.empty()) text += "space     " + header.space + "\n";
+  if (!header.labels.space.empty()) text += "space     " + printable(header.labels.space) + "\n";
   return print(text);
 }
 

@@ -102,7 +102,7 @@ std::vector<std::byte> values_of(std::span<const std::byte> stored, SampleType t
 }
 
 void set_labels(const DicomImage& image, VolumeHeader& header) {
-  header.space = "LPS";
+  header.labels.space = "LPS";
   header.labels.unit = "mm";
   if (is_label(image.modality)) header.labels.field = image.modality;
   const std::string unit = image.rescale_type.empty() || image.rescale_type == "US" ? (image.modality == "CT" ? "HU" : "") : image.rescale_type;

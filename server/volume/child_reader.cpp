@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -25,8 +26,7 @@ namespace intervale {
 namespace {
 
 constexpr std::size_t kMaxMessage = 1000;
-constexpr int kPatience = 60'000;                  // milliseconds without a byte
-constexpr std::size_t kFirstBytes = 64ull << 20u;  // allocated before any sample has arrived
+constexpr int kPatience = 60'000;  // milliseconds without a byte
 
 // The folder of the shared library that this is part of; of the program, if of none.
 std::filesystem::path folder_of_library() {
@@ -174,10 +174,19 @@ Result<VolumeHeader> start(Child& child, const ReaderProgram& program, const std
   });
 }
 
-std::string name_of(const std::filesystem::path& path) {
-  const auto whole = path.lexically_normal();
-  return whole.has_filename() ? whole.stem().string() : whole.parent_path().filename().string();  // a folder's may end with '/'
-}
+class LibrarySamples final : public VolumeReader {
+ public:
+  LibrarySamples(VolumeHeader header, std::unique_ptr<Child> child, std::string where)
+      : VolumeReader(std::move(header), false), child_(std::move(child)), where_(std::move(where)) {}
+
+ private:
+  Result<void> read_next(std::span<std::byte> out) override {
+    if (child_->read(out) < out.size()) return tl::unexpected(child_->reason(where_));
+    return {};
+  }
+  std::unique_ptr<Child> child_;
+  std::string where_;
+};
 
 }  // namespace
 
@@ -186,10 +195,10 @@ Result<VolumeHeader> read_header_by(const ReaderProgram& program, const std::fil
   return start(child, program, path, part, {"--header"});
 }
 
-Result<Volume> read_volume_by(const ReaderProgram& program, const std::filesystem::path& path, const std::optional<std::string>& part,
-                              std::optional<std::uint64_t> time_point) {
-  Child child;
-  const auto header = start(child, program, path, part, {"--time-point", std::to_string(time_point.value_or(0))});
+Result<std::unique_ptr<VolumeReader>> open_by(const ReaderProgram& program, const std::filesystem::path& path, const std::optional<std::string>& part,
+                                              std::optional<std::uint64_t> time_point) {
+  auto child = std::make_unique<Child>();
+  auto header = start(*child, program, path, part, {"--time-point", std::to_string(time_point.value_or(0))});
   if (!header) return tl::unexpected<Error>(header.error());
   if (!part && header->parts.size() > 1) {
     std::string names;
@@ -198,15 +207,7 @@ Result<Volume> read_volume_by(const ReaderProgram& program, const std::filesyste
                   printable(header->parts_are + ": choose one with --part: " + names));
   }
   if (auto chosen = check_time_point(*header, time_point, in_quotes(path)); !chosen) return tl::unexpected<Error>(chosen.error());
-  Volume volume{name_of(path), header->grid, header->type, {}, header->labels, header->components};
-  const std::size_t needed = header->data_bytes();
-  while (volume.bytes.size() < needed) {
-    const std::size_t before = volume.bytes.size(), more = std::max(before, kFirstBytes);
-    volume.bytes.resize(before + std::min(needed - before, more));
-    if (child.read(std::span(volume.bytes).subspan(before)) < volume.bytes.size() - before) return tl::unexpected(child.reason(in_quotes(path)));
-  }
-  rescale(volume, header->slope, header->intercept);
-  return volume;
+  return std::make_unique<LibrarySamples>(std::move(*header), std::move(child), in_quotes(path));
 }
 
 }  // namespace intervale

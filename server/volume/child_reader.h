@@ -9,12 +9,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
-#include "common/patch/volume.h"
 #include "common/util/result.h"
-#include "server/volume/volume_header.h"
+#include "server/volume/volume_reader.h"
 
 namespace intervale {
 
@@ -27,9 +27,9 @@ struct ReaderProgram {
 [[nodiscard]] Result<VolumeHeader> read_header_by(const ReaderProgram& program, const std::filesystem::path& path,
                                                   const std::optional<std::string>& part);
 
-// Its samples, with the slope and intercept of the header applied. To choose no part or time point where there are
-// several is misuse. Memory grows with the samples that arrive. Fails if none arrive for a minute.
-[[nodiscard]] Result<Volume> read_volume_by(const ReaderProgram& program, const std::filesystem::path& path, const std::optional<std::string>& part,
-                                            std::optional<std::uint64_t> time_point);
+// Its samples. To choose no part or time point where there are several is misuse. Reading fails if no sample arrives for a
+// minute.
+[[nodiscard]] Result<std::unique_ptr<VolumeReader>> open_by(const ReaderProgram& program, const std::filesystem::path& path,
+                                                            const std::optional<std::string>& part, std::optional<std::uint64_t> time_point);
 
 }  // namespace intervale

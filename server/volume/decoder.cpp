@@ -181,13 +181,15 @@ std::unique_ptr<Codec> codec_of(Encoding encoding) {
   return std::make_unique<Deflate>();
 }
 
-class Decoder {
+}  // namespace
+
+class Decoder::Impl {
  public:
-  explicit Decoder(const Coded& data)
+  explicit Impl(const Coded& data)
       : file_(data.file), source_(data), codec_(codec_of(data.encoding)), before_(data.base64_skip.value_or(0)), left_(data.coded_bytes) {}
 
   // Fills `out`; fewer bytes only at the end of the data.
-  Result<std::uint64_t> next(std::span<std::byte> out) {
+  Result<std::uint64_t> read(std::span<std::byte> out) {
     const std::size_t wanted = out.size();
     while (!out.empty() && !is_ended_) {
       if (!codec_->is_ready()) return fail("no memory left to decode " + in_quotes(file_.path()));
@@ -208,11 +210,11 @@ class Decoder {
     return wanted - out.size();
   }
   // Fewer bytes only at the end of the data.
-  Result<std::uint64_t> discard(std::uint64_t bytes) {
+  Result<std::uint64_t> skip(std::uint64_t bytes) {
     std::vector<std::byte> chunk(std::min<std::uint64_t>(bytes, kChunk));
     std::uint64_t done = 0;
     while (done < bytes) {
-      auto got = next(std::span(chunk).first(std::min<std::uint64_t>(chunk.size(), bytes - done)));
+      auto got = read(std::span(chunk).first(std::min<std::uint64_t>(chunk.size(), bytes - done)));
       if (!got) return got;
       done += *got;
       if (*got == 0) break;
@@ -221,7 +223,7 @@ class Decoder {
   }
   // zlib compares the checksum when it meets the end, which it has not looked for yet if the samples end with the data.
   Result<void> look_for_end() {
-    if (auto rest = discard(kChunk); !rest) return tl::unexpected<Error>(rest.error());
+    if (auto rest = skip(kChunk); !rest) return tl::unexpected<Error>(rest.error());
     return {};
   }
 
@@ -256,34 +258,22 @@ class Decoder {
   std::span<std::byte> input_;  // what is left of it
 };
 
-}  // namespace
+Decoder::Decoder(const Coded& data) : impl_(std::make_unique<Impl>(data)) {}
+Decoder::Decoder(Decoder&&) noexcept = default;
+Decoder::~Decoder() = default;
+Result<std::uint64_t> Decoder::read(std::span<std::byte> out) { return impl_->read(out); }
+Result<std::uint64_t> Decoder::skip(std::uint64_t bytes) { return impl_->skip(bytes); }
+Result<void> Decoder::look_for_end() { return impl_->look_for_end(); }
 
 Result<std::uint64_t> decode(const Coded& data, std::uint64_t skip, std::span<std::byte> out) {
   Decoder decoder(data);
-  if (auto skipped = decoder.discard(skip); !skipped) return skipped;
-  auto got = decoder.next(out);
+  if (auto skipped = decoder.skip(skip); !skipped) return skipped;
+  auto got = decoder.read(out);
   if (got && *got == out.size())
     if (auto end = decoder.look_for_end(); !end) return tl::unexpected<Error>(end.error());
   return got;
 }
 
-Result<void> decode_growing(const Coded& data, std::uint64_t skip, std::uint64_t size, std::vector<std::byte>& out) {
-  constexpr std::uint64_t kFirst = 1 << 20;
-  Decoder decoder(data);
-  out.clear();
-  if (auto skipped = decoder.discard(skip); !skipped) return tl::unexpected<Error>(skipped.error());
-  while (out.size() < size) {
-    const std::size_t before = out.size();
-    out.resize(std::min(size, std::max<std::uint64_t>(kFirst, 2 * before)));
-    const auto got = decoder.next(std::span(out).subspan(before));
-    if (!got) return tl::unexpected<Error>(got.error());
-    if (before + *got == out.size()) continue;
-    out.resize(before + *got);
-    return {};
-  }
-  return decoder.look_for_end();
-}
-
-Result<std::uint64_t> decoded_length(const Coded& data) { return Decoder(data).discard(std::numeric_limits<std::uint64_t>::max()); }
+Result<std::uint64_t> decoded_length(const Coded& data) { return Decoder(data).skip(std::numeric_limits<std::uint64_t>::max()); }
 
 }  // namespace intervale

@@ -3,9 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "common/util/result.h"
 #include "server/volume/volume_header.h"
@@ -21,13 +21,28 @@ struct Coded {
   std::uint64_t coded_bytes = UINT64_MAX;
 };
 
-// Decodes the data, skips `skip` decoded bytes and fills `out`. Returns how many bytes were filled: fewer than out.size()
-// if the data ends before. Fails on damaged data. If the data ends within the next few kilobytes, its checksum has been
-// compared; concatenated members count as one.
-[[nodiscard]] Result<std::uint64_t> decode(const Coded& data, std::uint64_t skip, std::span<std::byte> out);
+// Decodes data from its beginning on. Concatenated members count as one. Fails on damaged data.
+class Decoder {
+ public:
+  explicit Decoder(const Coded& data);  // its file must outlive this
+  Decoder(Decoder&&) noexcept;
+  Decoder& operator=(Decoder&&) = delete;
+  ~Decoder();
 
-// The same, but makes `out` as long as `size` or, if that is less, as what there is: as it is decoded.
-[[nodiscard]] Result<void> decode_growing(const Coded& data, std::uint64_t skip, std::uint64_t size, std::vector<std::byte>& out);
+  // Fills `out`. Returns how many bytes were filled: fewer than out.size() only at the end of the data.
+  [[nodiscard]] Result<std::uint64_t> read(std::span<std::byte> out);
+  // Passes over so many bytes. Returns how many there were.
+  [[nodiscard]] Result<std::uint64_t> skip(std::uint64_t bytes);
+  // If the data ends within the next few kilobytes, compares its checksum.
+  [[nodiscard]] Result<void> look_for_end();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Skips `skip` decoded bytes and fills `out`, as Decoder::read() does; looks for the end after that.
+[[nodiscard]] Result<std::uint64_t> decode(const Coded& data, std::uint64_t skip, std::span<std::byte> out);
 
 // The decoded size in bytes. Takes the time of a full decoding and the memory of one chunk.
 [[nodiscard]] Result<std::uint64_t> decoded_length(const Coded& data);

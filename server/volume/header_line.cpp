@@ -29,7 +29,7 @@ std::string header_line(const VolumeHeader& header) {
   for (const VolumePart& part : header.parts) parts.push_back({{"name", part.name}, {"about", part.about}});
   const Json line{{"dims", header.grid.dims},      {"affine", header.grid.affine.rows}, {"type", name_of(header.type)},
                   {"unit", header.labels.unit},    {"field", header.labels.field},      {"field_unit", header.labels.field_unit},
-                  {"space", header.space},         {"time_points", header.time_points}, {"slope", header.slope},
+                  {"space", header.labels.space},  {"time_points", header.time_points}, {"slope", header.slope},
                   {"intercept", header.intercept}, {"parts_are", header.parts_are},     {"parts", parts}};
   return line.dump(-1, ' ', true, Json::error_handler_t::replace);  // texts of files may be no UTF-8
 }
@@ -43,8 +43,7 @@ Result<VolumeHeader> parse_header_line(std::string_view text, const std::string&
   const auto grid = make_grid(line.at("dims").get<std::array<std::int64_t, 3>>(), Affine{line.at("affine").get<std::array<double, 12>>()}, where);
   if (!grid) return tl::unexpected<Error>(grid.error());
   header.grid = *grid;
-  header.labels = {label_at(line, "unit"), label_at(line, "field"), label_at(line, "field_unit")};
-  header.space = text_at(line, "space");
+  header.labels = {label_at(line, "unit"), label_at(line, "field"), label_at(line, "field_unit"), label_at(line, "space")};
   header.time_points = line.at("time_points").get<std::uint64_t>();
   header.slope = line.at("slope").get<double>();
   header.intercept = line.at("intercept").get<double>();

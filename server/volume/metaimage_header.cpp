@@ -122,7 +122,7 @@ Result<VolumeHeader> read_metaimage_header(const InputFile& file) {
   if (!type) return unusable("ElementType, of integers of 8 to 32 bits or floats,");
   header.type = *type;
   if (!take(lines.find({"elementnumberofchannels"}), channels, {1})) return unusable("ElementNumberOfChannels");
-  if (channels[0] != 1 && channels[0] != 3) return fail(name + " has " + std::to_string(channels[0]) + " numbers a sample; 1 and 3 are read");
+  if (auto few = check_components(std::uint64_t(std::max<std::int64_t>(0, channels[0])), name); !few) return tl::unexpected<Error>(few.error());
   header.components = unsigned(channels[0]);
   const auto affine = sides.size() == 3 ? metaimage_affine<3>(lines, name) : metaimage_affine<4>(lines, name);
   if (!affine) return tl::unexpected<Error>(affine.error());
@@ -130,7 +130,7 @@ Result<VolumeHeader> read_metaimage_header(const InputFile& file) {
   if (!grid) return tl::unexpected<Error>(grid.error());
   header.grid = *grid;
   if (auto size = check_size(header, name); !size) return tl::unexpected<Error>(size.error());
-  if (lines.has("anatomicalorientation") && lines.value.at("anatomicalorientation").find('?') == std::string::npos) header.space = "LPS";
+  if (lines.has("anatomicalorientation") && lines.value.at("anatomicalorientation").find('?') == std::string::npos) header.labels.space = "LPS";
   bool is_binary = true, is_compressed = false, data_msb = false, element_msb = false;
   if (!take(lines.find({"binarydata"}), is_binary, true) || !take(lines.find({"compresseddata"}), is_compressed, false))
     return unusable("BinaryData or CompressedData");

@@ -174,7 +174,7 @@ Result<VolumeHeader> read_nifti_header(const InputFile& file) {
   const Version& version = *found->version;
   const Fields fields(*start, *found);
   header.format = version.name;
-  header.space = "RAS";
+  header.labels.space = "RAS";
   header.big_endian = found->big_endian;
 
   const std::int64_t axes = fields.dim(0);

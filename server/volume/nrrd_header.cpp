@@ -176,11 +176,13 @@ Result<Affine> affine_of(const Nrrd& nrrd, unsigned first_axis, const std::strin
   return Affine::of_columns(directions, origin);
 }
 
-// Whether the first of four axes has the components of a vector.
-bool has_vectors(const Nrrd& nrrd) {
+// Whether the first of four axes has the components of samples: it is said to, or has three and is not said to be one in
+// space.
+bool has_components(const Nrrd& nrrd) {
   const auto& first = nrrd.axis[0];
   const bool is_in_space = first.kind == nrrdKindDomain || first.kind == nrrdKindSpace || first.kind == nrrdKindTime || first.kind == nrrdKindPoint;
-  return nrrd.dim == 4 && first.size == 3 && !is_in_space;
+  const bool is_beside_space = nrrd.spaceDim == 3 && std::isnan(first.spaceDirection[0]) && !std::isnan(nrrd.axis[3].spaceDirection[0]);
+  return nrrd.dim == 4 && !is_in_space && (first.size == 3 || first.kind >= nrrdKindList || is_beside_space);
 }
 
 // Whether the last of four axes has volumes, one after the other: it is not one in space.
@@ -206,11 +208,13 @@ const char* space_of(int space) {
 Result<VolumeHeader> judged(const Nrrd& nrrd, const NrrdIoState& state, const std::string& name) {
   VolumeHeader header;
   header.format = "NRRD";
-  header.space = space_of(nrrd.space);
   for (const int field : {nrrdField_type, nrrdField_dimension, nrrdField_sizes, nrrdField_encoding})
     if (!state.seen[field]) return fail(name + ": the NRRD header has no '" + airEnumStr(nrrdField, field) + "' line");
-  header.components = has_vectors(nrrd) ? 3 : 1;
-  const unsigned first_axis = header.components == 1 ? 0 : 1;
+  const unsigned first_axis = has_components(nrrd) ? 1 : 0;
+  if (first_axis == 1) {
+    if (auto few = check_components(nrrd.axis[0].size, name); !few) return tl::unexpected<Error>(few.error());
+    header.components = unsigned(nrrd.axis[0].size);
+  }
   if (first_axis == 0 && has_time_points(nrrd)) {
     header.time_points = nrrd.axis[3].size;
   } else if (nrrd.dim != 3 + first_axis) {
@@ -262,6 +266,7 @@ Result<VolumeHeader> read_nrrd_header(const InputFile& file) {
   if (header) {
     header->data_file = screened->data_file;
     header->labels = screened->labels;
+    header->labels.space = space_of(nrrd->space);
     header->data_offset = screened->data_file ? 0 : screened->end;
   }
   return header;

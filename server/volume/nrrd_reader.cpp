@@ -1,5 +1,6 @@
 #include "server/volume/nrrd.h"
 #include "server/volume/nrrd_header.h"
+#include "server/volume/volume_reader.h"
 
 namespace intervale {
 
@@ -8,7 +9,11 @@ Result<Volume> read_nrrd(const std::filesystem::path& path) {
   if (!file) return tl::unexpected<Error>(file.error());
   const auto header = read_nrrd_header(*file);
   if (!header) return tl::unexpected<Error>(header.error());
-  return read_data(*file, *header);
+  const auto reader = open_samples(*file, *header);
+  if (!reader) return tl::unexpected<Error>(reader.error());
+  auto volume = read_samples(**reader);
+  if (volume) volume->name = path.stem().string();
+  return volume;
 }
 
 }  // namespace intervale

@@ -28,17 +28,25 @@ std::string in_marks(std::string_view text) {
   return line + "\"";
 }
 
+// The line that says the world's axes, or only how many there are.
+std::string space_line(std::string_view space) {
+  if (space == "RAS") return "space: right-anterior-superior\n";
+  if (space == "LAS") return "space: left-anterior-superior\n";
+  if (space == "LPS") return "space: left-posterior-superior\n";
+  return "space dimension: 3\n";
+}
+
 // `space directions` rather than `spacings`: a NRRD has an origin in space only together with them. NRRD0004 is the
 // first with either.
 std::string header(const Volume& volume) {
   const auto& [dims, affine] = volume.grid;
   std::string text = "NRRD0004\n# written by Intervale " INTERVALE_VERSION "\ntype: ";
-  text.append(kTypeNames[std::size_t(volume.type)]).append("\ndimension: 3\nspace dimension: 3\nsizes:");
+  text.append(kTypeNames[std::size_t(volume.type)]).append("\ndimension: 3\n").append(space_line(volume.labels.space)).append("sizes:");
   for (const auto side : dims) text.append(" ").append(std::to_string(side));
   text += "\nspace directions:";
   for (std::size_t axis = 0; axis < 3; ++axis) text += " " + in_brackets(affine.column(axis));
   text += "\nspace origin: " + in_brackets(affine.origin()) + "\nkinds: domain domain domain\n";
-  const auto& [unit, field, field_unit] = volume.labels;
+  const auto& [unit, field, field_unit, space] = volume.labels;
   if (!unit.empty()) text += "space units: " + in_marks(unit) + " " + in_marks(unit) + " " + in_marks(unit) + "\n";
   if (!field.empty()) text += "content: " + field + "\n";
   if (!field_unit.empty()) text += "sample units: " + in_marks(field_unit) + "\n";

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "server/volume/input_file.h"
+#include "server/volume/volume_reader.h"
 
 namespace intervale {
 namespace {
@@ -24,27 +25,25 @@ Result<SampleType> parse_sample_type(std::string_view name) {
   return misuse("unknown sample type '" + std::string(name) + "': use u8, i8, u16, i16, u32, i32, f32 or f64");
 }
 
-Result<Volume> read_raw(const std::filesystem::path& path, const RawLayout& layout) {
+Result<std::unique_ptr<VolumeReader>> open_raw(const std::filesystem::path& path, const RawLayout& layout) {
   const auto grid = make_grid(layout.dims, layout.affine, "the layout of '" + path.string() + "'");
   if (!grid) return misuse(grid.error().message);
-  Volume volume;
-  volume.name = path.stem().string();
-  volume.type = layout.type;
-  volume.grid = *grid;
+  VolumeHeader header;
+  header.type = layout.type;
+  header.grid = *grid;
+  header.big_endian = layout.big_endian;
+  header.data_offset = layout.skip_bytes;
 
-  const std::uint64_t bytes = volume.grid.sample_count() * size_of(layout.type);  // at most 2^63
+  const std::uint64_t bytes = header.data_bytes();  // at most 2^63
   if (layout.skip_bytes > std::numeric_limits<std::uint64_t>::max() - bytes) return misuse("--skip is larger than any file");
   const std::uint64_t expected = layout.skip_bytes + bytes;
-  auto file = InputFile::open(path);
+  const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   if (file->size() != expected)
     return fail(in_quotes(path) + " is " + std::to_string(file->size()) + " bytes, too " + (file->size() < expected ? "short" : "long") + " for " +
                 shape_of(layout) + (layout.skip_bytes > 0 ? " after " + std::to_string(layout.skip_bytes) + " skipped bytes" : "") + ", which take " +
                 std::to_string(expected) + "; check --dims, --type and --skip");
-  volume.bytes.resize(bytes);
-  if (auto read = file->read(layout.skip_bytes, volume.bytes); !read) return tl::unexpected<Error>(read.error());
-  if (layout.big_endian) swap_bytes(volume.bytes, volume.type);
-  return volume;
+  return open_samples(*file, header);
 }
 
 }  // namespace intervale

@@ -23,8 +23,4 @@ struct RawLayout {
 // "u8", "i8", "u16", "i16", "u32", "i32", "f32" or "f64"; misuse with that list otherwise.
 INTERVALE_EXPORT Result<SampleType> parse_sample_type(std::string_view name);
 
-// Reads a file of exactly skip_bytes + samples. An invalid layout is misuse; a file of another size fails with both
-// sizes. Allocates only the volume, after comparing the sizes.
-INTERVALE_EXPORT Result<Volume> read_raw(const std::filesystem::path& path, const RawLayout& layout);
-
 }  // namespace intervale

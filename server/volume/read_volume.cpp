@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/util/printable.h"
 #include "server/volume/child_reader.h"
 #include "server/volume/decoder.h"
 #include "server/volume/header_bytes.h"
@@ -19,7 +20,7 @@
 #include "server/volume/nifti_header.h"
 #include "server/volume/npy_header.h"
 #include "server/volume/nrrd_header.h"
-#include "server/volume/volume_header.h"
+#include "server/volume/volume_reader.h"
 #include "server/volume/vti_header.h"
 #include "server/volume/vtk_header.h"
 
@@ -35,6 +36,7 @@ struct FileFormat {
 
 bool is_nrrd(std::string_view start) { return start.starts_with("NRRD000"); }
 
+constexpr unsigned kVectorComponents = 3;
 constexpr std::size_t kStart = 1024;  // bytes, enough for all of these
 constexpr std::array<FileFormat, 7> kFormats{{{{".nrrd", ".nhdr"}, is_nrrd, read_nrrd_header},
                                               {{".npy"}, is_npy, read_npy_header},
@@ -66,6 +68,23 @@ std::string decoded_start(const InputFile& file) {
   const auto got = decode({file}, 0, std::as_writable_bytes(std::span(start)));
   start.resize(got.value_or(0));
   return start;
+}
+
+// What `part` is the number of, from 0, as --part N or FILE:/N: a component of each sample, or else a time point.
+Result<void> choose_part(VolumeHeader& header, const std::optional<std::string>& part, const std::string& where) {
+  if (!part) return {};
+  const std::uint64_t parts = header.components > 1 ? header.components : header.time_points;
+  if (parts == 1) return misuse(where + " has one volume: leave out --part");
+  const auto number = number_of<std::uint64_t>(std::string_view(*part).substr(part->starts_with('/') ? 1 : 0));
+  if (!number || *number >= parts) return misuse(where + " has no part '" + printable(*part) + "': its parts are 0 to " + std::to_string(parts - 1));
+  (header.components > 1 ? header.component : header.time_point) = *number;
+  return {};
+}
+
+// Of the volume in a file or a folder.
+std::string name_of(const std::filesystem::path& path) {
+  const auto whole = path.lexically_normal();
+  return whole.has_filename() ? whole.stem().string() : whole.parent_path().filename().string();  // a folder's may end with '/'
 }
 
 std::string position_of(std::size_t index, const Grid& grid) {
@@ -101,7 +120,6 @@ Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::pa
   const auto program = find_reader_program(path);
   if (!program) return tl::unexpected<Error>(program.error());
   if (*program != nullptr) return read_header_by(**program, path, part).map([](VolumeHeader header) { return std::optional(std::move(header)); });
-  if (part) return misuse(in_quotes(path) + " has one volume: leave out --part");
   const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   const auto start = read_start(*file, kStart);
@@ -111,18 +129,22 @@ Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::pa
   if (is_gzip && format != nullptr && format->begins != is_nifti)
     return fail(in_quotes(path) + " is compressed as a whole, which only NIfTI files may be: unpack it with gunzip first");
   if (format == nullptr) format = find_format_by_name(path);
+  if (format == nullptr && part) return misuse(in_quotes(path) + " has one volume: leave out --part");
   if (format == nullptr) return std::optional<VolumeHeader>();
-  return format->read_header(*file).map([](VolumeHeader header) { return std::optional(std::move(header)); });
+  auto header = format->read_header(*file);
+  if (!header) return tl::unexpected<Error>(header.error());
+  if (auto chosen = choose_part(*header, part, in_quotes(path)); !chosen) return tl::unexpected<Error>(chosen.error());
+  return std::optional(std::move(*header));
 }
 
-Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point,
-                           const std::optional<std::string>& part) {
+Result<std::unique_ptr<VolumeReader>> open_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout,
+                                                  std::optional<std::uint64_t> time_point, const std::optional<std::string>& part) {
   const auto program = find_reader_program(path);
-  if (!layout && program && *program != nullptr) return read_volume_by(**program, path, part, time_point);
+  if (!layout && program && *program != nullptr) return open_by(**program, path, part, time_point);
   const auto header = read_volume_header(path, part);
   if (layout && header && !*header) {
     if (time_point.value_or(0) != 0) return misuse("raw samples have one time point: leave out --time-point, and --skip what is before them");
-    return read_raw(path, *layout);
+    return open_raw(path, *layout);
   }
   if (layout && (header || find_format_by_name(path) != nullptr))
     return misuse(in_quotes(path) + " describes itself: leave out --dims and --type, or rename the file if its samples are raw");
@@ -131,9 +153,23 @@ Result<Volume> read_volume(const std::filesystem::path& path, const std::optiona
     return misuse(
         in_quotes(path) +
         " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM, HDF5 or Zarr: say what its raw samples are with --dims X Y Z and --type TYPE");
+  const VolumeHeader& found = **header;
+  if (found.time_point) time_point = found.time_point;
+  if (!found.component && found.components != 1 && found.components != kVectorComponents)
+    return misuse(in_quotes(path) + " has " + std::to_string(found.components) + " numbers a sample: choose one, 0 to " +
+                  std::to_string(found.components - 1) + ", with --part");
   const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
-  return read_data(*file, **header, time_point);
+  return open_samples(*file, found, time_point);
+}
+
+Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point,
+                           const std::optional<std::string>& part, const std::optional<SampleBox>& crop) {
+  const auto reader = open_volume(path, layout, time_point, part);
+  if (!reader) return tl::unexpected<Error>(reader.error());
+  auto volume = read_samples(**reader, crop);
+  if (volume) volume->name = name_of(path);
+  return volume;
 }
 
 Volume component_of(const Volume& volume, unsigned component) {

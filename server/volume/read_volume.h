@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -13,6 +14,7 @@
 namespace intervale {
 
 struct VolumeHeader;
+class VolumeReader;
 
 // What a person names: FILE:/ARRAY is an array of an HDF5 file or a Zarr folder, unless there is a file of that whole
 // name or a part is chosen otherwise.
@@ -27,10 +29,18 @@ struct NamedVolume {
 // volume. None: the file's samples are raw. part: which of several volumes (VolumeHeader::parts); none: the first.
 [[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part = {});
 
-// A layout for a file that describes itself is misuse, and so is none for any other, whose samples are raw. To choose no
-// part or time point of several, or one that is not there, is misuse.
+// For a file that describes itself a layout is misuse, and so is none for any other, whose samples are raw. To choose no
+// part or time point of several, or one that is not there, is misuse. part: see read_volume_header(); of a
+// file with several numbers a sample which of them, from 0, or else which time point. Without a part, three numbers are a
+// vector.
+[[nodiscard]] Result<std::unique_ptr<VolumeReader>> open_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout,
+                                                                std::optional<std::uint64_t> time_point = {},
+                                                                const std::optional<std::string>& part = {});
+
+// Likewise; the samples in a box, or all. Slope and intercept are applied. Only what is kept is in memory.
 INTERVALE_EXPORT Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout,
-                                            std::optional<std::uint64_t> time_point = {}, const std::optional<std::string>& part = {});
+                                            std::optional<std::uint64_t> time_point = {}, const std::optional<std::string>& part = {},
+                                            const std::optional<SampleBox>& crop = {});
 
 // The samples of one component of a volume, as a volume: component < volume.components.
 [[nodiscard]] INTERVALE_EXPORT Volume component_of(const Volume& volume, unsigned component);

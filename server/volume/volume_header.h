@@ -14,6 +14,8 @@ namespace intervale {
 
 enum class Encoding : std::uint8_t { raw, deflate, bzip2, text, library };  // deflate: as gzip or zlib wraps it; library: see child_reader.h
 
+inline constexpr unsigned kMostComponents = 16;
+
 // One of several volumes in a file or folder.
 struct VolumePart {
   std::string name;   // by which it is chosen; any bytes
@@ -24,13 +26,14 @@ struct VolumeHeader {
   const char* format = "";  // name of the file's format
   Grid grid;
   Labels labels;
-  std::string space;  // directions of the world's axes: "RAS" is right, anterior, superior; empty: not said
   SampleType type = SampleType::u8;
-  unsigned components = 1;          // numbers a sample: 1, or 3 of a vector
-  std::uint64_t time_points = 1;    // volumes of this shape, one after the other
-  double slope = 1, intercept = 0;  // value = slope * stored number + intercept; both finite, slope not 0
-  std::string parts_are;            // what the parts are, if there are several: "series", "channels", "arrays"
-  std::vector<VolumePart> parts;    // if there are several, of which the header describes one
+  unsigned components = 1;                  // numbers a sample: 1 to kMostComponents
+  std::optional<std::uint64_t> component;   // the one of several to be read; none: all
+  std::optional<std::uint64_t> time_point;  // which was chosen
+  std::uint64_t time_points = 1;            // volumes of this shape, one after the other
+  double slope = 1, intercept = 0;          // value = slope * stored number + intercept; both finite, slope not 0
+  std::string parts_are;                    // what the parts are, if there are several: "series", "channels", "arrays"
+  std::vector<VolumePart> parts;            // if there are several, of which the header describes one
   Encoding encoding = Encoding::raw;
   bool big_endian = false;
   std::optional<std::string> data_file;  // as written, unchecked; none: the header's own file
@@ -47,15 +50,11 @@ struct VolumeHeader {
 // Fails if there is no time point, or if the bytes of all have no number. The message begins with `where`.
 [[nodiscard]] Result<void> check_size(const VolumeHeader& header, const std::string& where);
 
+// Fails if a sample has no number or more than kMostComponents. The message begins with `where`.
+[[nodiscard]] Result<void> check_components(std::uint64_t components, const std::string& where);
+
 // The time point to read: without a choice the only one. To choose none of several, or one that is not there, is misuse.
 [[nodiscard]] Result<std::uint64_t> check_time_point(const VolumeHeader& header, std::optional<std::uint64_t> time_point, const std::string& where);
-
-// Reads the samples that the header of a file describes, with its slope and intercept applied. The data may be in
-// another file, in the header's own folder or below it. Nothing of the volume's size is allocated before the data is
-// long enough to fill it: for raw by its length, for deflate by its greatest ratio (1032), for bzip2 as it is decoded,
-// for text by two characters a sample. Bytes after the samples are ignored. time_point: see
-// check_time_point.
-[[nodiscard]] Result<Volume> read_data(const InputFile& file, const VolumeHeader& header, std::optional<std::uint64_t> time_point = {});
 
 // Makes values of stored numbers: whole ones if slope and intercept are whole and all fit one of the integer types,
 // else f32 if that keeps apart what the stored numbers do, else f64. A slope of 1 and an intercept of 0 change nothing.

@@ -180,7 +180,8 @@ Result<VolumeHeader> read_vti_header(const InputFile& file) {
   if (!type) return fail(name + ": VTK samples of another type than Int8 to Int32, UInt8 to UInt32, Float32 and Float64 are not read");
   header.type = *type;
   const auto components = numbers_in<unsigned, 1>(array.attribute("NumberOfComponents"), {1});
-  if (!components || (components->front() != 1 && components->front() != 3)) return fail(name + ": its array has other than 1 or 3 components");
+  if (!components) return fail(name + ": NumberOfComponents is no number");
+  if (auto few = check_components(components->front(), name); !few) return tl::unexpected<Error>(few.error());
   header.components = components->front();
   const auto tuples = numbers_in<std::uint64_t, 1>(array.attribute("NumberOfTuples"), {grid->sample_count()});
   if (!tuples || tuples->front() != grid->sample_count()) return bad("its array has not as many tuples as the grid has points");

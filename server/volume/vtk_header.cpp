@@ -205,8 +205,7 @@ Result<VolumeHeader> read_vtk_header(const InputFile& file) {
   const auto type = vtk_type(parsed.type);
   if (!type) return fail(name + ": VTK samples of another type than char, short, int, unsigned or not, float and double are not read");
   header.type = *type;
-  if (parsed.components != 1 && parsed.components != 3)
-    return fail(name + ": the first array of the VTK file has another number of components than 1 or 3");
+  if (auto few = check_components(parsed.components, name); !few) return tl::unexpected<Error>(few.error());
   header.components = unsigned(parsed.components);
   if (parsed.is_color && header.encoding == Encoding::text) return fail(name + ": COLOR_SCALARS as text are not read; write the file as BINARY");
   const auto grid = make_grid(parsed.dims, Affine::of(parsed.spacing, parsed.origin), name);

@@ -41,7 +41,7 @@ TEST(Oblique, AnAffineOfTheCommandLineGoesThroughEveryProgram) {
   const std::string raw = folder.file("v.raw", samples()), plain = folder / "plain.ivm", oblique = folder / "oblique.ivm";
   ASSERT_EQ(run(build_raw(raw, plain, {})).status, 0);
   auto options = kAffine;
-  options.insert(options.end(), {"--unit", "mm", "--field", "density", "--field-unit", "HU"});
+  options.insert(options.end(), {"--unit", "mm", "--field", "density", "--field-unit", "HU", "--space", "RAS"});
   ASSERT_EQ(run(build_raw(raw, oblique, options)).status, 0);
   const auto info = json_of(run({program("intervale"), "info", oblique, "--json"}));
   EXPECT_EQ(info.at("affine"), nlohmann::json(kRows));
@@ -50,8 +50,9 @@ TEST(Oblique, AnAffineOfTheCommandLineGoesThroughEveryProgram) {
   EXPECT_EQ(info.at("unit"), "mm");
   EXPECT_EQ(info.at("field"), "density");
   EXPECT_EQ(info.at("field_unit"), "HU");
+  EXPECT_EQ(info.at("space"), "RAS");
   EXPECT_THAT(run({program("intervale"), "info", oblique}).out,
-              ::testing::AllOf(HasSubstr("axes (-1, 0, 0), (0.5, 2, 0), (0, 0.25, 3), origin (100, -7, 0.001), in mm\n"),
+              ::testing::AllOf(HasSubstr("axes (-1, 0, 0), (0.5, 2, 0), (0, 0.25, 3), origin (100, -7, 0.001), in mm\n"), HasSubstr("space RAS\n"),
                                HasSubstr("field density, in HU\n")));
   EXPECT_THAT(run({program("intervale"), "info", plain}).out, HasSubstr("spacing (1, 1, 1), origin (0, 0, 0)\n"));
 
@@ -72,7 +73,7 @@ TEST(Oblique, AnAffineOfTheCommandLineGoesThroughEveryProgram) {
   ServerProgram server(oblique);
   EXPECT_EQ(fetch_json({"--digest"}, server.url("oblique")).at("digest"), after.at("digest"));
   const auto listed = json_of(run({client(), "list", server.url(), "--json"})).at("datasets").at(0);
-  for (const char* key : {"affine", "spacing", "origin", "unit", "field", "field_unit"}) EXPECT_EQ(listed.at(key), info.at(key)) << key;
+  for (const char* key : {"affine", "spacing", "origin", "unit", "field", "field_unit", "space"}) EXPECT_EQ(listed.at(key), info.at(key)) << key;
 }
 
 TEST(Oblique, DirectionsOfNrrdAreKeptAndOptionsOverrideItsLabels) {
@@ -86,6 +87,7 @@ TEST(Oblique, DirectionsOfNrrdAreKeptAndOptionsOverrideItsLabels) {
   EXPECT_EQ(built.at("unit"), "mm");
   EXPECT_EQ(built.at("field"), "water");
   EXPECT_EQ(built.at("field_unit"), "");
+  EXPECT_EQ(built.at("space"), "LPS");
 }
 
 TEST(Oblique, WhatCannotBeIsWrongUsageInOneLine) {

@@ -309,6 +309,25 @@ TEST(Programs, InfoSaysWhatIsInAVolumeAndBuildTakesIt) {
   expect_complaint(run({program("intervale"), "info", folder.file("x.nii", "x")}), 1, "is not a NIfTI file", "intervale: ");
 }
 
+TEST(Programs, BuildKeepsAPartOfAVolume) {
+  const TempDir folder;
+  std::string header = "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 9 8 7\nspace dimension: 3\nspace directions: none (1,0,0) (0,2,0) (0,0,4)\n";
+  header += "space origin: (10,20,30)\nkinds: list domain domain domain\nencoding: raw\n\n";
+  for (int i = 0; i < 9 * 8 * 7; ++i) header += {char(i % 50), char(100 + i % 50)};
+  const std::string volume = folder.file("v.nrrd", header), out = folder / "v.ivm";
+  EXPECT_THAT(run({program("intervale"), "info", volume}).out, HasSubstr("numbers   2: choose one with build --part, 0 to 1\n"));
+  std::vector<std::string> build{program("intervale"), "build", volume, "-o", out, "--json", "--channel", "other=" + volume + ":/0"};
+  expect_complaint(run(build), 2, "2 numbers a sample: choose one, 0 to 1, with --part", "intervale: ");
+  build.insert(build.end(), {"--part", "1", "--crop", "2", "6", "1", "7", "3", "5"});
+  const auto built = json_of(run(build));
+  EXPECT_EQ(built.at("dims"), nlohmann::json({5, 7, 3}));
+  EXPECT_EQ(built.at("origin"), nlohmann::json({12.0, 22.0, 42.0}));
+  EXPECT_GE(built.at("values").at("least"), 100);
+  EXPECT_LT(built.at("channels").at(0).at("values").at("greatest"), 50);
+  build.back() = "7";
+  expect_complaint(run(build), 2, "the samples on z go from 0 to 6, and 3 to 7 were chosen", "intervale: ");
+}
+
 TEST(Programs, AFolderOfDicomImagesIsLookedAtAndBuilt) {
   if (!std::filesystem::exists(program("read-dicom"))) GTEST_SKIP() << "no read-dicom";
   const TempDir folder;

@@ -154,6 +154,7 @@ TEST(Labels, AreShortTextsWithoutControlCharacters) {
     EXPECT_FALSE(is_label(bad));
   EXPECT_TRUE(is_label(std::string(64, 'x')));
   EXPECT_FALSE(check_labels({"mm", "a\tb", ""}));
+  EXPECT_FALSE(check_labels({"", "", "", "RA\n"}));
 }
 
 }  // namespace

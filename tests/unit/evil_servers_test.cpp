@@ -134,6 +134,7 @@ std::vector<Lie> descriptions() {
       {"AffineOfZeros", opened([](Description& d) { d.grid.affine.rows.fill(0); }), kInvalid},
       {"NameTooLong", opened([](Description& d) { d.name.assign(256, 'x'); }), "name is too long"},
       {"UnitTooLong", opened([](Description& d) { d.labels.unit.assign(65, 'x'); }), "label is too long"},
+      {"SpaceTooLong", opened([](Description& d) { d.labels.space.assign(65, 'x'); }), "label is too long"},
       {"UnitOfEscapes", opened([](Description& d) { d.labels.unit = "\x1b[2J\n"; }), kInvalid},
       {"FieldThatIsNoText", opened([](Description& d) { d.labels.field = "\xff\xfe"; }), kInvalid},
       {"RangeUpsideDown", opened([](Description& d) {

@@ -165,7 +165,7 @@ TEST_F(Dicom, ImagesAreSortedAlongTheNormal) {
   folder_.file("scan/README", "not an image");
   const auto header = read_volume_header(path);
   ASSERT_TRUE(header) << header.error().message;
-  EXPECT_EQ((*header)->space, "LPS");
+  EXPECT_EQ((*header)->labels.space, "LPS");
   EXPECT_STREQ((*header)->format, "DICOM");
   const auto volume = read_volume(path, {});
   ASSERT_TRUE(volume) << volume.error().message;
@@ -266,8 +266,7 @@ TEST(HeaderLine, IsReadAsItWasWritten) {
   VolumeHeader header;
   header.grid = {{3, 4, 5}, Affine{{1, 2, 0, 4, 0, 5, 6, 7, 0, 0, 8, 9.5}}};
   header.type = SampleType::i32;
-  header.labels = {"mm", "density \u00e9", "g/cm3"};
-  header.space = "LPS";
+  header.labels = {"mm", "density \u00e9", "g/cm3", "LPS"};
   header.time_points = 7;
   header.slope = 0.1;
   header.intercept = -1e300;

@@ -64,7 +64,7 @@ TEST(Nrrd, DirectionsAndLabelsComeBack) {
   std::mt19937 random(2);
   for (unsigned kind = 0; kind < 50; ++kind) {
     Volume volume{"v", {{5, 2, 3}, testing::random_affine(random, kind % 5)}, SampleType::u8, {}};
-    volume.labels = {"mm", "CT \"head\"", "a\\b \u00b5"};
+    volume.labels = {"mm", "CT \"head\"", "a\\b \u00b5", std::array{"", "RAS", "LAS", "LPS"}[kind % 4]};
     volume.bytes.resize(volume.grid.sample_count());
     ASSERT_TRUE(write_nrrd(folder / "v.nrrd", volume));
     const auto read = read_nrrd(folder / "v.nrrd");
@@ -82,6 +82,7 @@ TEST(Nrrd, LabelsThatCannotBeAreIgnored) {
     return volume ? volume->labels : Labels{};
   };
   EXPECT_EQ(labels("space dimension: 3\nspace units: \"mm\" \"mm\" \"mm\"\ncontent:  a head \nsample units: HU\n"), (Labels{"mm", "a head", "HU"}));
+  EXPECT_EQ(labels("space: left-posterior-superior\n"), (Labels{"", "", "", "LPS"}));
   EXPECT_EQ(labels("space dimension: 3\nspace units: \"mm\" \"mm\" \"m\"\n"), Labels{}) << "they differ";
   EXPECT_EQ(labels("content: " + std::string(65, 'x') + "\nsample units: \xff\n"), Labels{});
   EXPECT_EQ(labels("content: \x1b[2J\nsample units: \"unfinished\n"), Labels{});

@@ -59,7 +59,7 @@ class ObliqueGrid : public ::testing::TestWithParam<unsigned> {
 TEST_P(ObliqueGrid, TheMeshIsThatOfThePlainGridTransformed) {
   Volume volume = trial_.volume;
   volume.grid = grid_;
-  volume.labels = {"mm", "density", "HU"};
+  volume.labels = {"mm", "density", "HU", map_.is_mirrored() ? "LPS" : ""};
   const auto file = encode_ivm(testing::build(volume, trial_.options));
   const auto loaded = decode_ivm(file, "made");
   ASSERT_TRUE(loaded) << loaded.error().message;

@@ -21,7 +21,7 @@ Description some_description() {
   Description d;
   d.name = "buckyball";
   d.grid = {{129, 65, 2}, Affine{{1, 0.5, -0.25, -1, 0, 2, 0.125, 0, -3, 0, 4, 1e9}}};
-  d.labels = {"mm", "density \u00e9", "g/cm\u00b3"};
+  d.labels = {"mm", "density \u00e9", "g/cm\u00b3", "LPS"};
   d.range = {-kInf, 188};
   d.refine = Refine::uniform;
   d.max_error = 12.25;

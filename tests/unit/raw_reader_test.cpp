@@ -27,7 +27,7 @@ TEST(RawReader, ReadsEveryTypeXFastest) {
     std::vector<T> samples(24);
     for (int i = 0; i < 24; ++i) samples[i] = static_cast<T>(i * 5 - 7);
     const auto path = folder.file("v.raw", bytes_of(samples));
-    const auto volume = read_raw(path, {{2, 3, 4}, type, false, 0, Affine::of({1, 2, 3}, {4, 5, 6})});
+    const auto volume = read_volume(path, RawLayout{{2, 3, 4}, type, false, 0, Affine::of({1, 2, 3}, {4, 5, 6})});
     ASSERT_TRUE(volume) << volume.error().message;
     EXPECT_EQ(volume->name, "v");
     EXPECT_EQ(volume->type, type);
@@ -48,7 +48,7 @@ TEST(RawReader, SkipsAndSwaps) {
   const TempDir folder;
   std::string file = "header!";
   for (int i = 0; i < 8; ++i) file += {'\x01', static_cast<char>(i)};
-  const auto volume = read_raw(folder.file("v.raw", file), {{2, 2, 2}, SampleType::u16, true, 7});
+  const auto volume = read_volume(folder.file("v.raw", file), RawLayout{{2, 2, 2}, SampleType::u16, true, 7});
   ASSERT_TRUE(volume) << volume.error().message;
   visit_samples(*volume, [](auto samples) {
     for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(static_cast<int>(samples[i]), 256 + int(i));
@@ -58,7 +58,7 @@ TEST(RawReader, SkipsAndSwaps) {
 TEST(RawReader, RefusesAFileTooShortOrTooLongWithBothNumbers) {
   const TempDir folder;
   for (const std::size_t size : {std::size_t{0}, std::size_t{7}, std::size_t{9}}) {
-    const auto volume = read_raw(folder.file("v.raw", std::string(size, 'x')), {{2, 2, 2}, SampleType::u8});
+    const auto volume = read_volume(folder.file("v.raw", std::string(size, 'x')), RawLayout{{2, 2, 2}, SampleType::u8});
     ASSERT_FALSE(volume);
     EXPECT_FALSE(volume.error().usage);
     EXPECT_NE(volume.error().message.find(std::to_string(size) + " bytes"), std::string::npos) << volume.error().message;
@@ -85,7 +85,7 @@ TEST(RawReader, RefusesLayoutsThatCannotBe) {
       {{2, 2, 2}, SampleType::u8, false, 0, Affine::of({1e308, 1, 1}, {1e308, 0, 0})},
   };
   for (const auto& layout : layouts) {
-    const auto volume = read_raw(path, layout);
+    const auto volume = read_volume(path, layout);
     ASSERT_FALSE(volume);
     EXPECT_TRUE(volume.error().usage) << volume.error().message;
   }
@@ -93,7 +93,7 @@ TEST(RawReader, RefusesLayoutsThatCannotBe) {
 
 TEST(RawReader, AHugeLayoutAllocatesNothing) {
   const TempDir folder;
-  const auto volume = read_raw(folder.file("v.raw", "x"), {{1 << 20, 1 << 20, 1 << 20}, SampleType::f64});
+  const auto volume = read_volume(folder.file("v.raw", "x"), RawLayout{{1 << 20, 1 << 20, 1 << 20}, SampleType::f64});
   ASSERT_FALSE(volume);
   EXPECT_NE(volume.error().message.find("9223372036854775808"), std::string::npos) << volume.error().message;
 }
@@ -102,7 +102,7 @@ TEST(RawReader, RefusesWhatIsNoRegularFile) {
   const TempDir folder;
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   for (const auto& path : {folder.path(), folder / "none", folder / "pipe", std::filesystem::path("/dev/zero")}) {
-    const auto volume = read_raw(path, {{2, 2, 2}, SampleType::u8});
+    const auto volume = read_volume(path, RawLayout{{2, 2, 2}, SampleType::u8});
     ASSERT_FALSE(volume) << path;
     EXPECT_NE(volume.error().message.find(path.string()), std::string::npos) << volume.error().message;
   }

@@ -51,7 +51,7 @@ TEST_P(VolumeFiles, AreReadAsTheyWereMade) {
   const auto header = read_volume_header(path);
   ASSERT_TRUE(header) << header.error().message;
   ASSERT_TRUE(*header);
-  EXPECT_EQ((*header)->space, file().space);
+  EXPECT_EQ((*header)->labels.space, file().space);
   EXPECT_EQ((*header)->time_points, file().time_points);
   const auto volume = read_volume(path, {}, file().time_point);
   ASSERT_TRUE(volume) << volume.error().message;
