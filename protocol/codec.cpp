@@ -53,7 +53,12 @@ Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
   const auto in_order = ranges.empty() ? 0 : out.CreateVectorOfStructs(ranges);
   const auto refine = std::uint8_t(shown.refine ? 1 + int(*shown.refine) : 0);
   const auto channels = message.channels.empty() ? 0 : out.CreateVectorOfStrings(message.channels);
-  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early, message.coarse_error_percent, channels);
+  const auto& map = message.depth;
+  const auto depth =
+      map ? fbs::CreateDepthMap(out, std::uint8_t(map->width), std::uint8_t(map->height), map->nearest, map->farthest, out.CreateVector(map->codes))
+          : 0;
+  return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early, message.coarse_error_percent, channels,
+                         depth);
 }
 
 Offset<fbs::Credit> encode_body(FlatBufferBuilder& out, const Credit& message) { return fbs::CreateCredit(out, message.bytes); }
@@ -165,6 +170,12 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
     auto splits = decode_splits({forget->data(), forget->size()}, kMaxHave);
     if (!splits) return malformed(splits.error().message);
     view.forget = std::move(*splits);
+  }
+  if (const auto* depth = table.depth()) {
+    if (!lod.camera) return malformed("a depth map without a camera");
+    const DepthMap map{depth->width(), depth->height(), depth->nearest(), depth->farthest(), {depth->codes()->begin(), depth->codes()->end()}};
+    if (auto ok = check_depth_map(map); !ok) return malformed(ok.error().message);
+    view.depth = map;
   }
   if (const auto* channels = table.channels()) {
     if (channels->size() > kMaxChannels) return malformed("a view of more than " + std::to_string(kMaxChannels) + " channels");

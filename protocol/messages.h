@@ -9,6 +9,7 @@
 
 #include "common/diamond/supercube.h"
 #include "common/patch/description.h"
+#include "common/view/depth_map.h"
 #include "common/view/lod.h"
 #include "protocol/limits.h"
 
@@ -76,6 +77,8 @@ struct View {
   // max_error. Only from a data set of every range.
   std::optional<double> coarse_error_percent = {};
   std::vector<std::string> channels = {};  // whose values are sent with the updates: names of the data set's
+  // What the lod's camera sees of the client's mesh: updates that lie behind are sent last.
+  std::optional<DepthMap> depth = {};
   friend bool operator==(const View&, const View&) = default;
 };
 struct Credit {

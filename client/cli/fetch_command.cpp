@@ -137,6 +137,9 @@ Result<void> run(const FetchCommand& options) {
   fetch.shown = {*ranges, parse_refine(options.refine)};
   fetch.channels = with_channel_of(options.picture, fetch.channels);
   fetch.prefers_uniform = options.picture && options.picture->render == Render::volume;
+  // A mesh that is written is of use from all sides.
+  const auto& picture = options.picture;
+  fetch.is_opaque = picture && !options.output && picture->render == Render::surface && !picture->clip && !picture->edges;
   const auto fetched = fetch_with_progress(*url, fetch);
   if (!fetched) return tl::unexpected(fetched.error());
   const FetchedMesh all = mesh_of(fetched->client, options.digest);

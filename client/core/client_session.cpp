@@ -27,9 +27,20 @@ Result<void> ClientSession::look(ViewRequest request) {
     mesh_->show_channels(*channels);
   }
   view_ = std::move(request);
+  map_due_ = view_->depth ? 2 * updates_ : kDepthMapUpdates;
   if (mesh_ && view_->camera) mesh_->look(*view_->camera);
   if (state_ != State::connecting) send_view();
   return {};
+}
+
+bool ClientSession::wants_depth_map() const {
+  return state_ == State::viewing && view_ && view_->is_opaque && view_->lod.camera && updates_ >= map_due_;
+}
+
+void ClientSession::send_depth_map(DepthMap map) {
+  view_->depth = std::move(map);
+  map_due_ = 2 * updates_;
+  send_view();
 }
 
 // With max_bytes, Open grants nothing: first it must be known how many bytes Opened takes.
@@ -195,6 +206,7 @@ void ClientSession::send_view() {
   view.early = view_->early;
   view.coarse_error_percent = view_->coarse_error_percent;
   view.channels = view_->channels;
+  view.depth = view_->depth;
   if (shown_.empty() || shown_.back().shown != view.shown || shown_.back().channels != view.channels)
     shown_.push_back({epoch_, view.shown, view.channels});
   if (mesh_) {

@@ -17,6 +17,7 @@
 #include "client/core/credit_window.h"
 #include "client/core/stream_client.h"
 #include "common/util/result.h"
+#include "common/view/depth_map.h"
 #include "common/view/lod.h"
 #include "protocol/messages.h"
 
@@ -39,6 +40,9 @@ struct ViewRequest {
   // Likewise; batches arrive while the session is idle, too.
   std::optional<double> coarse_error_percent = {};
   std::vector<std::string> channels = {};  // of the data set, whose values come along
+  // Surfaces hide what is behind them: see wants_depth_map(). With a camera in `lod`.
+  bool is_opaque = false;
+  std::optional<DepthMap> depth = {};  // of that camera, if there is one already
 };
 
 // On one thread.
@@ -101,6 +105,12 @@ class ClientSession {
   Result<void> preview(const RangeRequest& shown) { return mesh_ ? mesh_->show(shown) : Result<void>(); }
   // Asks for the same view again, and gives up more: there was no room for all of it.
   void look_again() { send_view(); }
+
+  // Whether the server should be told what the surfaces hide: the view is opaque, and the mesh has twice as many updates
+  // as when it was last told.
+  [[nodiscard]] bool wants_depth_map() const;
+  // Asks for the same view again. map: of its camera, and of the mesh as it is.
+  void send_depth_map(DepthMap map);
 
   // The WebSocket is open. Open, all Haves and the view are to be sent together: that saves a round trip.
   void connected(Clock::time_point now);
@@ -167,6 +177,7 @@ class ClientSession {
   std::uint64_t answered_ = 0;  // epoch of the last batch or Done; at first that of the first view of this session
   std::uint64_t sequence_ = 0;  // of the next batch
   std::uint64_t updates_ = 0;   // that the client has now
+  std::uint64_t map_due_ = 0;   // with so many updates a depth map is to be sent
 };
 
 }  // namespace intervale

@@ -6,11 +6,14 @@
 
 #include "client/core/backoff.h"
 #include "client/net/connection.h"
+#include "common/mesh/boundary.h"
 
 namespace intervale {
 namespace {
 
 using Clock = ClientSession::Clock;
+
+constexpr std::uint64_t kMostUpdatesOfMap = 250'000;  // of a mesh that is drawn into a depth map: a fifth of a second
 
 class Fetch {
  public:
@@ -65,7 +68,9 @@ class Fetch {
     if (stats_.seconds_first_mesh == 0 && client.tet_count() > 0) stats_.seconds_first_mesh = elapsed();
     stats_.session = session_.stats();
     if (event->kind == ClientSession::Event::Kind::batch && events_.on_batch) events_.on_batch(client, stats_);
-    return {};
+    if (!session_.wants_depth_map() || client.updates() > kMostUpdatesOfMap) return {};
+    session_.send_depth_map(depth_map(client.mesh()));
+    return connection_->send(session_);
   }
 
   Result<void> opened(const Description& description) {
@@ -77,8 +82,18 @@ class Fetch {
   }
 
   Result<void> look(const std::optional<Refine>& refine) {
-    return session_.look(
-        {options_.lod, {}, {.max_tets = options_.lod.max_tets.value_or(UINT64_MAX)}, {options_.shown.ranges, refine}, false, {}, options_.channels});
+    return session_.look({.lod = options_.lod,
+                          .budget = {.max_tets = options_.lod.max_tets.value_or(UINT64_MAX)},
+                          .shown = {options_.shown.ranges, refine},
+                          .channels = options_.channels,
+                          .is_opaque = options_.is_opaque});
+  }
+
+  // What the camera sees of a mesh.
+  [[nodiscard]] DepthMap depth_map(const Mesh& mesh) const {
+    DepthBuffer buffer(*options_.lod.camera);
+    for (const auto& [a, b, c] : boundary_triangles(mesh)) buffer.draw({mesh.points[a], mesh.points[b], mesh.points[c]});
+    return buffer.map();
   }
 
   // Fails with `why` once the time for it is over, or as stream() does.

@@ -21,6 +21,8 @@ struct FetchOptions {
   std::vector<std::string> channels;  // of the data set, that the meshes bring along
   // Where `shown` does not say what to refine: the inside of the ranges too, if the data set has it.
   bool prefers_uniform = false;
+  // Surfaces hide what is behind them: what the lod's camera does not see is received last.
+  bool is_opaque = false;
   // The most bytes of messages that are received; only the first one, the description, may exceed it. No updates
   // arrive for less than that message and protocol::kMinCredit.
   std::optional<std::uint64_t> max_bytes;

@@ -321,6 +321,17 @@ BoundarySurface::Change BoundarySurface::all() {
   return change;
 }
 
+void BoundarySurface::draw(DepthBuffer& buffer) const {
+  const Affine& affine = mesher_.state().grid.affine;
+  const auto corner = [&](PointId id) {
+    const FrontMesher::Position& p = points_[id].position;
+    return affine.point({double(p[0]) / FrontMesher::kSteps, double(p[1]) / FrontMesher::kSteps, double(p[2]) / FrontMesher::kSteps});
+  };
+  for (const Part& part : parts_) {
+    for (const Triangle& t : part.triangles) buffer.draw({corner(t[0]), corner(t[1]), corner(t[2])});
+  }
+}
+
 double BoundarySurface::samples_in_world() const { return mesher_.state().grid.affine.determinant() / kStepsCubed; }
 
 double BoundarySurface::volume() const {

@@ -15,6 +15,7 @@
 #include "common/front/front.h"
 #include "common/front/front_mesher.h"
 #include "common/mesh/normals.h"
+#include "common/view/depth_map.h"
 
 namespace intervale {
 
@@ -56,6 +57,9 @@ class BoundarySurface {
   [[nodiscard]] Change all();
   // A piece as of the last update, with or without edges. O(its size).
   [[nodiscard]] SurfacePiece piece(std::uint32_t id, bool edges);
+
+  // Draws what the last update made, as far as it hides anything. O(triangles).
+  void draw(DepthBuffer& buffer) const;
 
   // As of the last update.
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }

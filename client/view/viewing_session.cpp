@@ -2,7 +2,7 @@
 
 namespace intervale {
 
-Result<void> ViewingSession::look(const WantedView& view) {
+Result<void> ViewingSession::look(const WantedView& view, std::optional<DepthMap> depth) {
   Lod lod;
   lod.roi = view.region;
   lod.camera = view.camera;
@@ -16,7 +16,9 @@ Result<void> ViewingSession::look(const WantedView& view) {
                             .shown = view.shown,
                             .early = true,
                             .coarse_error_percent = kCoarseErrorPercent,
-                            .channels = view.channels};
+                            .channels = view.channels,
+                            .is_opaque = view.is_opaque,
+                            .depth = view.region ? std::nullopt : std::move(depth)};
   if (auto looked = session_.look(request); !looked) return looked;
   view_ = view;
   gave_up_more_ = false;

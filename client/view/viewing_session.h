@@ -21,6 +21,7 @@ struct WantedView {
   Budget budget;                           // max_updates: at least kMinRoom
   RangeRequest shown;                      // of the data set
   std::vector<std::string> channels = {};  // likewise
+  bool is_opaque = false;                  // surfaces hide what is behind them, and nothing is cut away
   friend bool operator==(const WantedView&, const WantedView&) = default;
 };
 
@@ -33,9 +34,14 @@ class ViewingSession {
   // client: name and version, for the server's log.
   ViewingSession(std::string dataset, std::string client) : session_({.dataset = std::move(dataset), .client = std::move(client)}) {}
 
-  // What is wanted from now on. Fails, and changes nothing, if check_lod refuses the camera or the region, or
-  // the data set has not all that is to be shown.
-  Result<void> look(const WantedView& view);
+  // What is wanted from now on. Fails, and changes nothing, if check_lod refuses the camera or the region, or the data
+  // set has not all that is to be shown. depth: of this camera, and an opaque view's, if there is a surface already.
+  Result<void> look(const WantedView& view, std::optional<DepthMap> depth = {});
+
+  // See ClientSession.
+  [[nodiscard]] bool wants_depth_map() const { return session_.wants_depth_map(); }
+  void send_depth_map(DepthMap map) { session_.send_depth_map(std::move(map)); }
+  [[nodiscard]] const std::optional<WantedView>& view() const { return view_; }
 
   // What is shown until the next look(): see ClientSession::preview().
   Result<void> preview(const RangeRequest& shown) { return session_.preview(shown); }

@@ -8,7 +8,8 @@
 
 namespace intervale {
 
-Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod) : volume_(volume), relevant_(relevant) {
+Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden)
+    : volume_(volume), relevant_(relevant) {
   const double threshold = error_of(lod, volume.description().max_error);
   const auto steps = volume.error_steps();
   while (threshold > 0 && least_step_ < steps.size() && steps[least_step_] <= threshold) ++least_step_;
@@ -16,6 +17,7 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
   if (lod.roi) roi_.emplace(*lod.roi, g);
   if (lod.camera) {
     screen_.emplace(*lod.camera, g);
+    if (hidden != nullptr) occlusion_.emplace(*hidden, *lod.camera, g);
     pixel_error_ = float(lod.camera->pixel_error);
     const Vec3 spacing = g.affine.spacing();
     for (unsigned slope = 0; slope <= kMaxSlope; ++slope) removed_[slope] = removed_of(slope);
@@ -44,6 +46,8 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
   const float pixels = object_error * b.pixels_;
   if (!(pixels > pixel_error_)) return b;
   b.weight_ = weight_of(region, b.scale_, b.pixels_, !b.near_);
+  b.is_hidden_ = is_hidden(region);
+  if (b.is_hidden_) b.weight_ *= kHidden;
   b.bound_ = rank_of(importance_of(pixels, slope, b.weight_));
   return b;
 }
@@ -67,11 +71,14 @@ Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, Supercube
   s.scale_ = scale_;
   s.pixels_ = pixels_;
   s.weight_ = weight_;
+  const bool may_be_hidden = ranking_->occlusion_ && !is_hidden_;
+  if (!near_ && !may_be_hidden) return s;
+  const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
   if (near_) {
-    const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
     s.pixels_ = ranking_->pixels_per_unit(region);
     s.weight_ = ranking_->weight_of(region, scale_, s.pixels_, true);
   }
+  if (is_hidden_ ? near_ : may_be_hidden && ranking_->occlusion_->hides(region)) s.weight_ *= kHidden;
   return s;
 }
 

@@ -7,7 +7,8 @@
 // its square, as deviations are seen so large; and its square once more, if all pixels should count alike, but not, if
 // all of the surface should. Otherwise it is estimated: the square of the deviation in pixels, times the pixels that the
 // diamond's surfaces cover, about (h in pixels)^2. Both as far as the surfaces are in the picture. So what is large in
-// the picture comes before what is far off in one place. Pixels a world unit, for the nearest visible point, and the
+// the picture comes before what is far off in one place. What a depth map hides comes after everything that is seen.
+// Pixels a world unit, for the nearest visible point, and the
 // share that is seen are computed once a supercube, or once a brick that is far away.
 #pragma once
 
@@ -19,6 +20,7 @@
 
 #include "common/ivm/interval_volume.h"
 #include "common/util/bits.h"
+#include "common/view/depth_map.h"
 #include "common/view/lod.h"
 #include "common/view/screen_error.h"
 #include "common/view/seen_box.h"
@@ -27,8 +29,9 @@ namespace intervale {
 
 class Ranking {
  public:
-  // volume and relevant, to the range that is looked at, must outlive it; lod: one that check_lod lets pass.
-  Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod);
+  // volume and relevant, to the range that is looked at, must outlive it; lod: one that check_lod lets pass. hidden: of
+  // its camera; what lies behind comes last.
+  Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden = nullptr);
   // The same, for the range of the data set.
   Ranking(const IntervalVolume& volume, const Lod& lod) : Ranking(volume, volume.relevant(), lod) {}
 
@@ -91,7 +94,8 @@ class Ranking {
     friend class Ranking;
     const Ranking* ranking_ = nullptr;
     int scale_ = 0;
-    bool near_ = false;  // distances from the camera to its supercubes differ much
+    bool near_ = false;       // distances from the camera to its supercubes differ much
+    bool is_hidden_ = false;  // all of it
     float pixels_ = 0, weight_ = 0;
     Rank bound_ = 0;
   };
@@ -110,6 +114,7 @@ class Ranking {
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
 
  private:
+  static constexpr float kHidden = 0x1p-32F;  // of the weight of what is seen
   static constexpr float kLeastImportance = std::numeric_limits<float>::min(), kMostImportance = 0x1p100f;
   // Above 0.
   [[nodiscard]] float importance_of(float pixels, unsigned slope, float weight) const {
@@ -122,6 +127,7 @@ class Ranking {
     return Rank(std::max(rank, 1));
   }
   [[nodiscard]] float pixels_per_unit(const ScreenError::Region& region) const;
+  [[nodiscard]] bool is_hidden(const ScreenError::Region& region) const { return occlusion_ && occlusion_->hides(region); }
   [[nodiscard]] float weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const;
 
   const IntervalVolume& volume_;
@@ -129,6 +135,7 @@ class Ranking {
   unsigned least_step_ = 0;  // the lowest error step that is wanted
   std::optional<SeenBox> roi_;
   std::optional<ScreenError> screen_;
+  std::optional<Occlusion> occlusion_;
   float pixel_error_ = 0;
   double spacing_ = 0;                          // between samples, the geometric mean over the axes
   std::array<float, kMaxSlope + 1> removed_{};  // by slope

@@ -157,11 +157,11 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   return true;
 }
 
-void StreamPlan::set_lod(const Lod& lod) {
+void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden) {
   budget_.reset();
   search_.reset();
   if (lod.max_updates) search_ = std::make_shared<BudgetSearch>(volume_, relevant_, lod);
-  ranking_.emplace(*volume_, *relevant_, lod);
+  ranking_.emplace(*volume_, *relevant_, lod, hidden);
   rank_bricks();
 }
 

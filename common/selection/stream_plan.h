@@ -70,8 +70,9 @@ class StreamPlan {
   // data set's.
   bool resume(std::size_t channel, SupercubeKey key, std::uint64_t slots);
 
-  // Replaces the level of detail; check_lod(lod) must hold. O(bricks).
-  void set_lod(const Lod& lod);
+  // Replaces the level of detail; check_lod(lod) must hold. hidden: a depth map of its camera; what lies behind is sent
+  // last. O(bricks).
+  void set_lod(const Lod& lod, const DepthMap* hidden = nullptr);
 
   // The search for what is within max_updates, which is to be done before the next batch; nullptr: none. Another thread
   // may go on with it; otherwise next() does.

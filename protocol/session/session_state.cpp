@@ -77,7 +77,9 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   plan_->set_channels(*channels);
   coarse_percent_ = view.coarse_error_percent;
   epoch_ = view.epoch;
+  const bool is_other_view = lod_ != view.lod || shown_ != shown;
   lod_ = view.lod;
+  depth_ = view.depth;
   if (shown_ != shown || !lod_.camera) measurement_.reset();
   if (shown_ != shown) estimate_.reset();
   search_.reset();  // of another view; if it is done, it would say that nothing is waited for
@@ -85,8 +87,8 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   is_early_ = view.early;
   is_new_ = true;
   waits_ = false;
+  if (is_other_view || view_ == ViewState::none) target_ = kFirstPayload;
   view_ = ViewState::unanswered;
-  target_ = kFirstPayload;
   return {};
 }
 
@@ -121,7 +123,7 @@ bool SessionState::begin_view() {
     const bool needs_measured = measurement_ && (!is_early_ || lod_.max_updates || measurement_->is_soon());
     if (needs_measured || (!is_planned && !estimate())) return false;
   }
-  if (std::exchange(is_new_, false)) plan_->set_lod(measurement_ ? coarser(lod_) : lod_);
+  if (std::exchange(is_new_, false)) plan_->set_lod(measurement_ ? coarser(lod_) : lod_, depth_ ? &*depth_ : nullptr);
   return true;
 }
 

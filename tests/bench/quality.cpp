@@ -1,5 +1,5 @@
-// How soon a picture is right: bytes received against the deviation measured on the screen, for the order in which we
-// send and for three others.
+// How soon a picture is right: bytes received against the deviation measured on the screen, and against the noise in the
+// picture as it is drawn, for the order in which we send and for others.
 //
 // Deviation is measured, not estimated: points are spread over the full mesh's surface, those in the picture are kept,
 // and for each the distance to the surface of the mesh so far is taken, in pixels where the point is.
@@ -26,7 +26,9 @@
 #include "common/ivm/refinement.h"
 #include "common/mesh/boundary.h"
 #include "common/mesh/io/mesh_writer.h"
+#include "common/picture/canvas.h"
 #include "common/selection/stream_plan.h"
+#include "common/view/depth_map.h"
 #include "protocol/limits.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/bench/cases.h"
@@ -45,6 +47,7 @@ constexpr double kPixelError = 1;
 constexpr double kEnough = 0.4;       // pixels: no need to look further
 constexpr double kFirstBytes = 4096;  // of the first picture that is measured; each further one has half as much again
 constexpr int kPoints = 3000;
+constexpr std::array<int, 2> kDrawn{640, 360};  // pixels
 
 using Sigma = std::shared_ptr<const IntervalVolume>;
 
@@ -72,12 +75,24 @@ Lod lod_of(const Look& look, const Grid& g) {
   return lod;
 }
 
-// The full mesh's surface, as points in one picture.
+// As the programs draw it.
+std::vector<std::uint8_t> drawn(const Mesh& mesh, Camera camera, const Box& box) {
+  camera.viewport = kDrawn;
+  const Viewpoint viewpoint(camera, box);
+  auto canvas = or_throw(Canvas::create(kDrawn, viewpoint, {}));
+  for_each_triangle(mesh, {}, viewpoint, [&canvas](std::span<const Corner> corners) { canvas.draw(corners); });
+  return or_throw(canvas.finish()).rgb;
+}
+
+// The full mesh's surface, as points in one picture, and drawn.
 struct Picture {
+  Camera seen_from;
+  Box box;
+  std::vector<std::uint8_t> pixels;
   NaiveCamera camera;
   std::vector<Vector> points;
 
-  Picture(const Triangles& full, const Camera& c) : camera(c) {
+  Picture(const Mesh& mesh, const Triangles& full, const Camera& c, const Box& b) : seen_from(c), box(b), pixels(drawn(mesh, c, b)), camera(c) {
     std::mt19937 random(1);
     for (int tries = 0; tries < 40 && points.size() < std::size_t(kPoints); ++tries) {
       for (const Vector& p : testing::points_on(full, kPoints, random)) {
@@ -85,6 +100,14 @@ struct Picture {
       }
     }
     if (points.size() < 100) throw std::runtime_error("there is next to nothing to be seen");
+  }
+
+  // The peak signal-to-noise ratio, in decibels, of the picture of a mesh.
+  [[nodiscard]] double decibels(const Mesh& mesh) const {
+    const auto other = drawn(mesh, seen_from, box);
+    double sum = 0;
+    for (std::size_t i = 0; i < pixels.size(); ++i) sum += (double(pixels[i]) - other[i]) * (double(pixels[i]) - other[i]);
+    return sum == 0 ? 99 : std::min(99.0, 10 * std::log10(255.0 * 255 * double(pixels.size()) / sum));
   }
 
   struct Deviation {
@@ -131,15 +154,21 @@ struct Order {
   const char* name;
   const char* color;
 };
-constexpr std::array<Order, 4> kOrders{{{"Intervale", "#0b6e4f"}, {"ideal", "#888888"}, {"by field error", "#c1440e"}, {"by level", "#3b5ba5"}}};
+constexpr std::array<Order, 5> kOrders{{{"Intervale", "#0b6e4f"},
+                                        {"ideal", "#888888"},
+                                        {"by field error", "#c1440e"},
+                                        {"by level", "#3b5ba5"},
+                                        {"Intervale with depth maps", "#8e44ad"}}};
+constexpr std::size_t kOurs = 0, kIdeal = 1, kByLevel = 3, kHiddenLast = 4;
 
 struct Point {
   double bytes = 0;
   Picture::Deviation deviation;
+  double decibels = 0;
 };
 using Curve = std::vector<Point>;
 
-using NextBatch = std::function<std::optional<std::vector<std::uint8_t>>()>;
+using NextBatch = std::function<std::optional<std::vector<std::uint8_t>>(const StreamClient&)>;
 using BytesSoFar = std::function<double()>;
 
 // Takes batches as a client does, and measures what it has now and then.
@@ -149,7 +178,7 @@ Curve follow(const IntervalVolume& volume, const Picture& picture, const NextBat
   double bytes = 0, due = kFirstBytes;
   bool more = true;
   while (more) {
-    const auto batch = next();
+    const auto batch = next(client);
     more = batch.has_value();
     if (more) {
       if (const auto applied = client.apply(*batch); !applied) throw std::runtime_error(applied.error().message);
@@ -157,17 +186,31 @@ Curve follow(const IntervalVolume& volume, const Picture& picture, const NextBat
       if (bytes < due) continue;
     }
     while (due <= bytes) due *= 1.5;
-    curve.push_back({bytes_so_far ? bytes_so_far() : bytes, picture.deviation(client.mesh())});
+    const Mesh mesh = client.mesh();
+    curve.push_back({bytes_so_far ? bytes_so_far() : bytes, picture.deviation(mesh), picture.decibels(mesh)});
     if (curve.back().deviation.most < kEnough) break;
   }
   return curve;
 }
 
-Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod) {
+DepthMap depth_map_of(const Mesh& mesh, const Camera& camera) {
+  DepthBuffer buffer(camera);
+  for (const auto& triangle : testing::triangles_of(mesh, boundary_triangles(mesh))) buffer.draw(triangle);
+  return buffer.map();
+}
+
+// with_depth: as a client that sends a depth map whenever it has twice as many updates as at the last.
+Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod, bool with_depth = false) {
   StreamPlan plan(sigma);
   plan.set_lod(lod);
   std::size_t target = kFirstPayload;
-  return follow(*sigma, picture, [&]() -> std::optional<std::vector<std::uint8_t>> {
+  std::uint64_t due = kDepthMapUpdates;
+  return follow(*sigma, picture, [&](const StreamClient& client) -> std::optional<std::vector<std::uint8_t>> {
+    if (with_depth && client.updates() >= due) {
+      due = 2 * client.updates();
+      const DepthMap map = depth_map_of(client.mesh(), *lod.camera);
+      plan.set_lod(lod, &map);
+    }
     auto batch = plan.next(target);
     while (!batch && !plan.done()) batch = plan.next(target);
     if (!batch) return {};
@@ -182,7 +225,7 @@ Curve follow_list(const Sigma& sigma, const Picture& picture, const std::vector<
   const SupercubeSet& set = sigma->set();
   SplitSet sent(sigma->size());
   std::size_t at = 0;
-  const auto next = [&]() -> std::optional<std::vector<std::uint8_t>> {
+  const auto next = [&](const StreamClient&) -> std::optional<std::vector<std::uint8_t>> {
     const std::size_t end = std::min({order.size(), at + std::max<std::size_t>(500, at / 8), at + kBatchUpdatesMost});
     if (at == end) return {};
     SplitSet some(sigma->size());
@@ -205,6 +248,26 @@ std::optional<double> bytes_to(const Curve& curve, double pixels) {
     return std::exp(std::lerp(std::log(curve[i - 1].bytes), std::log(curve[i].bytes), t));
   }
   return {};
+}
+
+// Bytes until the picture has so many decibels; likewise.
+std::optional<double> bytes_to_decibels(const Curve& curve, double decibels) {
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    if (curve[i].decibels < decibels) continue;
+    if (i == 0) return curve[i].bytes;
+    const double t = (decibels - curve[i - 1].decibels) / (curve[i].decibels - curve[i - 1].decibels);
+    return std::exp(std::lerp(std::log(curve[i - 1].bytes), std::log(curve[i].bytes), t));
+  }
+  return {};
+}
+
+// What the picture has after so many bytes: what was measured last before.
+double decibels_at(const Curve& curve, double bytes) {
+  double decibels = 0;
+  for (const Point& p : curve) {
+    if (p.bytes <= bytes) decibels = p.decibels;
+  }
+  return decibels;
 }
 
 struct Row {
@@ -233,15 +296,16 @@ std::vector<Row> measure(const Case& c) {
   std::vector<Row> rows;
   for (const Look& look : kLooks) {
     const Lod lod = lod_of(look, sigma->description().grid);
-    const Picture picture(surface, *lod.camera);
+    const Picture picture(mesh, surface, *lod.camera, box_of(sigma->description().grid));
     Row row{fmt::format("{} {}", c.name, range_text(c.range, c.refine)), look.name, {}, 0, 0};
-    row.curves[0] = follow_plan(sigma, picture, lod);
+    row.curves[kOurs] = follow_plan(sigma, picture, lod);
+    row.curves[kHiddenLast] = follow_plan(sigma, picture, lod, true);
     const SplitSet wanted = select(*sigma, lod);
     Lod to_the_end = lod;
     to_the_end.camera->pixel_error = 1e-3;
-    row.curves[1] = follow_list(sigma, picture, in_order(*sigma, select(*sigma, to_the_end), to_the_end), true);
+    row.curves[kIdeal] = follow_list(sigma, picture, in_order(*sigma, select(*sigma, to_the_end), to_the_end), true);
     row.curves[2] = follow_plan(sigma, picture, Lod{});
-    row.curves[3] = follow_list(sigma, picture, by_level, false);
+    row.curves[kByLevel] = follow_list(sigma, picture, by_level, false);
     row.least_bytes = double(bytes_of(*sigma, wanted));
     StreamPlan plan(sigma);
     plan.set_lod(lod);
@@ -263,8 +327,8 @@ void print_rows(const std::vector<Row>& rows) {
   for (const Row& r : rows) {
     fmt::print("| {} | {} |", r.title, r.look);
     for (const double pixels : {4.0, 1.0}) {
-      for (const Curve& curve : r.curves) {
-        const auto bytes = bytes_to(curve, pixels);
+      for (std::size_t k = 0; k < kHiddenLast; ++k) {
+        const auto bytes = bytes_to(r.curves[k], pixels);
         fmt::print(" {} |", bytes ? kilobytes(*bytes) : "–");
       }
     }
@@ -282,6 +346,29 @@ void print_rows(const std::vector<Row>& rows) {
       "level-of-detail pyramid is sent. By field error: the same order whatever the view. When done: the bytes sent for a\n"
       "pixel error of 1, over the fewest bytes for that.\n",
       kPoints);
+}
+
+void print_pictures(const std::vector<Row>& rows) {
+  constexpr std::array<double, 8> kKilobytes{4, 8, 16, 32, 64, 128, 256, 512};
+  const auto name = [](std::size_t k) { return k == kHiddenLast ? "with depth maps" : kOrders[k].name; };
+  fmt::print("\n| volume, range | view | order | kB to 30 dB | 35 dB |");
+  for (const double kilobytes : kKilobytes) fmt::print(" dB at {} kB |", kilobytes);
+  fmt::print("\n|---|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+  for (const Row& r : rows) {
+    for (const std::size_t k : {kHiddenLast, kOurs, kByLevel}) {
+      fmt::print("| {} | {} | {} |", r.title, r.look, name(k));
+      for (const double decibels : {30.0, 35.0}) {
+        const auto bytes = bytes_to_decibels(r.curves[k], decibels);
+        fmt::print(" {} |", bytes ? kilobytes(*bytes) : "–");
+      }
+      for (const double kilobytes : kKilobytes) fmt::print(" {:.1f} |", decibels_at(r.curves[k], 1000 * kilobytes));
+      fmt::print("\n");
+    }
+  }
+  fmt::print(
+      "\nPeak signal-to-noise ratio of the picture, {} x {} pixels as the programs draw them, against that of the full mesh. With\n"
+      "depth maps: the client sends one whenever it has twice as many updates as at the last, and what they hide is sent last.\n",
+      kDrawn[0], kDrawn[1]);
 }
 
 void draw(const std::vector<Row>& rows, const std::string& path) {
@@ -350,6 +437,7 @@ int run(int argc, char** argv) {
   }
   if (rows.empty()) return 0;
   print_rows(rows);
+  print_pictures(rows);
   if (!picture.empty()) draw(rows, picture);
   return 0;
 }

@@ -299,6 +299,15 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, {}, {}, {}, {{}, Refine(2)}}))));
   for (const double percent : {-1.0, 100.5, kNan, kInf, -kInf})
     EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = {}, .coarse_error_percent = percent})))) << percent;
+  const Lod with_camera{.camera = Camera{.look_at = {1, 0, 0}}};
+  const View seen{.epoch = 1, .lod = with_camera, .depth = DepthMap{2, 2, 0.5, 9, {0, 1, 254, 255}}};
+  const auto decoded = decode_client_message(encode(ClientMessage(seen)));
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  EXPECT_EQ(std::get<View>(*decoded), seen);
+  for (const DepthMap& map : {DepthMap{2, 2, 0.5, 9, {0, 1, 2}}, DepthMap{0, 2, 0.5, 9, {}}, DepthMap{65, 1, 0.5, 9, std::vector<std::uint8_t>(65)},
+                              DepthMap{1, 1, kNan, 9, {0}}, DepthMap{1, 1, 2, 1, {0}}, DepthMap{1, 1, 1, kInf, {0}}})
+    EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = with_camera, .depth = map}))));
+  EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = {}, .depth = seen.depth})))) << "without a camera";
   for (const Lod& lod : wrong) EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, lod})))) << &lod - wrong.data();
 }
 

@@ -89,6 +89,21 @@ bool meets(const IntervalVolume& v, const Diamond& d, const Box& roi) {
   return true;
 }
 
+// What a camera sees of some triangles in the box; none without a camera, and now and then.
+std::optional<DepthMap> random_map(const Lod& lod, const Grid& g, std::mt19937& random) {
+  if (!lod.camera || random() % 3 == 0) return {};
+  DepthBuffer buffer(*lod.camera);
+  for (int i = 0; i < 20; ++i) {
+    std::array<Vec3, 3> triangle;
+    for (Vec3& corner : triangle) {
+      for (std::size_t k = 0; k < 3; ++k) corner[k] = testing::uniform(random, -0.5, 1.5) * g.dims[k];
+      corner = g.affine.point(corner);
+    }
+    buffer.draw(triangle);
+  }
+  return buffer.map();
+}
+
 class Ranks : public ::testing::TestWithParam<unsigned> {
  protected:
   IntervalVolume volume_ = ranking_volume(GetParam());
@@ -97,7 +112,9 @@ class Ranks : public ::testing::TestWithParam<unsigned> {
 
 TEST_P(Ranks, NoUpdateRanksAboveItsBrick) {
   for (int trial = 0; trial < 40; ++trial) {
-    const Ranking ranking(volume_, testing::random_lod(volume_.description().grid, random_));
+    const Lod lod = testing::random_lod(volume_.description().grid, random_);
+    const auto map = random_map(lod, volume_.description().grid, random_);
+    const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr);
     for_each_rank(volume_, ranking,
                   [&](const Place& p, Ranking::Rank rank) { ASSERT_GE(ranking.of_brick(p.brick).bound(), rank) << "trial " << trial; });
   }
@@ -105,12 +122,40 @@ TEST_P(Ranks, NoUpdateRanksAboveItsBrick) {
 
 TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
   for (int trial = 0; trial < 40; ++trial) {
-    const Ranking ranking(volume_, testing::random_lod(volume_.description().grid, random_));
+    const Lod lod = testing::random_lod(volume_.description().grid, random_);
+    const auto map = random_map(lod, volume_.description().grid, random_);
+    const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr);
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
       const unsigned level = volume_.relevant().supercube_error_steps()[p.supercube];
       ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, 0, volume_.relevant().supercube_slopes()[p.supercube]), rank)
           << "trial " << trial;
     });
+  }
+}
+
+TEST_P(Ranks, WhatADepthMapHidesComesLastAndIsWantedAllTheSame) {
+  std::size_t hidden = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    Lod lod = testing::random_lod(volume_.description().grid, random_);
+    const Grid& g = volume_.description().grid;
+    if (!lod.camera) lod.camera = testing::random_camera(g, random_);
+    lod.camera->pixel_error = 1e-3;
+    const auto map = random_map(lod, g, random_);
+    if (!map) continue;
+    const Ranking seen(volume_, lod), ranking(volume_, volume_.relevant(), lod, &*map);
+    const Occlusion occlusion(*map, *lod.camera, g);
+    for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
+      const Ranking::Rank without = seen.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot);
+      ASSERT_EQ(rank == 0, without == 0);
+      if (rank == 0) return;
+      const bool is_hidden = occlusion.hides(region_of(volume_, p.key, p.key));
+      hidden += is_hidden;
+      constexpr int kOctaves = 32, kRanksAnOctave = 16;
+      ASSERT_EQ(int(rank), is_hidden ? std::max(1, without - kOctaves * kRanksAnOctave) : int(without)) << "trial " << trial;
+    });
+  }
+  if (GetParam() == 0) {
+    EXPECT_GT(hidden, 0u);
   }
 }
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/mesh/mesh_digest.h"
+
 #include <memory>
 #include <semaphore>
 
@@ -66,6 +68,38 @@ TEST_F(MeasuredLate, AnEarlyViewBeginsWithEstimatesAndEndsWhenAllIsKnown) {
   ASSERT_TRUE(session.look(view_of({-0.3, 0.2}, true)));
   run_while_it_waits();
   EXPECT_EQ(session.state(), ClientSession::State::idle) << "it is known by now";
+}
+
+// What is seen comes first; the mesh at the end is the same.
+TEST_F(MeasuredLate, AnOpaqueViewTellsWhatItsSurfacesHide) {
+  may_measure.release(100);
+  ViewRequest view = view_of({-0.3, 0.2}, true);
+  view.lod.camera->pixel_error = 0.1;
+  ASSERT_TRUE(session.look(view));
+  server.run();
+  const std::uint64_t updates = session.mesh()->updates();
+  const std::uint64_t epochs = session.epoch();
+
+  ClientSession opaque{{.dataset = "made", .client = "test"}};
+  testing::SessionServer<ClientSession> other{volume, opaque};
+  view.is_opaque = true;
+  ASSERT_TRUE(opaque.look(view));
+  std::uint64_t told = 0, due = kDepthMapUpdates;
+  for (int step = 0; step < 1000 && opaque.state() != ClientSession::State::idle; ++step) {
+    other.run(1);
+    EXPECT_EQ(opaque.wants_depth_map(), opaque.state() == ClientSession::State::viewing && opaque.mesh()->updates() >= due);
+    if (!opaque.wants_depth_map()) continue;
+    ++told;
+    due = 2 * opaque.mesh()->updates();
+    DepthBuffer buffer(*view.lod.camera);
+    buffer.draw({Vec3{16, -1000, -1000}, Vec3{16, 2000, -1000}, Vec3{16, 0, 2000}});
+    opaque.send_depth_map(buffer.map());
+  }
+  EXPECT_EQ(opaque.state(), ClientSession::State::idle);
+  EXPECT_GE(told, 2u);
+  EXPECT_EQ(opaque.epoch(), epochs + told);
+  EXPECT_EQ(opaque.mesh()->updates(), updates);
+  EXPECT_EQ(mesh_digest(opaque.mesh()->mesh()), mesh_digest(session.mesh()->mesh()));
 }
 
 TEST_F(MeasuredLate, OtherViewsWait) {

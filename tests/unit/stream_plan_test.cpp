@@ -115,7 +115,12 @@ TEST_P(Plan, SendsEveryWantedUpdateOnceWhateverViewsFollow) {
   EXPECT_FALSE(plan.next(kPlanBatchBytes)) << "nothing is wanted yet";
   for (int view = 0; view < 8; ++view) {
     const Lod lod = view == 7 ? Lod{} : plan_lod(*volume, random);
-    plan.set_lod(lod);
+    std::optional<DepthMap> hidden;
+    if (lod.camera && random() % 2 == 0) {
+      hidden = DepthMap{2, 2, 1, 100, {}};
+      for (int cell = 0; cell < 4; ++cell) hidden->codes.push_back(std::uint8_t(random()));
+    }
+    plan.set_lod(lod, hidden ? &*hidden : nullptr);
     receiver.set_lod(lod);
     ASSERT_GE(plan.remaining().updates, receiver.own_left(lod).updates);
     for (int batches = view == 7 ? 100000 : int(random() % 4); batches > 0; --batches) {

@@ -30,7 +30,8 @@ namespace {
 
 using emscripten::val;
 
-constexpr std::uint64_t kMostTets = 200'000;  // drawn one by one
+constexpr std::uint64_t kMostTets = 200'000;            // drawn one by one
+constexpr std::uint64_t kMostTrianglesOfMap = 300'000;  // drawn into a depth map
 
 ViewingSession::Clock::time_point time_of(double milliseconds) {
   return ViewingSession::Clock::time_point(
@@ -101,10 +102,11 @@ class Viewer {
     if (const val channel = view["channel"]; !channel.isNull()) wanted.channels = {channel.as<std::string>()};
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
+    wanted.is_opaque = view["opaque"].as<bool>();
     stale_ = true;  // a budget hides and shows at once
     is_previewing_ = false;
     for (DrawnRange& range : drawn_) range.use_exact();
-    const auto looked = session_.look(wanted);
+    const auto looked = session_.look(wanted, wanted.is_opaque ? depth_map(wanted.camera) : std::nullopt);
     fit_to_mesh();
     return text_of(looked);
   }
@@ -208,7 +210,7 @@ class Viewer {
   }
 
   // A SurfaceChange of messages.ts without its version: what changed since the last one, or everything. isOtherMesh:
-  // whether tetrahedra changed; perhaps only some inside.
+  // whether tetrahedra changed; perhaps only some inside. A message may be there to be sent: what the surface hides.
   val update_surface(bool edges, bool all) {
     stale_ = false;
     val pieces = val::array(), removed = val::array(), reset = val::array();
@@ -222,6 +224,9 @@ class Viewer {
     }
     for (std::size_t i = drawn_.size(); i < ranges_sent_; ++i) reset.call<void>("push", double(i));
     ranges_sent_ = drawn_.size();
+    if (session_.wants_depth_map()) {
+      if (auto map = depth_map(session_.view()->camera)) session_.send_depth_map(std::move(*map));
+    }
     val result = val::object();
     result.set("reset", reset);
     result.set("pieces", pieces);
@@ -301,6 +306,16 @@ class Viewer {
   template <class T>
   static std::string text_of(const Result<T>& result) {
     return result ? std::string() : result.error().message;
+  }
+
+  // What a camera sees of the last surface; none if that would take too long.
+  [[nodiscard]] std::optional<DepthMap> depth_map(const Camera& camera) const {
+    std::uint64_t triangles = 0;
+    for (const DrawnRange& range : drawn_) triangles += range.surface().triangles();
+    if (triangles == 0 || triangles > kMostTrianglesOfMap) return {};
+    DepthBuffer buffer(camera);
+    for (const DrawnRange& range : drawn_) range.surface().draw(buffer);
+    return buffer.map();
   }
 
   // A range is drawn for each of the mesh's fronts.

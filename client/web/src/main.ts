@@ -20,7 +20,7 @@ import { rangesOf } from './range';
 import { watchRanges } from './range_controls';
 import { RegionControls } from './region';
 import { downloadMesh, watchSaving } from './save';
-import { exclusive, fromHash, kDefaults, showsValues, toHash, type ViewState } from './state';
+import { exclusive, fromHash, kDefaults, showsValues, stylesOf, toHash, type ViewState } from './state';
 import { Status } from './status';
 import { Store } from './store';
 import { watchTheme } from './theme';
@@ -171,14 +171,16 @@ class Page {
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
     const { pixelError, region, memory, clip, tets, wireframe, probe } = view.value;
+    const hides = stylesOf(view.value).every((styles) => Object.values(styles).every(({ opacity }) => opacity === 1));
     const viewport: [number, number] = [canvas.width, canvas.height];
     const { dataset } = status.value;
     const volume = view.value.render === 'volume' && this.viewer.picture.volume.isAvailable;
     const maxTets = volume ? Math.min(view.value.maxTets ?? Infinity, kMostVolumeTets) : view.value.maxTets;
+    const opaque = hides && !volume && !clip && !wireframe && !tets;
     const [ranges, uniform] = [dataset ? rangesOf(dataset, view.value) : [], volume && !!dataset?.hasRangesWithin];
     const channel = channelOf(dataset, view.value)?.name ?? null;
     return {
-      view: { camera: { ...pose, viewport }, ranges, uniform, channel, pixelError, region, maxTets, maxUpdates: updatesIn(memory) },
+      view: { camera: { ...pose, viewport }, ranges, uniform, channel, pixelError, region, opaque, maxTets, maxUpdates: updatesIn(memory) },
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,

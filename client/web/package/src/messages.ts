@@ -60,6 +60,7 @@ export interface View {
   channel: string | null; // of the data set, whose values come along; null: none
   pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null;
+  opaque: boolean; // whether surfaces hide what is behind them, and nothing is cut away: what they hide is sent last
   maxTets: number | null; // in the mesh; null: no limit
   maxUpdates: number | null; // kept in memory, about 30 bytes each on the server; null: no limit
 }

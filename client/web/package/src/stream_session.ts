@@ -279,6 +279,7 @@ export class StreamSession {
     this.viewer.wantValues(hasValues, this.channel ?? '');
     const { isOtherMesh, ...change } = this.viewer.updateSurface(edges, this.needsAll);
     this.needsAll = false;
+    this.send();
     const isOther = change.pieces.length > 0 || change.removed.length > 0 || change.reset.length > 0 || (volume && isOtherMesh);
     if (isOther) ++this.version;
     if (volume) this.sendVolume(this.version, isOther);

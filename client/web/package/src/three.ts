@@ -188,7 +188,7 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
     const viewport: [number, number] = [this.viewport.x, this.viewport.y];
     const { ranges } = this;
     const channel = this.channelOf(dataset)?.name ?? null;
-    const common = { ranges, channel, pixelError: this.options.pixelError ?? 1 };
+    const common = { ranges, channel, pixelError: this.options.pixelError ?? 1, opaque: true };
     return this.camera ? { ...common, camera: { ...this.pose(this.camera), viewport } } : { ...common, camera: viewOf(dataset, viewport).camera };
   }
 
