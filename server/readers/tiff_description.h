@@ -1,0 +1,26 @@
+// What the description of a TIFF file's first page says of its pages: OME-XML (docs.openmicroscopy.org/ome-model,
+// "Pixels") or what ImageJ writes. Resolutions of plain files are those of printers, and are not looked at.
+#pragma once
+
+#include <tiffio.h>
+
+#include <cstdint>
+#include <string>
+
+#include "common/util/vec3.h"
+
+namespace intervale {
+
+struct Described {
+  Vec3 spacing{1, 1, 1};
+  std::string unit;
+  std::uint64_t channels = 1, time_points = 1;
+  std::uint64_t slices = 0;  // 0: not said
+  bool has_known_units = true;
+  std::string order = "ZCT";  // which of slice, channel and time changes first from page to page
+};
+
+// Of the page that the file is at. Without a description that is known, all as it is by default.
+[[nodiscard]] Described description_of(TIFF* tiff);
+
+}  // namespace intervale
