@@ -16,15 +16,9 @@ namespace intervale {
 }
 
 // start: the first 132 bytes of a file. DICOM files begin with 128 bytes for other formats, and "DICM" (PS3.10, section
-// 7.1). Older ones lack both, and begin with the first element of group 2 or 8.
-[[nodiscard]] inline bool begins_as_dicom(std::string_view start) {
-  using namespace std::string_view_literals;
-  if (start.size() >= 132 && start.substr(128, 4) == "DICM"sv) return true;
-  for (const auto first : {"\x02\0\0\0UL"sv, "\x08\0\0\0UL"sv, "\x08\0\x05\0CS"sv, "\x08\0\x08\0CS"sv, "\x08\0\x16\0UI"sv}) {
-    if (start.starts_with(first)) return true;
-  }
-  return false;
-}
+// 7.1). Older ones lack both, and begin with the first element of group 2 or 8; of group 8 also in implicit VR, which
+// has no letters to know it by: there the value must be one of its element, and more of the group must follow.
+[[nodiscard]] bool begins_as_dicom(std::string_view start);
 
 // start: the first 520 bytes of a file; the first 512 may be those of another format, as in MATLAB's files (HDF5 File Format
 // Specification, section II.A).

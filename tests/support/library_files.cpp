@@ -25,12 +25,34 @@ std::string entry(std::uint16_t tag, std::uint16_t type, std::uint32_t count, st
   return little(tag) + little(type) + little(count) + little(value);
 }
 
-// A DICOM element; vr: what its value is.
+// Writes a DICOM element; vr: what its value is.
+using WriteElement = std::string (*)(std::uint16_t group, std::uint16_t number, std::string_view vr, std::string value);
+
 std::string element(std::uint16_t group, std::uint16_t number, std::string_view vr, std::string value) {
   if (value.size() % 2 != 0) value += vr == "UI" ? '\0' : ' ';
   const bool is_long = vr == "OB" || vr == "OW";
   const std::string length = is_long ? little(std::uint16_t(0)) + little(std::uint32_t(value.size())) : little(std::uint16_t(value.size()));
   return little(group) + little(number) + std::string(vr) + length + value;
+}
+
+std::string implicit_element(std::uint16_t group, std::uint16_t number, std::string_view vr, std::string value) {
+  if (value.size() % 2 != 0) value += vr == "UI" ? '\0' : ' ';
+  return little(group) + little(number) + little(std::uint32_t(value.size())) + value;
+}
+
+constexpr const char* kCtImages = "1.2.840.10008.5.1.4.1.1.2";
+std::string name_of(const DicomImage& image) { return "1.2.3.4." + std::to_string(image.instance); }
+
+std::string elements_of(const DicomImage& image, WriteElement write) {
+  std::string file =
+      write(8, 0x16, "UI", kCtImages) + write(8, 0x18, "UI", name_of(image)) + write(8, 0x60, "CS", "CT") + write(0x18, 0x50, "DS", "2");
+  file += write(0x20, 0xe, "UI", image.series) + write(0x20, 0x11, "IS", "1") + write(0x20, 0x13, "IS", std::to_string(image.instance));
+  file += write(0x20, 0x32, "DS", image.position) + write(0x20, 0x37, "DS", image.orientation);
+  const auto number = [write](std::uint16_t at, std::uint16_t value) { return write(0x28, at, "US", little(value)); };
+  file += number(2, 1) + write(0x28, 4, "CS", "MONOCHROME2") + number(0x10, image.rows) + number(0x11, image.columns);
+  file += write(0x28, 0x30, "DS", "0.5\\0.25") + number(0x100, 16) + number(0x101, 16) + number(0x102, 15) + number(0x103, 1);
+  file += write(0x28, 0x1052, "DS", image.intercept) + write(0x28, 0x1053, "DS", image.slope);
+  return file + write(0x7fe0, 0x10, "OW", samples(image.pixels));
 }
 
 }  // namespace
@@ -61,18 +83,11 @@ std::string tiff_file(std::uint32_t width, std::uint32_t height, const std::vect
 }
 
 std::string dicom_file(const DicomImage& image) {
-  const std::string kind = "1.2.840.10008.5.1.4.1.1.2", name = "1.2.3.4." + std::to_string(image.instance);
-  const std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) + element(2, 2, "UI", kind) + element(2, 3, "UI", name) +
+  const std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) + element(2, 2, "UI", kCtImages) + element(2, 3, "UI", name_of(image)) +
                            element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
-  std::string file = std::string(128, '\0') + "DICM" + element(2, 0, "UL", little(std::uint32_t(meta.size()))) + meta;
-  file += element(8, 0x16, "UI", kind) + element(8, 0x18, "UI", name) + element(8, 0x60, "CS", "CT") + element(0x18, 0x50, "DS", "2");
-  file += element(0x20, 0xe, "UI", image.series) + element(0x20, 0x11, "IS", "1") + element(0x20, 0x13, "IS", std::to_string(image.instance));
-  file += element(0x20, 0x32, "DS", image.position) + element(0x20, 0x37, "DS", image.orientation);
-  const auto number = [](std::uint16_t at, std::uint16_t value) { return element(0x28, at, "US", little(value)); };
-  file += number(2, 1) + element(0x28, 4, "CS", "MONOCHROME2") + number(0x10, image.rows) + number(0x11, image.columns);
-  file += element(0x28, 0x30, "DS", "0.5\\0.25") + number(0x100, 16) + number(0x101, 16) + number(0x102, 15) + number(0x103, 1);
-  file += element(0x28, 0x1052, "DS", image.intercept) + element(0x28, 0x1053, "DS", image.slope);
-  return file + element(0x7fe0, 0x10, "OW", samples(image.pixels));
+  return std::string(128, '\0') + "DICM" + element(2, 0, "UL", little(std::uint32_t(meta.size()))) + meta + elements_of(image, element);
 }
+
+std::string implicit_dicom_file(const DicomImage& image) { return elements_of(image, implicit_element); }
 
 }  // namespace intervale::testing

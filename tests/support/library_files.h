@@ -13,13 +13,14 @@ namespace intervale::testing {
 [[nodiscard]] std::string tiff_file(std::uint32_t width, std::uint32_t height, const std::vector<std::vector<std::uint16_t>>& pages,
                                     const std::string& description = {}, std::uint16_t samples_a_pixel = 1);
 
-// One image of a DICOM series (PS3.10, explicit little endian), of i16.
+// One image of a DICOM series, of i16.
 struct DicomImage {
   std::string series = "1.2.3", position = "0\\0\\0", orientation = "1\\0\\0\\0\\1\\0", slope = "1", intercept = "0";
   int instance = 1;
   std::uint16_t columns = 3, rows = 2;
   std::vector<std::int16_t> pixels{};
 };
-[[nodiscard]] std::string dicom_file(const DicomImage& image);
+[[nodiscard]] std::string dicom_file(const DicomImage& image);           // PS3.10, explicit little endian
+[[nodiscard]] std::string implicit_dicom_file(const DicomImage& image);  // implicit little endian, without what PS3.10 puts before
 
 }  // namespace intervale::testing

@@ -10,6 +10,7 @@
 
 #include "common/patch/visit_samples.h"
 #include "server/volume/header_line.h"
+#include "server/volume/library_formats.h"
 #include "server/volume/read_volume.h"
 #include "server/volume/volume_header.h"
 #include "tests/support/library_files.h"
@@ -176,6 +177,48 @@ TEST_F(Dicom, ImagesAreSortedAlongTheNormal) {
   for (std::size_t k = 0; k < 7; ++k) EXPECT_EQ(samples_of(*volume)[6 * k + 4], double(100 * k) + 4 - 1024);
   const Affine tilted{{0.25, 0, 0, 10, 0, 0.5, 1, 20, 0, 0, 2.5, 0}};  // columns are 0.25 apart, rows 0.5
   for (std::size_t k = 0; k < 12; ++k) EXPECT_NEAR(volume->grid.affine.rows[k], tilted.rows[k], 1e-12) << k;
+}
+
+TEST_F(Dicom, MayBeOfImplicitVrWithoutItsFirstPart) {
+  const auto images = slices(4);
+  for (std::size_t k = 0; k < images.size(); ++k) {
+    std::filesystem::create_directory(folder_ / "old");
+    folder_.file("old/" + std::to_string(k), implicit_dicom_file(images[k]));
+  }
+  const auto volume = read_volume(folder_ / "old", {}), other = read_volume(scan(images), {});
+  ASSERT_TRUE(volume) << volume.error().message;
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_EQ(volume->grid.dims, other->grid.dims);
+  EXPECT_EQ(volume->grid.affine, other->grid.affine);
+  EXPECT_EQ(volume->type, other->type);
+  EXPECT_EQ(volume->bytes, other->bytes);
+  const std::string whole = implicit_dicom_file(images[1]);
+  folder_.file("old/1", whole.substr(0, whole.size() - 2));
+  EXPECT_FALSE(read_volume(folder_ / "old", {}));
+}
+
+TEST(ImplicitDicom, BeginsWithAnElementOfGroup8AndAValueOfItsKind) {
+  const auto begins = [](const std::string& element, const std::string& value, const std::string& next = std::string("\x08\0\x60\0\2\0\0\0CT", 10)) {
+    return begins_as_dicom("\x08" + std::string(1, '\0') + element + std::string(1, '\0') + char(value.size()) + std::string(3, '\0') + value + next +
+                           std::string(100, 'x'));
+  };
+  const std::string none(1, '\0');
+  EXPECT_TRUE(begins(none, "\x80\2" + none + none));
+  EXPECT_TRUE(begins("\x05", "ISO_IR 100"));
+  EXPECT_TRUE(begins("\x08", "ORIGINAL\\PRIMARY\\AXIAL"));
+  EXPECT_TRUE(begins("\x16", "1.2.840.10008.5.1.4.1.1.2" + none));
+  EXPECT_FALSE(begins("\x05", "iso_ir 100"));
+  EXPECT_FALSE(begins("\x05", "ISO_IR 10"));  // an odd length
+  EXPECT_FALSE(begins("\x05", ""));
+  EXPECT_FALSE(begins("\x16", "1.2.840.10008.A" + none));
+  EXPECT_FALSE(begins("\x07", "ISO_IR 100"));
+  EXPECT_FALSE(begins("\x16", "1.2.840.10008.5.1.4.1.1.2" + none, std::string("\x08\0\5\0\2\0\0\0CT", 10)));  // not in order
+  EXPECT_FALSE(begins(none, std::string(4, '\0'), std::string(10, '\0')));
+  for (const int step : {0, 1}) {  // samples of u16: 8, 8 and 8, 9 and so on
+    std::string samples;
+    for (int k = 0; k < 100; ++k) samples += {char(8 + step * k), '\0'};
+    EXPECT_FALSE(begins_as_dicom(samples)) << step;
+  }
 }
 
 TEST_F(Dicom, AMissingImageIsNamed) {
