@@ -1,10 +1,8 @@
 // An array of an HDF5 file, NetCDF-4 and MATLAB 7.3 among them, by libhdf5: a program of its own, see child_reader.h.
 //
-// Arrays of three axes are z, y, x, as in C; of four axes the first one is time. Attributes that are read: element_size_um
-// (z, y, x: ilastik and others), units, long_name, scale_factor and add_offset (CF conventions, sections 3.1, 3.2, 8.1),
-// and the coordinate variables of NetCDF (dimension scales), if they are evenly spaced.
+// Arrays of three axes are z, y, x, as in C; of four axes the first one is time. Attributes that are read: units, long_name,
+// scale_factor and add_offset (CF conventions, sections 3.1, 3.2, 8.1), and those of hdf5_axes.h.
 #include <hdf5.h>
-#include <hdf5_hl.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/readers/hdf5_axes.h"
+#include "server/readers/hdf5_object.h"
 #include "server/readers/reader_program.h"
 
 namespace intervale {
@@ -22,23 +22,6 @@ namespace {
 
 constexpr std::size_t kMostArrays = 10'000;
 constexpr std::uint64_t kGreatestRatio = 10'000;  // of compression; sparse arrays and filters of high ratio are below
-
-// A handle of the library.
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
-  Handle& operator=(Handle&&) = delete;
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  [[nodiscard]] hid_t get() const { return id_; }
-  [[nodiscard]] bool is_open() const { return id_ >= 0; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
 
 Handle dataset_of(hid_t file, const std::string& name) { return {H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose}; }
 
@@ -77,21 +60,6 @@ hid_t memory_type(SampleType type) {
   return kTypes[std::size_t(type)];
 }
 
-std::vector<hsize_t> dims_of(hid_t dataset) {
-  const Handle space(H5Dget_space(dataset), H5Sclose);
-  const int rank = space.is_open() ? H5Sget_simple_extent_ndims(space.get()) : 0;
-  if (rank < 1 || rank > H5S_MAX_RANK) return {};
-  std::vector<hsize_t> dims(std::size_t(rank), 0);
-  H5Sget_simple_extent_dims(space.get(), dims.data(), nullptr);
-  return dims;
-}
-
-// Whether the file itself has the numbers: an array may also be said to lie in any other file.
-bool is_in_file(hid_t dataset) {
-  const Handle made(H5Dget_create_plist(dataset), H5Pclose);
-  return made.is_open() && H5Pget_external_count(made.get()) == 0 && H5Pget_layout(made.get()) != H5D_VIRTUAL;
-}
-
 // Numbers of three axes or four, all longer than 1 but for time.
 std::optional<Array> array_of(hid_t file, const std::string& name) {
   const Handle dataset = dataset_of(file, name);
@@ -116,90 +84,9 @@ std::vector<std::string> names_in(hid_t file) {
   return names;
 }
 
-// The numbers of an attribute, as many as it has up to `most`.
-std::vector<double> numbers_of_attribute(hid_t object, const char* name, std::size_t most) {
-  if (H5Aexists(object, name) <= 0) return {};
-  const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
-  if (!attribute.is_open()) return {};
-  const Handle space(H5Aget_space(attribute.get()), H5Sclose), type(H5Aget_type(attribute.get()), H5Tclose);
-  const hssize_t count = H5Sget_simple_extent_npoints(space.get());
-  const H5T_class_t kind = H5Tget_class(type.get());
-  if (count < 1 || std::size_t(count) > most || (kind != H5T_INTEGER && kind != H5T_FLOAT)) return {};
-  std::vector<double> numbers(std::size_t(count), 0);
-  if (H5Aread(attribute.get(), H5T_NATIVE_DOUBLE, numbers.data()) < 0) return {};
-  return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); }) ? numbers : std::vector<double>();
-}
-
-std::string text_of_attribute(hid_t object, const char* name) {
-  constexpr std::size_t kMost = 1000;
-  if (H5Aexists(object, name) <= 0) return {};
-  const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
-  const Handle type(H5Aget_type(attribute.get()), H5Tclose), space(H5Aget_space(attribute.get()), H5Sclose);
-  if (!type.is_open() || H5Tget_class(type.get()) != H5T_STRING || H5Sget_simple_extent_npoints(space.get()) != 1) return {};
-  if (H5Tis_variable_str(type.get()) > 0) {
-    char* text = nullptr;
-    if (H5Aread(attribute.get(), type.get(), &text) < 0 || text == nullptr) return {};
-    std::string copy(text, ::strnlen(text, kMost));
-    H5free_memory(text);
-    return copy;
-  }
-  const std::size_t size = H5Tget_size(type.get());
-  if (size == 0 || size > kMost) return {};
-  std::string text(size, '\0');
-  if (H5Aread(attribute.get(), type.get(), text.data()) < 0) return {};
-  return text.substr(0, text.find('\0'));
-}
-
 double scalar(hid_t object, const char* name, double otherwise) {
   const auto numbers = numbers_of_attribute(object, name, 1);
   return numbers.empty() ? otherwise : numbers[0];
-}
-
-// Coordinates along an axis, evenly spaced.
-struct Axis {
-  double first = 0, step = 1;
-  std::string unit;
-};
-
-// Those of a coordinate variable. None if it has not as many as the axis, or if they are not evenly spaced.
-std::optional<Axis> axis_of(hid_t scale, hsize_t count) {
-  constexpr double kEven = 1e-3;  // of a step
-  if (dims_of(scale) != std::vector{count} || !is_in_file(scale)) return {};
-  std::vector<double> at(count);
-  if (H5Dread(scale, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, at.data()) < 0) return {};
-  const double step = (at.back() - at.front()) / double(count - 1);
-  if (!std::isfinite(at.front()) || !std::isfinite(step) || step == 0) return {};
-  for (hsize_t i = 0; i < count; ++i) {
-    if (!(std::abs(at[i] - (at.front() + step * double(i))) <= kEven * std::abs(step))) return {};
-  }
-  return Axis{at.front(), step, text_of_attribute(scale, "units")};
-}
-
-// The places of the samples, and the unit of length: by element_size_um, or by coordinate variables; what neither says is
-// counted in samples.
-Affine affine_of(hid_t dataset, const Array& array, std::string& unit) {
-  const auto size = numbers_of_attribute(dataset, "element_size_um", 3);
-  if (size.size() == 3 && std::all_of(size.begin(), size.end(), [](double s) { return s > 0; })) {
-    unit = "\u00b5m";
-    return Affine::of({size[2], size[1], size[0]});
-  }
-  std::array<Axis, 3> axes;
-  struct Search {
-    hsize_t count;
-    std::optional<Axis> found;
-  };
-  const auto take = [](hid_t, unsigned, hid_t scale, void* to) -> herr_t {
-    auto& search = *static_cast<Search*>(to);
-    search.found = axis_of(scale, search.count);
-    return search.found ? 1 : 0;
-  };
-  for (std::size_t k = 0; k < 3; ++k) {
-    Search search{array.zyx()[2 - k], {}};
-    H5DSiterate_scales(dataset, unsigned(array.dims.size() - 1 - k), nullptr, take, &search);
-    if (search.found) axes[k] = *search.found;
-  }
-  if (axes[0].unit == axes[1].unit && axes[0].unit == axes[2].unit && is_label(axes[0].unit)) unit = axes[0].unit;
-  return Affine::of({axes[0].step, axes[1].step, axes[2].step}, {axes[0].first, axes[1].first, axes[2].first});
 }
 
 Result<VolumeHeader> header_of(hid_t file, const Array& array, const std::string& where) {
@@ -215,8 +102,11 @@ Result<VolumeHeader> header_of(hid_t file, const Array& array, const std::string
   const std::string name = array.name.substr(array.name.rfind('/') + 1);
   if (is_label(field.empty() ? name : field)) header.labels.field = field.empty() ? name : field;
   if (is_label(unit)) header.labels.field_unit = unit;
-  const Affine affine = affine_of(dataset.get(), array, header.labels.unit);
-  const auto grid = make_grid({std::int64_t(array.zyx()[2]), std::int64_t(array.zyx()[1]), std::int64_t(array.zyx()[0])}, affine, where);
+  const auto* const n = array.zyx();
+  auto places = places_of(dataset.get(), {n[0], n[1], n[2]}, where);
+  if (!places) return tl::unexpected<Error>(places.error());
+  header.labels.unit = places->unit;
+  const auto grid = make_grid({std::int64_t(n[2]), std::int64_t(n[1]), std::int64_t(n[0])}, places->affine, where);
   if (!grid) return tl::unexpected<Error>(grid.error());
   header.grid = *grid;
   if (auto size = check_size(header, where); !size) return tl::unexpected<Error>(size.error());

@@ -2,6 +2,7 @@
 #if __has_include(<hdf5.h>)
 #include <gtest/gtest.h>
 #include <hdf5.h>
+#include <hdf5_hl.h>
 
 #include <filesystem>
 #include <numeric>
@@ -42,6 +43,19 @@ class Hdf5 : public ::testing::Test {
     H5Aclose(attribute);
     H5Sclose(space);
     H5Dclose(set);
+  }
+  // A coordinate variable of NetCDF for an axis of an array.
+  static void add_scale(hid_t file, const char* name, const std::vector<double>& at, const char* set_name, unsigned axis, bool is_single = false) {
+    const hsize_t count = at.size();
+    const hid_t space = H5Screate_simple(1, &count, nullptr);
+    const hid_t scale = H5Dcreate2(file, name, is_single ? H5T_IEEE_F32LE : H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t set = H5Dopen2(file, set_name, H5P_DEFAULT);
+    H5Dwrite(scale, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, at.data());
+    H5DSset_scale(scale, name);
+    H5DSattach_scale(set, scale, axis);
+    H5Dclose(set);
+    H5Dclose(scale);
+    H5Sclose(space);
   }
   [[nodiscard]] hid_t create() const { return H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT); }
   const TempDir folder_;
@@ -87,6 +101,33 @@ TEST_F(Hdf5, OneOfSeveralArraysIsChosen) {
   EXPECT_EQ(numbers_in(*volume)[0], 48);
   EXPECT_FALSE(read_volume(path_, {}, 3, "/later"));
   EXPECT_FALSE(read_volume(path_, {}, {}, "/none"));
+}
+
+TEST_F(Hdf5, CoordinatesPlaceSamplesIfTheyAreEven) {
+  const hid_t file = create();
+  add(file, "t", {4, 3, 2}, 0);
+  add_scale(file, "depth", {5, 7, 9, 11}, "t", 0);
+  add_scale(file, "lat", {179.98, 179.99, 180}, "t", 1, true);  // rounded by more than a thousandth of the step
+  add_scale(file, "nothing", {0, 0}, "t", 2);                   // as of a dimension without a variable
+  H5Fclose(file);
+  const auto volume = read_volume(path_, {});
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->grid.affine.spacing()[2], 2);
+  EXPECT_EQ(volume->grid.affine.origin()[2], 5);
+  EXPECT_NEAR(volume->grid.affine.spacing()[1], 0.01, 1e-4);
+  EXPECT_EQ(volume->grid.affine.spacing()[0], 1);
+}
+
+TEST_F(Hdf5, UnevenCoordinatesAreRefusedByName) {
+  const hid_t file = create();
+  add(file, "t", {4, 3, 2}, 0);
+  add_scale(file, "depth", {5, 7, 9, 25}, "t", 0);
+  H5Fclose(file);
+  const auto volume = read_volume(path_, {});
+  ASSERT_FALSE(volume);
+  EXPECT_NE(volume.error().message.find("'/depth' is not evenly spaced: from index 2 to 3 it goes from 9 to 25, where the usual step is 2"),
+            std::string::npos)
+      << volume.error().message;
 }
 
 // A file of a few bytes may claim any number of samples, and name other files for them.
