@@ -1,19 +1,22 @@
 // An array of an HDF5 file, NetCDF-4 and MATLAB 7.3 among them, by libhdf5: a program of its own, see child_reader.h.
 //
 // Arrays of three axes are z, y, x, as in C; of four axes the first one is time. Attributes that are read: units, long_name,
-// scale_factor and add_offset (CF conventions, sections 3.1, 3.2, 8.1), and those of hdf5_axes.h.
+// scale_factor and add_offset (CF conventions, sections 3.1, 3.2, 8.1), and those of hdf5_axes.h and
+// hdf5_missing.h.
 #include <hdf5.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "server/readers/hdf5_axes.h"
+#include "server/readers/hdf5_missing.h"
 #include "server/readers/hdf5_object.h"
 #include "server/readers/reader_program.h"
 
@@ -117,7 +120,10 @@ Result<VolumeHeader> header_of(hid_t file, const Array& array, const std::string
   return header;
 }
 
-Result<void> write_slices(hid_t file, const Array& array, const VolumeHeader& header, const ReaderRequest& request) {
+// Some slices of z, in the type of the array. Fails to stop.
+using TakeSlices = std::function<Result<void>(std::span<const std::byte> samples)>;
+
+Result<void> read_slices(hid_t file, const Array& array, const ReaderRequest& request, const TakeSlices& take) {
   if (request.time_point >= array.times()) return misuse(in_quotes(request.path) + " has no time point of that number: the first is 0");
   const Handle dataset = dataset_of(file, array.name), space(H5Dget_space(dataset.get()), H5Sclose);
   const std::size_t rank = array.dims.size();
@@ -134,13 +140,37 @@ Result<void> write_slices(hid_t file, const Array& array, const VolumeHeader& he
     samples.resize(slice * count[rank - 3]);
     const Handle memory(H5Screate_simple(int(rank), count.data(), nullptr), H5Sclose);
     const bool is_read = H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) >= 0 &&
-                         H5Dread(dataset.get(), memory_type(header.type), memory.get(), space.get(), H5P_DEFAULT, samples.data()) >= 0;
+                         H5Dread(dataset.get(), memory_type(array.type), memory.get(), space.get(), H5P_DEFAULT, samples.data()) >= 0;
     if (!is_read)
       return fail(in_quotes(request.path) + ": '" + array.name + "' cannot be read from slice " + std::to_string(z + 1) +
                   " on; is it damaged, or compressed by a filter that is not installed?");
-    if (auto written = write_samples(samples); !written) return written;
+    if (auto taken = take(samples); !taken) return taken;
   }
   return {};
+}
+
+// Writes the header and the samples. Integers some of which are no values become floats, as the header must say before: so
+// they are read twice.
+Result<void> write_volume(hid_t file, const Array& array, VolumeHeader header, const ReaderRequest& request) {
+  const MissingNumbers missing = MissingNumbers::of(dataset_of(file, array.name).get());
+  const double slope = header.slope, intercept = header.intercept;
+  if (missing.any() && !is_float(array.type) && request.time_point < array.times()) {
+    bool are_there = false;
+    const auto looked = read_slices(file, array, request, [&](std::span<const std::byte> samples) -> Result<void> {
+      are_there = missing.are_in(samples, array.type);
+      return are_there ? fail("") : Result<void>();
+    });
+    if (!looked && !are_there) return looked;
+    if (are_there) {
+      header.type = float_type_for(array.type, slope, intercept);
+      header.slope = 1, header.intercept = 0;
+    }
+  }
+  if (auto written = write_header(header); !written) return written;
+  const bool are_changed = missing.any() && is_float(header.type);
+  return read_slices(file, array, request, [&](std::span<const std::byte> samples) {
+    return are_changed ? write_samples(missing.as_nan(samples, array.type, header.type, slope, intercept)) : write_samples(samples);
+  });
 }
 
 Result<void> read(const ReaderRequest& request) {
@@ -171,8 +201,7 @@ Result<void> read(const ReaderRequest& request) {
                                              name_of(array.type) +
                                              (array.dims.size() == 4 ? ", " + std::to_string(array.times()) + " time points" : "")});
   }
-  if (auto written = write_header(*header); !written || request.only_header) return written;
-  return write_slices(file.get(), *chosen, *header, request);
+  return request.only_header ? write_header(*header) : write_volume(file.get(), *chosen, *std::move(header), request);
 }
 
 }  // namespace

@@ -38,6 +38,19 @@ std::optional<SampleType> integer_type(SampleType type, double least, double gre
   return {};
 }
 
+// Of those that are no NaN; zeros if all are.
+template <class T>
+std::pair<T, T> least_and_greatest(std::span<const T> samples) {
+  const auto is_number = [](T sample) { return sample == sample; };
+  const auto first = std::find_if(samples.begin(), samples.end(), is_number);
+  std::pair<T, T> found = first == samples.end() ? std::pair(T(0), T(0)) : std::pair(*first, *first);
+  for (const T sample : samples) {
+    if (sample < found.first) found.first = sample;
+    if (sample > found.second) found.second = sample;
+  }
+  return found;
+}
+
 // Whether f32 keeps values apart that are a stored step apart, by a sixteenth of it. Of stored floats: as they are.
 template <class T>
 bool is_f32_enough(double slope, double intercept, double most) {
@@ -52,8 +65,8 @@ void rescale(Volume& volume, double slope, double intercept) {
   if (slope == 1 && intercept == 0) return;
   visit_samples(volume, [&]<class T>(std::span<const T> samples) {
     if (samples.empty()) return;
-    const auto [least, greatest] = std::minmax_element(samples.begin(), samples.end());
-    const auto [low, high] = std::minmax({slope * double(*least) + intercept, slope * double(*greatest) + intercept});
+    const auto [least, greatest] = least_and_greatest(samples);
+    const auto [low, high] = std::minmax({slope * double(least) + intercept, slope * double(greatest) + intercept});
     std::optional<SampleType> type;
     if (std::is_integral_v<T> && is_whole(slope) && is_whole(intercept)) type = integer_type(volume.type, low, high);
     if (!type) type = is_f32_enough<T>(slope, intercept, std::max(std::abs(low), std::abs(high))) ? SampleType::f32 : SampleType::f64;

@@ -4,6 +4,7 @@
 #include <hdf5.h>
 #include <hdf5_hl.h>
 
+#include <cmath>
 #include <filesystem>
 #include <numeric>
 #include <random>
@@ -128,6 +129,65 @@ TEST_F(Hdf5, UnevenCoordinatesAreRefusedByName) {
   EXPECT_NE(volume.error().message.find("'/depth' is not evenly spaced: from index 2 to 3 it goes from 9 to 25, where the usual step is 2"),
             std::string::npos)
       << volume.error().message;
+}
+
+// Samples from 0 on, in steps of 1, of which 5 stands for no value.
+TEST_F(Hdf5, FillValuesAreNoValues) {
+  const auto read_with = [this](const char* attribute, std::vector<double> missing, double slope, double offset) {
+    const hid_t file = create();
+    add(file, "t", {2, 2, 2}, 0);
+    add_attribute(file, "t", attribute, missing);
+    if (slope != 1) add_attribute(file, "t", "scale_factor", {slope});
+    if (offset != 0) add_attribute(file, "t", "add_offset", {offset});
+    H5Fclose(file);
+    return read_volume(path_, {});
+  };
+  struct Case {
+    double slope, offset;
+    SampleType type;
+  };
+  for (const auto& [slope, offset, type] : {Case{1, 0, SampleType::f32}, Case{0.01, 27300, SampleType::f64}, Case{0.5, 100, SampleType::f32}}) {
+    for (const char* attribute : {"_FillValue", "missing_value"}) {
+      auto volume = read_with(attribute, {-7, 5}, slope, offset);
+      ASSERT_TRUE(volume) << volume.error().message;
+      EXPECT_EQ(volume->type, type);
+      const auto numbers = numbers_in(*volume);
+      EXPECT_TRUE(std::isnan(numbers[5]));
+      EXPECT_NEAR(numbers[6], 6 * slope + offset, 1e-6);
+      const auto finite = check_finite(*volume, {});
+      ASSERT_FALSE(finite);
+      EXPECT_NE(finite.error().message.find("sample (1, 0, 1) of 'v' is NaN"), std::string::npos) << finite.error().message;
+      ASSERT_TRUE(check_finite(*volume, -1));
+      EXPECT_EQ(numbers_in(*volume)[5], -1);
+    }
+  }
+  const auto none = read_with("_FillValue", {-32768, 5.5, 1e300}, 1, 0);  // of which there are none
+  ASSERT_TRUE(none) << none.error().message;
+  EXPECT_EQ(none->type, SampleType::i16);
+  EXPECT_EQ(numbers_in(*none)[5], 5);
+}
+
+TEST_F(Hdf5, FillValuesOfFloatsAreComparedAsTheyAreStored) {
+  const hid_t file = create();
+  const std::vector<hsize_t> dims{2, 2, 2};
+  const std::vector<float> numbers{0.1F, 1e20F, 2, 3, 4, 5, 6, 7};
+  const hid_t space = H5Screate_simple(3, dims.data(), nullptr);
+  const hid_t set = H5Dcreate2(file, "t", H5T_IEEE_F32LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  H5Dwrite(set, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data());
+  H5Dclose(set);
+  H5Sclose(space);
+  add_attribute(file, "t", "_FillValue", {0.1});
+  add_attribute(file, "t", "missing_value", {1e20});
+  add_attribute(file, "t", "scale_factor", {2});
+  H5Fclose(file);
+  const auto volume = read_volume(path_, {});
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->type, SampleType::f32);
+  for (std::size_t i = 0; i < 8; ++i) {
+    const double number = numbers_in(*volume)[i];
+    EXPECT_EQ(std::isnan(number), i < 2) << i;
+    EXPECT_TRUE(i < 2 || number == 2.0 * double(i)) << i;
+  }
 }
 
 // A file of a few bytes may claim any number of samples, and name other files for them.
