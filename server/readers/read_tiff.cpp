@@ -7,6 +7,7 @@
 #include "server/readers/reader_program.h"
 #include "server/readers/tiff_description.h"
 #include "server/readers/tiff_pages.h"
+#include "server/readers/tiff_planes.h"
 #include "server/volume/header_bytes.h"
 
 namespace intervale {
@@ -31,29 +32,23 @@ std::optional<SampleType> type_of(const Page& page) {
   }
 }
 
-Result<VolumeHeader> header_of(const Pages& pages, const Page& page, const Described& described, const ReaderRequest& request) {
+Result<VolumeHeader> header_of(const Pages& pages, const Page& page, const Described& described, const Planes& planes, const ReaderRequest& request) {
   const TiffFile& file = pages.file();
   const std::string name = in_quotes(request.path);
   const auto type = type_of(page);
   if (page.samples != 1 || page.is_palette) return file.failure("its pages are in colour; a volume has one number a sample");
   if (!type)
     return file.failure("pages of " + std::to_string(page.bits) + " bits are not read; integers of 8, 16 and 32 bits and floats of 32 and 64 are");
-  const std::uint64_t channels = described.channels, times = described.time_points, all = pages.size();
-  if (channels == 0 || times == 0 || channels > all || times > all || all % (channels * times) != 0)
-    return fail(name + " has " + std::to_string(all) + " pages, which are not those of " + std::to_string(channels) + " channels and " +
-                std::to_string(times) + " time points");
-  if (described.slices != 0 && described.slices != all / channels / times)
-    return fail(name + " has " + std::to_string(all) + " pages, and says that it has " + std::to_string(described.slices) + " slices, " +
-                std::to_string(channels) + " channels and " + std::to_string(times) + " time points; are pages missing?");
   if (!described.has_known_units) return fail(name + ": its distances along x, y and z are in different units");
   VolumeHeader header;
-  const auto grid = make_grid({page.width, page.height, std::int64_t(all / channels / times)}, Affine::of(described.spacing), name);
+  const auto grid = make_grid({page.width, page.height, std::int64_t(planes.slices)}, Affine::of(described.spacing), name);
   if (!grid) return tl::unexpected<Error>(grid.error());
   header.grid = *grid;
   header.type = *type;
-  header.time_points = times;
+  header.time_points = planes.time_points;
   header.parts_are = "channels";
-  for (std::uint64_t c = 0; channels > 1 && c < channels; ++c) header.parts.push_back({std::to_string(c), "channel " + std::to_string(c)});
+  for (std::uint64_t c = 0; planes.channels > 1 && c < planes.channels; ++c)
+    header.parts.push_back({std::to_string(c), "channel " + std::to_string(c)});
   if (is_label(described.unit)) header.labels.unit = described.unit;
   if (auto size = check_size(header, name); !size) return tl::unexpected<Error>(size.error());
   return header;
@@ -67,23 +62,21 @@ Result<void> read(const ReaderRequest& request) {
   if (!pages->is_one_file()) {  // each file is one slice
     described.channels = described.time_points = 1;
     described.slices = 0;
+    described.data.clear();
   }
-  const auto header = header_of(*pages, first, described, request);
+  const auto planes = planes_of(described, *pages, in_quotes(request.path));
+  if (!planes) return tl::unexpected<Error>(planes.error());
+  const auto header = header_of(*pages, first, described, *planes, request);
   if (!header) return tl::unexpected<Error>(header.error());
-  const std::uint64_t channel = request.part ? number_of<std::uint64_t>(*request.part).value_or(described.channels) : 0;
-  if (channel >= described.channels) return misuse(in_quotes(request.path) + " has no channel of that number: the first is 0");
+  const std::uint64_t channel = request.part ? number_of<std::uint64_t>(*request.part).value_or(planes->channels) : 0;
+  if (channel >= planes->channels) return misuse(in_quotes(request.path) + " has no channel of that number: the first is 0");
   if (auto written = write_header(*header); !written || request.only_header) return written;
+  if (request.time_point >= planes->time_points) return misuse(in_quotes(request.path) + " has no time point of that number: the first is 0");
 
   std::vector<std::byte> samples;
-  const auto slices = std::uint64_t(header->grid.dims[2]);
-  for (std::uint64_t z = 0; z < slices; ++z) {
-    std::uint64_t number = 0, stride = 1;
-    for (const char axis : described.order) {
-      number += stride * (axis == 'Z' ? z : axis == 'C' ? channel : request.time_point);
-      stride *= axis == 'Z' ? slices : axis == 'C' ? described.channels : described.time_points;
-    }
-    if (number >= pages->size()) return misuse(in_quotes(request.path) + " has no time point of that number: the first is 0");
-    if (auto done = pages->read(number, first, size_of(header->type), samples); !done) return done;
+  for (std::uint64_t z = 0; z < planes->slices; ++z) {
+    const std::uint64_t page = planes->page_of(z, channel, request.time_point);
+    if (auto done = pages->read(page, first, size_of(header->type), samples); !done) return done;
     if (auto written = write_samples(samples); !written) return written;
   }
   return {};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <pugixml.hpp>
 #include <string_view>
 #include <utility>
@@ -20,12 +21,35 @@ double metres_in(std::string_view unit) {
   return found == kUnits.end() ? 0 : found->second;
 }
 
-// The first child of that name, whatever its namespace is called.
+// Whatever its namespace is called.
+bool has_name(const pugi::xml_node& node, std::string_view name) {
+  const std::string_view whole = node.name();
+  return whole.substr(whole.find(':') + 1) == name;
+}
+
+// The first child of that name.
 pugi::xml_node child_of(const pugi::xml_node& node, std::string_view name) {
-  return node.find_child([name](const pugi::xml_node& child) {
-    const std::string_view whole = child.name();
-    return whole.substr(whole.find(':') + 1) == name;
-  });
+  return node.find_child([name](const pugi::xml_node& child) { return has_name(child, name); });
+}
+
+// The file that an element says its planes are in, unless it is this one: by its name, or by its UUID if it was renamed.
+std::optional<std::string> other_file_of(const pugi::xml_node& data, std::string_view own_uuid, std::string_view own_name) {
+  const pugi::xml_node uuid = child_of(data, "UUID");
+  const std::string_view text = trimmed(uuid.text().as_string()), file = uuid.attribute("FileName").as_string();
+  if (text.empty() && file.empty()) return {};
+  if ((!text.empty() && text == own_uuid) || (!file.empty() && file == own_name)) return {};
+  return std::string(file);
+}
+
+std::vector<TiffData> tiff_data_of(const pugi::xml_node& pixels, std::string_view own_uuid, std::string_view own_name) {
+  std::vector<TiffData> all;
+  for (const pugi::xml_node& element : pixels.children()) {
+    if (!has_name(element, "TiffData")) continue;
+    const auto number = [&element](const char* name) { return number_of<std::uint64_t>(element.attribute(name).as_string()); };
+    all.push_back({number("FirstZ").value_or(0), number("FirstC").value_or(0), number("FirstT").value_or(0), number("IFD"), number("PlaneCount"),
+                   other_file_of(element, own_uuid, own_name)});
+  }
+  return all;
 }
 
 Described described_by_ome(const pugi::xml_node& pixels) {
@@ -78,8 +102,12 @@ Described description_of(TIFF* tiff) {
   if (std::string_view(text).starts_with("ImageJ=")) return described_by_imagej(text, tiff);
   pugi::xml_document document;
   if (!document.load_string(text)) return {};
-  const pugi::xml_node pixels = child_of(child_of(child_of(document, "OME"), "Image"), "Pixels");
-  return pixels ? described_by_ome(pixels) : Described();
+  const pugi::xml_node ome = child_of(document, "OME"), pixels = child_of(child_of(ome, "Image"), "Pixels");
+  if (!pixels) return {};
+  Described described = described_by_ome(pixels);
+  const std::string name = std::filesystem::path(TIFFFileName(tiff)).filename().string();
+  described.data = tiff_data_of(pixels, ome.attribute("UUID").as_string(), name);
+  return described;
 }
 
 }  // namespace intervale

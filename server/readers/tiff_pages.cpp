@@ -67,18 +67,19 @@ Result<void> read_page(const TiffFile& file, const Page& page, std::size_t width
 }
 
 // Where the pages of a file are, but for smaller copies of pages and masks. One at least.
-Result<std::vector<toff_t>> full_pages(const TiffFile& file) {
-  std::vector<toff_t> offsets;
-  for (bool is_last = false; !is_last;) {
+Result<std::vector<Directory>> full_pages(const TiffFile& file) {
+  std::vector<Directory> pages;
+  std::uint64_t number = 0;
+  for (bool is_last = false; !is_last; ++number) {
     std::uint32_t kind = 0;
     TIFFGetFieldDefaulted(file.get(), TIFFTAG_SUBFILETYPE, &kind);
-    if ((kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) offsets.push_back(TIFFCurrentDirOffset(file.get()));
-    if (offsets.size() > kMostPages) return file.failure("it has more pages than a volume has slices");
+    if ((kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) pages.push_back({TIFFCurrentDirOffset(file.get()), number});
+    if (number > kMostPages) return file.failure("it has more pages than a volume has slices");
     is_last = TIFFLastDirectory(file.get()) != 0;
     if (!is_last && TIFFReadDirectory(file.get()) != 1) return file.failure("its pages are damaged or cut short");
   }
-  if (offsets.empty()) return file.failure("it has no page");
-  return offsets;
+  if (pages.empty()) return file.failure("it has no page");
+  return pages;
 }
 
 bool is_tiff(const std::filesystem::path& path) {
@@ -114,9 +115,9 @@ Result<Pages> Pages::of(const std::filesystem::path& path) {
   if (pages.files_.empty()) return fail(in_quotes(path) + " has no TIFF files");
   if (auto opened = pages.open(0); !opened) return tl::unexpected<Error>(opened.error());
   if (pages.files_.size() > 1) return pages;
-  const auto offsets = full_pages(*pages.file_);
-  if (!offsets) return tl::unexpected<Error>(offsets.error());
-  pages.offsets_ = *offsets;
+  auto directories = full_pages(*pages.file_);
+  if (!directories) return tl::unexpected<Error>(directories.error());
+  pages.directories_ = *std::move(directories);
   return pages.go_to(0).map([&] { return std::move(pages); });
 }
 
@@ -134,6 +135,13 @@ Page Pages::page() const {
   return page;
 }
 
+std::optional<std::size_t> Pages::of_directory(std::uint64_t number) const {
+  const auto found =
+      std::lower_bound(directories_.begin(), directories_.end(), number, [](const Directory& one, std::uint64_t n) { return one.number < n; });
+  if (found == directories_.end() || found->number != number) return {};
+  return std::size_t(found - directories_.begin());
+}
+
 Result<void> Pages::read(std::size_t number, const Page& first, std::size_t width, std::vector<std::byte>& out) {
   if (auto gone = go_to(number); !gone) return gone;
   if (page() != first) return file_->failure("page " + std::to_string(number + 1) + " differs from the first in size or type");
@@ -142,7 +150,8 @@ Result<void> Pages::read(std::size_t number, const Page& first, std::size_t widt
 
 Result<void> Pages::go_to(std::size_t page) {
   if (files_.size() > 1) return open(page);
-  if (TIFFSetSubDirectory(file_->get(), offsets_[page]) != 1) return file_->failure("page " + std::to_string(page + 1) + " cannot be read");
+  if (TIFFSetSubDirectory(file_->get(), directories_[page].offset) != 1)
+    return file_->failure("page " + std::to_string(page + 1) + " cannot be read");
   return {};
 }
 
@@ -150,9 +159,9 @@ Result<void> Pages::open(std::size_t number) {
   file_ = std::make_unique<TiffFile>(files_[number]);
   if (!file_->is_open()) return file_->failure("cannot be read as TIFF");
   if (files_.size() == 1 || TIFFLastDirectory(file_->get()) != 0) return {};
-  const auto offsets = full_pages(*file_);
-  if (!offsets) return tl::unexpected<Error>(offsets.error());
-  if (offsets->size() > 1) return file_->failure("it has several pages; build a volume from it alone");
+  const auto directories = full_pages(*file_);
+  if (!directories) return tl::unexpected<Error>(directories.error());
+  if (directories->size() > 1) return file_->failure("it has several pages; build a volume from it alone");
   return TIFFSetDirectory(file_->get(), 0) == 1 ? Result<void>() : file_->failure("its pages are damaged");
 }
 

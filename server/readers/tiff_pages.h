@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,16 +39,24 @@ struct Page {
   friend bool operator==(const Page&, const Page&) = default;
 };
 
+// Where a file has a page.
+struct Directory {
+  toff_t offset = 0;
+  std::uint64_t number = 0;  // among all, smaller copies and masks counted
+};
+
 // The pages of a file or of a folder's files, one after the other, but for smaller copies of pages and masks.
 class Pages {
  public:
   // At the first page. One page at least.
   static Result<Pages> of(const std::filesystem::path& path);
 
-  [[nodiscard]] std::size_t size() const { return files_.size() > 1 ? files_.size() : offsets_.size(); }
+  [[nodiscard]] std::size_t size() const { return files_.size() > 1 ? files_.size() : directories_.size(); }
   [[nodiscard]] bool is_one_file() const { return files_.size() == 1; }
   [[nodiscard]] const TiffFile& file() const { return *file_; }  // at the page last gone to
   [[nodiscard]] Page page() const;                               // that it is at
+  // The page of a directory, smaller copies and masks counted; none if it is one of these. Only of a single file.
+  [[nodiscard]] std::optional<std::size_t> of_directory(std::uint64_t number) const;
   // The samples of a page, row by row. width: bytes of a sample. Fails unless the page is like `first`.
   Result<void> read(std::size_t number, const Page& first, std::size_t width, std::vector<std::byte>& out);
 
@@ -55,7 +64,7 @@ class Pages {
   Result<void> go_to(std::size_t page);
   Result<void> open(std::size_t number);
   std::vector<std::filesystem::path> files_;
-  std::vector<toff_t> offsets_;  // of pages, in a single file
+  std::vector<Directory> directories_;  // of pages, in a single file
   std::unique_ptr<TiffFile> file_;
 };
 
