@@ -63,6 +63,8 @@ Result<void> read(const ReaderRequest& request) {
     described.channels = described.time_points = 1;
     described.slices = 0;
     described.data.clear();
+  } else if (pages->size() == 1 && described.images > 1) {
+    if (auto more = pages->go_on_for(described.images); !more) return more;
   }
   const auto planes = planes_of(described, *pages, in_quotes(request.path));
   if (!planes) return tl::unexpected<Error>(planes.error());

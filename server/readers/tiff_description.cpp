@@ -82,6 +82,7 @@ Described described_by_imagej(std::string_view text, TIFF* tiff) {
   d.channels = number_of<std::uint64_t>(value("channels")).value_or(1);
   d.time_points = number_of<std::uint64_t>(value("frames")).value_or(1);
   d.slices = number_of<std::uint64_t>(value("slices")).value_or(0);
+  d.images = number_of<std::uint64_t>(value("images")).value_or(1);
   d.order = "CZT";
   d.unit = value("unit") == "micron" || value("unit") == "\\u00B5m" ? "\u00b5m" : std::string(value("unit"));
   float x = 0, y = 0;

@@ -26,6 +26,7 @@ struct Described {
   std::string unit;
   std::uint64_t channels = 1, time_points = 1;
   std::uint64_t slices = 0;  // 0: not said
+  std::uint64_t images = 1;  // of ImageJ: how many follow each other where a file has one page
   bool has_known_units = true;
   std::string order = "ZCT";   // which of slice, channel and time changes first from page to page
   std::vector<TiffData> data;  // empty: page by page

@@ -142,7 +142,41 @@ std::optional<std::size_t> Pages::of_directory(std::uint64_t number) const {
   return std::size_t(found - directories_.begin());
 }
 
+Result<void> Pages::go_on_for(std::uint64_t count) {
+  TIFF* const tiff = file_->get();
+  const Page first = page();
+  std::uint16_t compression = COMPRESSION_NONE;
+  TIFFGetFieldDefaulted(tiff, TIFFTAG_COMPRESSION, &compression);
+  if (compression != COMPRESSION_NONE || TIFFIsTiled(tiff) != 0) return file_->failure("only plain images can follow the one of its one page");
+  if (first.width > std::uint32_t(kMaxSide) || first.height > std::uint32_t(kMaxSide) || count > kMostPages)
+    return file_->failure("its images are larger than a volume may be");
+  const std::uint64_t row = std::uint64_t(first.width) * first.samples * first.bits / 8, bytes = row * first.height;
+  const std::uint64_t offset = TIFFGetStrileOffset(tiff, 0), size = file_->size();
+  const std::uint64_t strip = std::uint64_t(std::max<tmsize_t>(0, TIFFStripSize(tiff)));
+  for (std::uint32_t k = 1; k < TIFFNumberOfStrips(tiff); ++k) {
+    if (TIFFGetStrileOffset(tiff, k) != offset + k * strip) return file_->failure("the strips of its one page do not follow each other");
+  }
+  if (bytes == 0 || offset == 0 || offset > size || count > (size - offset) / bytes)
+    return file_->failure("it says that it has " + std::to_string(count) + " images of " + std::to_string(bytes) +
+                          " bytes, which are not in it; is it cut short?");
+  auto opened = InputFile::open(file_->path());
+  if (!opened) return tl::unexpected<Error>(opened.error());
+  images_.emplace(Images{*std::move(opened), offset, bytes, count});
+  return {};
+}
+
+Result<void> Pages::read_image(std::size_t number, std::size_t width, std::vector<std::byte>& out) const {
+  out.resize(images_->bytes);
+  if (auto done = images_->file.read(images_->offset + number * images_->bytes, out); !done) return done;
+  if (TIFFIsByteSwapped(file_->get()) != 0) {
+    for (std::size_t at = 0; at + width <= out.size(); at += width)
+      std::reverse(out.begin() + std::ptrdiff_t(at), out.begin() + std::ptrdiff_t(at + width));
+  }
+  return {};
+}
+
 Result<void> Pages::read(std::size_t number, const Page& first, std::size_t width, std::vector<std::byte>& out) {
+  if (images_) return read_image(number, width, out);
   if (auto gone = go_to(number); !gone) return gone;
   if (page() != first) return file_->failure("page " + std::to_string(number + 1) + " differs from the first in size or type");
   return read_page(*file_, first, width, out);

@@ -1,5 +1,6 @@
 #include "tests/support/library_files.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <string_view>
 
@@ -79,6 +80,27 @@ std::string tiff_file(std::uint32_t width, std::uint32_t height, const std::vect
     link = file.size();
     file += little(std::uint32_t(0));
   }
+  return file;
+}
+
+std::string imagej_file(std::uint32_t width, std::uint32_t height, const std::vector<std::uint16_t>& numbers, const std::string& description) {
+  const auto big = [](auto value) {
+    std::string bytes = little(value);
+    std::reverse(bytes.begin(), bytes.end());
+    return bytes;
+  };
+  const auto field = [&big](std::uint16_t tag, std::uint32_t value, bool is_short = false) {
+    const std::string number = is_short ? big(std::uint16_t(value)) + std::string(2, '\0') : big(value);
+    return big(tag) + big(std::uint16_t(is_short ? 3 : 4)) + big(std::uint32_t(1)) + number;
+  };
+  constexpr std::uint32_t kText = 8 + 2 + 9 * 12 + 4;  // where the description begins
+  const auto length = std::uint32_t(description.size() + 1), data = kText + length;
+  std::string file = std::string("MM\0*", 4) + big(std::uint32_t(8)) + big(std::uint16_t(9));
+  file += field(256, width) + field(257, height) + field(258, 16, true) + field(262, 1, true);
+  file += big(std::uint16_t(270)) + big(std::uint16_t(2)) + big(length) + big(kText);
+  file += field(273, data) + field(277, 1, true) + field(278, height) + field(279, 2 * width * height) + big(std::uint32_t(0));
+  file += description + '\0';
+  for (const std::uint16_t number : numbers) file += big(number);
   return file;
 }
 

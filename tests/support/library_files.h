@@ -13,6 +13,10 @@ namespace intervale::testing {
 [[nodiscard]] std::string tiff_file(std::uint32_t width, std::uint32_t height, const std::vector<std::vector<std::uint16_t>>& pages,
                                     const std::string& description = {}, std::uint16_t samples_a_pixel = 1);
 
+// As ImageJ writes stacks above 4 GiB: big endian, one page, and behind its samples those of the others.
+[[nodiscard]] std::string imagej_file(std::uint32_t width, std::uint32_t height, const std::vector<std::uint16_t>& numbers,
+                                      const std::string& description);
+
 // One image of a DICOM series, of i16.
 struct DicomImage {
   std::string series = "1.2.3", position = "0\\0\\0", orientation = "1\\0\\0\\0\\1\\0", slope = "1", intercept = "0";

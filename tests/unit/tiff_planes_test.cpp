@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/patch/visit_samples.h"
@@ -86,6 +87,22 @@ TEST_F(TiffPlanes, TiffDataThatIsWrongIsRefused) {
   expect_refused(3, ome("<TiffData IFD=\"0\" PlaneCount=\"3\"/>"), "are pages missing?");
   expect_refused(4, ome("<TiffData/>", "SizeZ=\"" + most + "\" SizeC=\"2\" SizeT=\"2\""), "are pages missing?");
   expect_refused(4, ome("<TiffData/>", "SizeZ=\"2\" SizeC=\"4\" SizeT=\"4\""), "which are not those of 4 channels and 4 time points");
+}
+
+TEST_F(TiffPlanes, ImagejLeavesOutThePagesOfLongStacks) {
+  std::vector<std::uint16_t> numbers;
+  for (std::uint16_t k = 0; k < 36; ++k) numbers.push_back(std::uint16_t(1000 + k / 6));
+  const auto file = [&](const std::string& about) { return testing::imagej_file(3, 2, numbers, "ImageJ=1.53\n" + about); };
+  EXPECT_EQ(pages_in(read_volume(folder_.file("v", file("images=5\nslices=5\n")), {})), (Numbers{1000, 1001, 1002, 1003, 1004}));
+  const auto several = folder_.file("w", file("images=6\nchannels=2\nslices=3\nhyperstack=true\n"));
+  EXPECT_EQ(pages_in(read_volume(several, {}, {}, "1")), (Numbers{1001, 1003, 1005}));
+  for (const auto& [about, complaint] :
+       {std::pair("images=7\n", "it says that it has 7 images of 12 bytes, which are not in it"),
+        std::pair("images=18446744073709551615\n", "larger than a volume may be"), std::pair("images=6\nslices=5\n", "says that it has 5 slices")}) {
+    const auto volume = read_volume(folder_.file("v", file(about)), {});
+    ASSERT_FALSE(volume) << about;
+    EXPECT_NE(volume.error().message.find(complaint), std::string::npos) << volume.error().message;
+  }
 }
 
 }  // namespace
