@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <map>
+#include <new>
 #include <sstream>
 #include <string_view>
 #include <tuple>
@@ -53,13 +54,23 @@ std::optional<std::array<double, N>> numbers_at(gdcm::StringFilter& filter, std:
   return numbers;
 }
 
-// What the elements before the pixels say. None: the file has no image.
-std::optional<DicomImage> scan(const std::filesystem::path& path) {
-  expect_crash_at(path);
+// GDCM catches the exception, and says no more than that it cannot read the file.
+bool g_lacked_memory = false;
+void note_lack_of_memory() {
+  g_lacked_memory = true;
+  throw std::bad_alloc();
+}
+
+// What the elements before the pixels say. None: the file has no image. Fails if it claims to hold much more than it does.
+Result<std::optional<DicomImage>> scan(const std::filesystem::path& path) {
+  expect_trouble_at(path);
   g_warnings.str({});
   gdcm::Reader reader;
   reader.SetFileName(path.c_str());
-  if (!reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010))) return {};
+  g_lacked_memory = false;
+  const bool is_read = reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010));
+  if (g_lacked_memory) return fail(in_quotes(path) + " is damaged: it claims to hold more than its size allows");
+  if (!is_read) return std::nullopt;
   gdcm::StringFilter filter;
   filter.SetFile(reader.GetFile());
   DicomImage image;
@@ -145,7 +156,10 @@ Result<void> check_even(const DicomSeries& series, const std::vector<Vec3>& at) 
 
 }  // namespace
 
-void expect_crash_at(const std::filesystem::path& path) {
+void expect_trouble_at(const std::filesystem::path& path) {
+  std::error_code none;
+  const auto bytes = std::filesystem::file_size(path, none);
+  limit_memory_for(none ? 0 : bytes);
   const std::string words = in_quotes(path) + " is damaged: GDCM stops when it reads it\n";
   std::strncpy(g_last_words.data(), words.c_str(), g_last_words.size() - 1);
 }
@@ -155,6 +169,7 @@ void forget_warnings() { g_warnings.str({}); }
 bool lacks_pixels() { return g_warnings.view().find("Incomplete Pixel Data") != std::string_view::npos; }
 
 void listen_to_gdcm() {
+  std::set_new_handler(note_lack_of_memory);
   gdcm::Trace::SetStream(g_warnings);
   gdcm::Trace::WarningOn();
   gdcm::Trace::ErrorOff();
@@ -169,7 +184,9 @@ Result<std::vector<DicomSeries>> dicom_series_in(const std::filesystem::path& pa
   for (const auto& file : *files) {
     const auto start = InputFile::open(file).and_then([](const InputFile& opened) { return read_start(opened, 132); });
     if (!start || !begins_as_dicom(*start)) continue;
-    auto image = scan(file);
+    auto scanned = scan(file);
+    if (!scanned) return tl::unexpected<Error>(scanned.error());
+    std::optional<DicomImage>& image = *scanned;
     if (!image) continue;  // DICOMDIR, reports and the like
     std::array<std::int64_t, 6> orientation{};
     for (std::size_t k = 0; image->orientation && k < 6; ++k) orientation[k] = std::llround(std::clamp((*image->orientation)[k], -2.0, 2.0) * 1000);

@@ -19,8 +19,9 @@
 
 namespace intervale {
 
-// To be said before GDCM reads a file: if it ends the program by an assertion, the program's last words name the file.
-void expect_crash_at(const std::filesystem::path& path);
+// To be said before GDCM reads a file: it may take memory by the file's size only, and if it ends the program by an
+// assertion, the program's last words name the file.
+void expect_trouble_at(const std::filesystem::path& path);
 // Whether the pixels last read since forget_warnings() were not all there: GDCM fills them with zeros.
 [[nodiscard]] bool lacks_pixels();
 void forget_warnings();

@@ -49,7 +49,7 @@ std::optional<SampleType> type_of(const gdcm::PixelFormat& format) {
 class Pixels {
  public:
   static Result<std::unique_ptr<Pixels>> open(const std::filesystem::path& path) {
-    expect_crash_at(path);
+    expect_trouble_at(path);
     auto pixels = std::make_unique<Pixels>();
     pixels->path_ = path;
     pixels->reader_.SetFileName(path.c_str());
@@ -68,7 +68,7 @@ class Pixels {
 
   // All frames. count: of the pixels that there should be.
   Result<void> read(std::uint64_t count, std::vector<std::byte>& out) {
-    expect_crash_at(path_);
+    expect_trouble_at(path_);
     const std::uint64_t bytes = count * size_of(type_);
     if (image().GetBufferLength() != bytes) return fail(in_quotes(path_) + " differs from the other images in size or type");
     out.resize(bytes);

@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <new>
 #include <string_view>
 
@@ -18,12 +19,12 @@ namespace intervale {
 namespace {
 
 constexpr std::size_t kMostFiles = 1 << 20;
+constexpr rlim_t kMostMemory = rlim_t(8) << 30;  // bytes
 
 // A library may take all memory for what a file claims. Sanitizers need more addresses than there is memory.
 void limit_memory() {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(INTERVALE_SANITIZED)
-  constexpr rlim_t kMost = rlim_t(8) << 30;
-  const rlimit limit{kMost, kMost};
+  const rlimit limit{kMostMemory, kMostMemory};
   ::setrlimit(RLIMIT_AS, &limit);
 #endif
   const rlimit none{0, 0};
@@ -112,6 +113,16 @@ Result<std::vector<std::filesystem::path>> files_of(const std::filesystem::path&
   if (error) return fail(in_quotes(path) + ": " + error.message());
   std::sort(files.begin(), files.end(), comes_before);
   return files;
+}
+
+void limit_memory_for([[maybe_unused]] std::uint64_t file_bytes) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(INTERVALE_SANITIZED)
+  std::uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const std::uint64_t used = pages * std::uint64_t(::sysconf(_SC_PAGESIZE)), more = (512u << 20u) + 64 * std::min(file_bytes, kMostMemory);
+  const rlimit limit{std::min<rlim_t>(kMostMemory, used + more), kMostMemory};
+  ::setrlimit(RLIMIT_AS, &limit);
+#endif
 }
 
 void run_reader(int argc, char** argv, Result<void> (*read)(const ReaderRequest& request)) {

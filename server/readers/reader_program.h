@@ -28,6 +28,10 @@ struct ReaderRequest {
 // The program's main function: exits with the status.
 [[noreturn]] void run_reader(int argc, char** argv, Result<void> (*read)(const ReaderRequest& request));
 
+// To be called before a library that allocates what a file claims reads it: for a file of so many bytes it gets 64 times that
+// and 512 MiB, beyond what the program has.
+void limit_memory_for(std::uint64_t file_bytes);
+
 // The files in a folder and the folders in it, numbers in their names by value: slice_9 comes before slice_10. Not those
 // whose names begin with a dot. Of a file, itself. Fails above 2^20 files.
 [[nodiscard]] Result<std::vector<std::filesystem::path>> files_of(const std::filesystem::path& path);
