@@ -121,5 +121,37 @@ TEST_F(ZarrFolder, WhatIsDamagedIsNamed) {
   EXPECT_FALSE(volume);
 }
 
+class DamagedZarr : public ZarrFolder, public ::testing::WithParamInterface<int> {};
+
+// Its metadata, more often than a chunk.
+TEST_P(DamagedZarr, DoesNoHarm) {
+  Json about = description({2, 3, 5}, {1, 2, 2});
+  about["compressor"] = {{"id", "zlib"}, {"level", 1}};
+  write_array("v", about);
+  const std::string attributes = "{\"multiscales\": [{\"axes\": [\"z\", \"y\", \"x\"], \"datasets\": [{\"path\": \"\"}]}]}";
+  const struct {
+    const char* name;
+    std::string bytes;
+  } files[] = {{".zarray", about.dump()}, {".zattrs", attributes}, {"0.0.0", contents_of(folder_ / "v/0.0.0")}};
+  for (const auto& file : files) write(folder_ / "v" / file.name, file.bytes);
+  std::mt19937 random(unsigned(GetParam()) + 7);
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto& [name, whole] = files[trial % 5 < 3 ? 0 : trial % 5 - 2];
+    std::string bytes = whole;
+    for (int k = 0; k < 1 + trial / 20; ++k) bytes[random() % bytes.size()] = trial % 2 == 0 ? char(random()) : char('0' + random() % 75);
+    if (trial % 10 == 0) bytes.resize(random() % bytes.size());
+    write(folder_ / "v" / name, bytes);
+    const auto volume = read_volume(folder_ / "v", {}, 0);
+    if (volume) {
+      EXPECT_EQ(volume->bytes.size(), volume->grid.sample_count() * size_of(volume->type));
+    } else {
+      EXPECT_EQ(volume.error().message.find('\n'), std::string::npos) << volume.error().message;
+    }
+    write(folder_ / "v" / name, whole);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Fifty, DamagedZarr, ::testing::Range(0, 5));
+
 }  // namespace
 }  // namespace intervale
