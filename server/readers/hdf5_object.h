@@ -1,4 +1,4 @@
-// What the programs' own code asks of objects in HDF5 files.
+// What read-hdf5 asks of the objects in a file.
 #pragma once
 
 #include <hdf5.h>
