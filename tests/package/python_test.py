@@ -126,6 +126,25 @@ class DataSets(Package):
         self.assertEqual(counts.sum(), array.size)
         self.assertEqual(len(edges), len(counts) + 1)
 
+    def test_a_path_is_what_is_read_there(self):
+        path, flow = self.folder / "ball.npy", self.folder / "flow.npy"
+        np.save(path, ball())
+        np.save(flow, 2 * ball())
+
+        def saved(*arguments, **more):
+            intervale.build(*arguments, **more).save(self.folder / "built.ivm")
+            return (self.folder / "built.ivm").read_bytes()
+
+        expected = saved(intervale.read(path), (3, 9), channels={"flow": intervale.read(flow)})
+        for given in (path, str(path)):
+            self.assertEqual(saved(given, range=(3, 9), channels={"flow": type(given)(flow)}), expected)
+        (self.folder / "bad.nrrd").write_bytes(b"NRRD0004\ntype: what\n")
+        self.assertRaises(intervale.FormatError, intervale.build, self.folder / "bad.nrrd")
+        for wrong in (path, str(path)):
+            for take in (intervale.Volume.wrap, intervale.Volume):
+                with self.assertRaisesRegex(TypeError, r"ball\.npy' is no array or image: intervale\.read\(\) reads files"):
+                    take(wrong)
+
     def test_meshes_as_those_of_other_packages(self):
         flow = np.stack([ball(), 2 * ball(), -ball()], axis=3)
         mesh = intervale.build(ball(), channels={"flow": flow}).extract([(3, 5), (7, 9)], channels=["flow"])

@@ -1,5 +1,6 @@
 """Checked by mypy, not run: what a typed program says of the package."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ def volume_of(url: str) -> float:
 
 def built(array: NDArray[Any]) -> intervale.DataSet:
     data_set = intervale.build(intervale.Volume(array, spacing=(1, 1, 2), unit="mm"), progress=print)
+    intervale.build(Path("scan.nrrd"), range=(1, 2), channels={"flow": "flow.nrrd"})
     mesh = data_set.extract([(1, 2), (3, 4)], error_percent=1, channels=["flow"])
     mesh.save("mesh.vtu")
     return data_set

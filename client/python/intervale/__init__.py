@@ -2,7 +2,7 @@
 
     import intervale
     volume = intervale.read("scan.nii.gz")            # or intervale.Volume(array, axes="zyx", spacing=(1, 1, 2))
-    data_set = intervale.build(volume)                # of every range of values
+    data_set = intervale.build(volume)                # of every range of values; a path will do, too
     mesh = data_set.extract(range=(300, 1200), error_percent=1)
     mesh.points, mesh.tets                            # NumPy arrays: (n, 3) float64, (m, 4) uint32
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from . import _intervale
 from ._request import make_request
-from ._volumes import Volume
+from ._volumes import Volume, read
 
 
 class Histogram(NamedTuple):
@@ -62,13 +62,16 @@ class DataSet:
 
 
 def build(volume, range=None, *, refine="boundary", step=None, nan=None, channels=None, progress=None, threads=0):
-    """A data set of a volume, or of what Volume.wrap() takes.
+    """A data set of a volume, of a file that read() reads, by its path, or of what Volume.wrap() takes.
 
     range: the (low, high) to keep; None: every range. refine: of a range, "boundary" or "uniform". step: distance of the
     values that floats are rounded to; 0: exact. nan: replaces NaN and infinite samples. channels: {name: volume}, other
-    fields on the same grid. progress: called with the fraction done. threads: 0: one for each core.
+    fields on the same grid, each whatever volume may be. progress: called with the fraction done. threads: 0: one for
+    each core.
     """
     def raw(source):
+        if isinstance(source, (str, os.PathLike)):
+            source = read(source)
         return (source if isinstance(source, Volume) else Volume.wrap(source))._raw()
 
     others = [(name, raw(source), None) for name, source in (channels or {}).items()]

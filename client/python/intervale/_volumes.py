@@ -22,6 +22,8 @@ class Volume:
         spacing, origin: x, y, z, whatever the axes; default 1 and 0. direction: 3 x 3, its columns are the directions of
         x, y and z. affine: 3 x 4 or 4 x 4, instead of those three.
         """
+        if isinstance(array, (str, os.PathLike)):
+            raise TypeError(f"{os.fspath(array)!r} is no array or image: intervale.read() reads files")
         array = np.asanyarray(array)
         if sorted(axes) != ["x", "y", "z"] or array.ndim not in (3, 4):
             raise ValueError(f"axes names x, y and z of an array of three axes (four of vectors), not {axes!r} of {array.ndim}")
@@ -46,7 +48,7 @@ class Volume:
     @classmethod
     def wrap(cls, image, **more):
         """An image of SimpleITK, nibabel, VTK, PyVista or xarray, or whatever NumPy takes for an array. more: arguments
-        of Volume that take the place of what the image says.
+        of Volume that take the place of what the image says. Files are for read().
         """
         if hasattr(image, "GetDirection") and hasattr(image, "GetSpacing") and hasattr(image, "GetPixelIDValue"):
             array = sys.modules["SimpleITK"].GetArrayViewFromImage(image)
