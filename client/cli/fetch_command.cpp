@@ -141,7 +141,7 @@ Result<void> run(const FetchCommand& options) {
   const auto& picture = options.picture;
   fetch.is_opaque = picture && !options.output && picture->render == Render::surface && !picture->clip && !picture->edges;
   const auto fetched = fetch_with_progress(*url, fetch);
-  if (!fetched) return tl::unexpected(fetched.error());
+  if (!fetched) return tl::unexpected(with_access_hint(fetched.error(), *url));
   const FetchedMesh all = mesh_of(fetched->client, options.digest);
   if (options.output) {
     if (auto written = write_mesh(*options.output, all.mesh); !written) return written;

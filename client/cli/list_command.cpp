@@ -45,7 +45,7 @@ Result<void> list(const ListOptions& options) {
   if (!url) return tl::unexpected(url.error());
   if (!url->name.empty()) return misuse("list expects a server without the name of a data set: " + url->server());
   const auto body = http_get(*url, "/api/datasets");
-  if (!body) return tl::unexpected(body.error());
+  if (!body) return tl::unexpected(with_access_hint(body.error(), *url));
   // The parser throws on invalid JSON, and at() on JSON of another shape. Both are bad input from outside.
   try {
     const auto answer = nlohmann::ordered_json::parse(*body, &is_shallow);

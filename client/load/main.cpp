@@ -46,7 +46,7 @@ Result<void> run(const LoadCommand& options) {
   LoadOptions load = options.load;
   load.shown = {*ranges, parse_refine(options.refine)};
   const auto report = run_load(*url, load);
-  if (!report) return tl::unexpected(report.error());
+  if (!report) return tl::unexpected(with_access_hint(report.error(), *url));
   if (auto printed = options.json ? print_json(to_json(*report)) : print(to_text(*report)); !printed) return printed;
   return check_report(*report);
 }

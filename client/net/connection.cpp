@@ -106,7 +106,7 @@ Error StreamConnection::Socket::faulted(const protocol::Fault& fault, const Erro
 
 Error unauthorized(const ServerUrl& url) {
   if (url.access.token) return {"the server at " + url.authority() + " does not accept the token"};
-  return {"the server at " + url.authority() + " requires a token: --token or INTERVALE_TOKEN"};
+  return {"the server at " + url.authority() + " requires a token"};
 }
 
 Error turned_away(const ServerUrl& url, std::string_view body) {

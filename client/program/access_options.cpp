@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "client/net/connection.h"
+
 namespace intervale {
 
 void add_access_options(CLI::App& app, Access& access) {
@@ -21,6 +23,11 @@ void add_access_options(CLI::App& app, Access& access) {
   app.add_option("--ca", access.authorities, "With wss://: PEM file of certificates to trust instead of the system's, such as the server's own")
       ->type_name("FILE")
       ->group(group);
+}
+
+Error with_access_hint(Error error, const ServerUrl& url) {
+  if (!url.access.token && error.message == unauthorized(url).message) error.message += ": --token or INTERVALE_TOKEN";
+  return error;
 }
 
 }  // namespace intervale

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "client/api/fetch_mesh.h"
 #include "common/util/printable.h"
 #include "protocol/codec.h"
 #include "tests/support/complaints.h"
@@ -22,6 +23,7 @@ namespace intervale {
 namespace {
 
 using ::testing::AnyOf;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -137,14 +139,18 @@ TEST(Programs, TokensLetInAndAreNeverTold) {
   expect_complaint(fetch({"--token", wrong}), 1, "does not accept the token");
   expect_complaint(fetch({"--token", secret + "2"}), 1, "does not grant 'buckyball'");
   EXPECT_EQ(fetch({"--token", secret}).status, 0);
-  expect_complaint(run({client(), "list", server.url()}), 1, "requires a token");
+  const std::vector<std::string> load{program("intervale-load"), server.url("buckyball"), "--clients", "2", "--duration", "0.1"};
+  expect_complaint(run({client(), "list", server.url()}), 1, "requires a token: --token or INTERVALE_TOKEN");
+  expect_complaint(run(load), 1, "requires a token: --token or INTERVALE_TOKEN", "intervale-load: ");
+  EXPECT_THAT(list_data_sets(server.url()).error().message, EndsWith("requires a token"));  // a library knows no options
+  expect_complaint(run({client(), "list", server.url(), "--token", wrong}), 1, "does not accept the token");
   folder.file("tokens", secret + "\n" + secret + "3 buckyball\n");
   EXPECT_TRUE(server.process().wait_for("reloaded the tokens"));
   EXPECT_EQ(fetch({"--token", secret + "3"}).status, 0);
   expect_complaint(run({client(), "fetch", server.url("buckyball"), "--token", "a b"}), 2, "--token");
   ::setenv("INTERVALE_TOKEN", secret.c_str(), 1);
   const auto listed = run({client(), "list", server.url()});
-  const auto loaded = run({program("intervale-load"), server.url("buckyball"), "--clients", "2", "--duration", "0.1"});
+  const auto loaded = run(load);
   ::unsetenv("INTERVALE_TOKEN");
   EXPECT_THAT(listed.out, StartsWith("buckyball: "));
   EXPECT_EQ(loaded.status, 0) << loaded.err;
