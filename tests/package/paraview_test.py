@@ -106,8 +106,10 @@ class Plugin(unittest.TestCase):
     def test_paraview_draws_it(self):
         script, picture = self.folder / "script.py", self.folder / "picture.png"
         script.write_text(SCRIPT.format(plugin=str(PLUGIN), file=str(self.every), picture=str(picture)), encoding="utf-8")
-        out = run("xvfb-run", "-a", "pvbatch", script, env={**os.environ, "PYTHONPATH": str(BUILD / "python"),
-                                                            "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"})
+        # -noreset: a library of MPI's looks at the display before ParaView does. The server would begin anew when that is
+        # gone, and now and then refuse ParaView meanwhile.
+        out = run("xvfb-run", "-a", "-s", "-screen 0 1280x1024x24 -noreset", "pvbatch", script,
+                  env={**os.environ, "PYTHONPATH": str(BUILD / "python"), "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"})
         self.assertRegex(out, r"cells [1-9]\d{3,}")
         self.assertGreater(picture.stat().st_size, 5000)
 
