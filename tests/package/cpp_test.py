@@ -1,7 +1,7 @@
-"""The installed C++ package: cpp_test.py BUILD EXAMPLES
+"""The installed C++ package: cpp_test.py BUILD EXAMPLES, or cpp_test.py --installed PREFIX EXAMPLES
 
-Installs BUILD into an empty prefix, builds the examples against it, with CMake and with pkg-config, and compares the
-meshes that they make with those of the programs.
+Installs BUILD into an empty prefix, unless there is a prefix; builds the examples against it, with CMake and with
+pkg-config, and compares the meshes that they make with those of the programs.
 """
 
 import os
@@ -13,7 +13,8 @@ from pathlib import Path
 
 from support import digest_in, run, serving
 
-BUILD, EXAMPLES = Path(sys.argv[1]), Path(sys.argv[2])
+IS_INSTALLED = sys.argv[1] == "--installed"
+PLACE, EXAMPLES = map(Path, sys.argv[-2:])  # PLACE: the build, or the prefix
 
 
 def check_symbols(prefix):
@@ -41,8 +42,9 @@ def check_view(program, url, folder):
 
 
 def main(folder):
-    prefix, examples = folder / "prefix", folder / "examples"
-    run("cmake", "--install", BUILD, "--prefix", prefix)
+    prefix, examples = PLACE if IS_INSTALLED else folder / "prefix", folder / "examples"
+    if not IS_INSTALLED:
+        run("cmake", "--install", PLACE, "--prefix", prefix)
     check_symbols(prefix)
 
     environment = {name: text for name, text in os.environ.items() if not name.startswith(("CMAKE", "PKG_CONFIG"))}
