@@ -23,6 +23,7 @@ import {
   set,
   settled,
   surfaceShares,
+  throttledProxy,
   vtkArray,
 } from './support.mjs';
 
@@ -116,6 +117,21 @@ describe('The page', () => {
     assert.ok(size > 200_000 && size <= 400_000, `${size} bytes are downloaded before data`);
     assert.deepEqual(errors, []);
     await close();
+  });
+
+  test('tells the server what its surfaces hide, if they hide anything', async () => {
+    const changes = async () => Number(/^intervale_view_change_seconds_count (\d+)/m.exec(await (await fetch(new URL('/metrics', server.url))).text())[1]);
+    // Views that are answered after the first one, while the page opens over a slow line.
+    const line = await throttledProxy(server.port, 50_000);
+    const opened = async (hash) => {
+      const before = await changes();
+      const { page, close } = await open(browser, `http://127.0.0.1:${line}/#data=buckyball${hash}`);
+      await settled(page);
+      await close();
+      return (await changes()) - before;
+    };
+    const opaque = await opened('');
+    for (const seen of ['&alpha=3a6ea5,0.5', '&clip=0,0,1,0']) assert.ok((await opened(seen)) < opaque, `${seen}, ${opaque}`);
   });
 
   test('has the same mesh as the native client, for the whole data set and for a view', async () => {
