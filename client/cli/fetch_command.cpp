@@ -137,9 +137,10 @@ Result<void> run(const FetchCommand& options) {
   fetch.shown = {*ranges, parse_refine(options.refine)};
   fetch.channels = with_channel_of(options.picture, fetch.channels);
   fetch.prefers_uniform = options.picture && options.picture->render == Render::volume;
-  // A mesh that is written is of use from all sides.
+  // A mesh that is written is of use from all sides, and the order of what arrives matters only where a budget ends it.
   const auto& picture = options.picture;
-  fetch.is_opaque = picture && !options.output && picture->render == Render::surface && !picture->clip && !picture->edges;
+  const bool has_budget = fetch.max_bytes || fetch.lod.max_tets;
+  fetch.is_opaque = has_budget && picture && !options.output && picture->render == Render::surface && !picture->clip && !picture->edges;
   const auto fetched = fetch_with_progress(*url, fetch);
   if (!fetched) return tl::unexpected(with_access_hint(fetched.error(), *url));
   const FetchedMesh all = mesh_of(fetched->client, options.digest);

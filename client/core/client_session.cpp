@@ -27,7 +27,7 @@ Result<void> ClientSession::look(ViewRequest request) {
     mesh_->show_channels(*channels);
   }
   view_ = std::move(request);
-  map_due_ = view_->depth ? 2 * updates_ : kDepthMapUpdates;
+  map_due_ = view_->depth ? std::max(kDepthMapUpdates, 2 * updates_) : kDepthMapUpdates;
   if (mesh_ && view_->camera) mesh_->look(*view_->camera);
   if (state_ != State::connecting) send_view();
   return {};
@@ -40,7 +40,7 @@ bool ClientSession::wants_depth_map() const {
 void ClientSession::send_depth_map(DepthMap map) {
   view_->depth = std::move(map);
   map_due_ = 2 * updates_;
-  send_view();
+  send_view(false);
 }
 
 // With max_bytes, Open grants nothing: first it must be known how many bytes Opened takes.
@@ -94,6 +94,10 @@ Result<ClientSession::Event> ClientSession::take(protocol::Opened& opened, Clock
   }
   credit_.note_round_trip(now - greeted_at_);
   if (options_.max_bytes) send_credit();
+  if (!resumes && view_) {
+    map_due_ = kDepthMapUpdates;
+    if (std::exchange(view_->depth, {})) send_view(false);  // it was of other data
+  }
   return Event{.kind = Event::Kind::opened, .is_new_mesh = !resumes};
 }
 
@@ -200,7 +204,7 @@ void ClientSession::send_haves(std::span<const SlotGroup> splits, std::optional<
 }
 
 // A view is sent before Opened has arrived. It gives nothing up then: the data may be other data than before.
-void ClientSession::send_view() {
+void ClientSession::send_view(bool gives_up) {
   protocol::View view{++epoch_, view_->lod};
   view.shown = view_->shown;
   view.early = view_->early;
@@ -211,7 +215,7 @@ void ClientSession::send_view() {
     shown_.push_back({epoch_, view.shown, view.channels});
   if (mesh_) {
     mesh_->set_budget(view_->budget, epoch_);
-    if (is_open()) view.forget = mesh_->give_up(epoch_, protocol::kMaxHave);
+    if (is_open() && gives_up) view.forget = mesh_->give_up(epoch_, protocol::kMaxHave);
   }
   if (view_->budget.max_updates != UINT64_MAX) view.room = view_->budget.max_updates;
   if (state_ == State::idle) credit_.note_pause();  // also if coarse updates have followed Done

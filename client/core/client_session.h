@@ -148,7 +148,7 @@ class ClientSession {
   Result<void> apply(const protocol::Batch& batch);
   void send(const protocol::ClientMessage& message);
   void send_haves();
-  void send_view();
+  void send_view(bool gives_up = true);
   void send_credit();
   void send_haves(std::span<const SlotGroup> splits, std::optional<std::size_t> channel);
   [[nodiscard]] bool is_open() const { return state_ == State::viewing || state_ == State::idle; }

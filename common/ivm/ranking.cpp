@@ -46,9 +46,8 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
   const float pixels = object_error * b.pixels_;
   if (!(pixels > pixel_error_)) return b;
   b.weight_ = weight_of(region, b.scale_, b.pixels_, !b.near_);
-  b.is_hidden_ = is_hidden(region);
-  if (b.is_hidden_) b.weight_ *= kHidden;
-  b.bound_ = rank_of(importance_of(pixels, slope, b.weight_));
+  b.is_seen_ = !is_hidden(region);
+  b.bound_ = rank_of(importance_of(pixels, slope, b.weight_), b.is_seen_);
   return b;
 }
 
@@ -59,7 +58,7 @@ float Ranking::pixels_per_unit(const ScreenError::Region& region) const {
 // If not exact, at most. pixels: of one world unit there.
 float Ranking::weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const {
   const double spacing = spacing_ * double(pixels);
-  const double weight = relevant_.has_slopes() ? spacing * spacing * spacing : std::ldexp(spacing * spacing, 2 * scale);
+  const double weight = relevant_.has_slopes() ? std::ldexp(spacing * spacing * spacing, scale) : std::ldexp(spacing * spacing, 2 * scale);
   return float(std::clamp(weight * (is_exact ? screen_->seen_share(region) : 1), 1e-30, 1e30));
 }
 
@@ -71,21 +70,22 @@ Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, Supercube
   s.scale_ = scale_;
   s.pixels_ = pixels_;
   s.weight_ = weight_;
-  const bool may_be_hidden = ranking_->occlusion_ && !is_hidden_;
+  s.is_seen_ = is_seen_;
+  const bool may_be_hidden = ranking_->occlusion_ && is_seen_;
   if (!near_ && !may_be_hidden) return s;
   const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
   if (near_) {
     s.pixels_ = ranking_->pixels_per_unit(region);
     s.weight_ = ranking_->weight_of(region, scale_, s.pixels_, true);
   }
-  if (is_hidden_ ? near_ : may_be_hidden && ranking_->occlusion_->hides(region)) s.weight_ *= kHidden;
+  if (may_be_hidden) s.is_seen_ = !ranking_->occlusion_->hides(region);
   return s;
 }
 
 double Ranking::error(Rank rank) const { return rank == 0 ? 0 : double(volume_.error_steps()[rank - 1u]); }
 
 Ranking::Rank Ranking::band_below(Rank top) const {
-  if (screen_) return Rank(std::max(1, top - kBand + 1));
+  if (screen_) return Rank(std::max(top > kSeenFrom ? kSeenFrom + 1 : 1, top - kBand + 1));
   const auto steps = volume_.error_steps();
   const float low = steps[top - 1u] * 0.25F;
   return Rank(std::lower_bound(steps.begin(), steps.end(), low) - steps.begin() + 1);

@@ -5,11 +5,11 @@
 // its pixel error; they are ranked by the squared deviation on the screen that they remove, summed up over the picture.
 // Where slopes are known (relevant_updates.h), that is what they say, times the cube of the spacing of samples in pixels:
 // its square, as deviations are seen so large; and its square once more, if all pixels should count alike, but not, if
-// all of the surface should. Otherwise it is estimated: the square of the deviation in pixels, times the pixels that the
-// diamond's surfaces cover, about (h in pixels)^2. Both as far as the surfaces are in the picture. So what is large in
-// the picture comes before what is far off in one place. What a depth map hides comes after everything that is seen.
-// Pixels a world unit, for the nearest visible point, and the
-// share that is seen are computed once a supercube, or once a brick that is far away.
+// all of the surface should. Once more with 2^scale: coarse updates come a little earlier than what they remove says,
+// which makes early pictures better and later ones no worse (tests/bench/RESULTS.md). Otherwise it is estimated: the square of the deviation in
+// pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2. Both as far as the surfaces are in the picture. So what is large
+// in the picture comes before what is far off in one place. What a depth map hides comes after everything that is seen. Pixels a world unit, for the
+// nearest visible point, and the share that is seen are computed once a supercube, or once a brick that is far away.
 #pragma once
 
 #include <algorithm>
@@ -52,11 +52,13 @@ class Ranking {
     // The least importance of this rank, 1 or more; and the rank of an importance.
     [[nodiscard]] float least(Rank rank) const {
       if (!ranking_->screen_) return float(rank);
-      return rank <= 1 ? kLeastImportance : bits_as<float>(std::uint32_t(rank + kRankFrom) << kRankShift);
+      const int among_its_kind = int(rank) - is_seen_ * kSeenFrom;
+      if (among_its_kind > kSeenFrom) return std::numeric_limits<float>::infinity();  // none that is hidden
+      return among_its_kind <= 1 ? kLeastImportance : bits_as<float>(std::uint32_t(among_its_kind + kRankFrom) << kRankShift);
     }
     [[nodiscard]] Rank rank(float importance) const {
       if (importance == 0) return 0;
-      return ranking_->screen_ ? rank_of(importance) : Rank(importance);
+      return ranking_->screen_ ? rank_of(importance, is_seen_) : Rank(importance);
     }
     // No lower than the rank of any update here whose error step, distance and slope are no higher.
     [[nodiscard]] Rank bound(unsigned step, std::uint8_t distance, unsigned slope) const { return rank(importance(step, distance, slope)); }
@@ -78,6 +80,7 @@ class Ranking {
     int scale_ = 0;
     float pixels_ = 0;  // of one world unit
     float weight_ = 0;  // of what is removed
+    bool is_seen_ = true;
   };
 
   // Ranks the supercubes of one brick.
@@ -94,8 +97,8 @@ class Ranking {
     friend class Ranking;
     const Ranking* ranking_ = nullptr;
     int scale_ = 0;
-    bool near_ = false;       // distances from the camera to its supercubes differ much
-    bool is_hidden_ = false;  // all of it
+    bool near_ = false;    // distances from the camera to its supercubes differ much
+    bool is_seen_ = true;  // some of it, perhaps
     float pixels_ = 0, weight_ = 0;
     Rank bound_ = 0;
   };
@@ -112,19 +115,20 @@ class Ranking {
   [[nodiscard]] Rank band_below(Rank top) const;
 
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
+  [[nodiscard]] std::size_t memory_bytes() const { return occlusion_ ? occlusion_->memory_bytes() : 0; }  // besides this object
 
  private:
-  static constexpr float kHidden = 0x1p-32F;  // of the weight of what is seen
   static constexpr float kLeastImportance = std::numeric_limits<float>::min(), kMostImportance = 0x1p100f;
   // Above 0.
   [[nodiscard]] float importance_of(float pixels, unsigned slope, float weight) const {
     return std::max((relevant_.has_slopes() ? removed_[slope] : pixels * pixels) * weight, kLeastImportance);
   }
-  // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1.
-  static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 32;
-  [[nodiscard]] static Rank rank_of(float importance) {
+  // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1. All that is seen ranks above all
+  // that is hidden.
+  static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 32, kSeenFrom = 4096;
+  [[nodiscard]] static Rank rank_of(float importance, bool is_seen) {
     const int rank = int(bits_as<std::uint32_t>(importance < kMostImportance ? importance : kMostImportance) >> kRankShift) - kRankFrom;
-    return Rank(std::max(rank, 1));
+    return Rank(std::max(rank, 1) + is_seen * kSeenFrom);
   }
   [[nodiscard]] float pixels_per_unit(const ScreenError::Region& region) const;
   [[nodiscard]] bool is_hidden(const ScreenError::Region& region) const { return occlusion_ && occlusion_->hides(region); }

@@ -61,6 +61,7 @@ StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume)
 
 void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown) {
   search_.reset();
+  searched_.reset();
   relevant_ = std::move(relevant);
   shown_ = std::move(shown);
   const SupercubeSet& set = volume_->set();
@@ -158,9 +159,12 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
 }
 
 void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden) {
-  budget_.reset();
-  search_.reset();
-  if (lod.max_updates) search_ = std::make_shared<BudgetSearch>(volume_, relevant_, lod);
+  if (searched_ != lod) {
+    searched_ = lod;
+    budget_.reset();
+    search_.reset();
+    if (lod.max_updates) search_ = std::make_shared<BudgetSearch>(volume_, relevant_, lod);
+  }
   ranking_.emplace(*volume_, *relevant_, lod, hidden);
   rank_bricks();
 }
@@ -391,6 +395,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
 std::size_t StreamPlan::memory_bytes() const {
   std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
   bytes += pending_.capacity() * sizeof(Pending) + steps_page_.capacity() * sizeof steps_page_[0] + steps_.capacity() * sizeof steps_[0];
+  if (ranking_) bytes += ranking_->memory_bytes();
   for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
   return bytes;
 }

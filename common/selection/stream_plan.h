@@ -34,7 +34,7 @@ struct Batch {
 
 // Payload of a view's first batch: small, so that there is a mesh to draw soon. Each further batch may be twice as
 // large, up to protocol::kMaxBatchPayload.
-inline constexpr std::size_t kFirstPayload = 8 << 10;
+inline constexpr std::size_t kFirstPayload = 4 << 10;
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
 // brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and three
@@ -71,7 +71,7 @@ class StreamPlan {
   bool resume(std::size_t channel, SupercubeKey key, std::uint64_t slots);
 
   // Replaces the level of detail; check_lod(lod) must hold. hidden: a depth map of its camera; what lies behind is sent
-  // last. O(bricks).
+  // last. O(bricks). The search of an equal level of detail goes on.
   void set_lod(const Lod& lod, const DepthMap* hidden = nullptr);
 
   // The search for what is within max_updates, which is to be done before the next batch; nullptr: none. Another thread
@@ -174,6 +174,7 @@ class StreamPlan {
   std::optional<Ranking> ranking_;
   std::shared_ptr<BudgetSearch> search_;  // with max_updates, until its result is taken
   std::optional<SplitSet> budget_;        // then: the updates within the budget
+  std::optional<Lod> searched_;           // that both are of
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);
   std::uint32_t pending_bricks_ = 0;  // whose rank is not 0
   Rank band_ = 0;                     // the lowest rank of the current band

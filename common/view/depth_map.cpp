@@ -146,6 +146,12 @@ Occlusion::Occlusion(const DepthMap& map, const Camera& camera, const Grid& grid
   }
 }
 
+std::size_t Occlusion::memory_bytes() const {
+  std::size_t bytes = levels_.capacity() * sizeof levels_[0];
+  for (const Level& level : levels_) bytes += level.codes.capacity();
+  return bytes;
+}
+
 // The region lies between two depths, and within a span across the line of sight; so its picture lies between the least
 // and the greatest of the spans' ends over both depths. It is compared with few cells: those of the first level of which
 // it touches at most two on each axis.

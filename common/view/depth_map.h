@@ -65,6 +65,7 @@ class Occlusion {
   // Whether all of the region that is in the picture lies behind the surfaces, by half its own diagonal at least: the
   // mesh of the map is coarse. Then so does each region inside this one. False for one that reaches the eye.
   [[nodiscard]] bool hides(const ScreenError::Region& region) const;
+  [[nodiscard]] std::size_t memory_bytes() const;  // besides this object
 
  private:
   struct Level {

@@ -82,7 +82,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   depth_ = view.depth;
   if (shown_ != shown || !lod_.camera) measurement_.reset();
   if (shown_ != shown) estimate_.reset();
-  search_.reset();  // of another view; if it is done, it would say that nothing is waited for
+  if (is_other_view) search_.reset();  // if it is done, it would say that nothing is waited for
   shown_ = std::move(shown);
   is_early_ = view.early;
   is_new_ = true;

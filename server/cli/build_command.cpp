@@ -144,17 +144,32 @@ Result<std::vector<ChannelInput>> parse_channels(const BuildCommand& options) {
   return channels;
 }
 
+std::string text_of_dims(const std::string& who, const Grid& grid) {
+  return fmt::format("{} has {} x {} x {} samples", who, grid.dims[0], grid.dims[1], grid.dims[2]);
+}
+
 // The channels of a data set of this grid and set.
 Result<BuiltChannels> build_channels(const std::vector<ChannelInput>& inputs, const BuildCommand& options, const Grid& grid,
                                      const SupercubeSet& set) {
   BuiltChannels built;
+  std::optional<Grid> whole;  // of the field, before it was cropped
+  if (!options.dims.empty()) {
+    whole.emplace();
+    std::copy_n(options.dims.begin(), 3, whole->dims.begin());
+  } else if (const NamedVolume field = named_volume(options.input, options.part); !options.crop.empty() && !inputs.empty()) {
+    const auto header = read_volume_header(field.path, field.part);
+    if (header && *header) whole = (*header)->grid;
+  }
   for (const ChannelInput& input : inputs) {
     Progress progress("channel " + printable(input.name));
     NamedVolume named = named_volume(input.file.string());
     const auto header = read_volume_header(named.path, named.part);
     const bool has_several = header && *header && (*header)->time_points > 1, has_parts = header && *header && !(*header)->parts.empty();
     if (has_parts && !named.part) named.part = options.part;
-    auto volume = read_volume(named.path, {}, has_several ? options.time_point : std::nullopt, named.part, crop_of(options));
+    if (whole && header && *header && (*header)->grid.dims != whole->dims)
+      return fail(text_of_dims("channel '" + printable(input.name) + "'", (*header)->grid) + text_of_dims(", the field", *whole));
+    auto volume =
+        read_volume(named.path, {}, has_several && !(*header)->time_point ? options.time_point : std::nullopt, named.part, crop_of(options));
     if (!volume) return tl::unexpected(volume.error());
     if (auto added = add_channel(built, *volume, input.name, input.step, options.nan, grid, set); !added) return tl::unexpected(added.error());
   }
@@ -242,7 +257,8 @@ Result<void> run(const BuildCommand& options) {
   if (!volume) return tl::unexpected(volume.error());
   if (volume->components != 1)
     return misuse("'" + options.input + "' has vectors: choose a component with --part 0, 1 or 2; --channel reads all of it");
-  if (auto finite = check_finite(*volume, options.nan); !finite) return finite;
+  const auto crop = crop_of(options);
+  if (auto finite = check_finite(*volume, options.nan, crop ? crop->first : SampleBox{}.first); !finite) return finite;
   if (auto set = set_labels(options, volume->labels); !set) return set;
   volume->name = std::filesystem::path(options.output).stem().string();
 
@@ -299,7 +315,7 @@ void add_build_command(Program& program) {
   command
       .add_option("--part,--series", o->part,
                   "Which volume of a file or folder with several, such as a DICOM series: its name, as info tells it. Of a file with several numbers "
-                  "a sample: which of them; the first is 0")
+                  "a sample, or several time points: which of them; the first is 0")
       ->type_name("NAME");
   command
       .add_option("--crop", o->crop,

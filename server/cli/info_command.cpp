@@ -138,7 +138,7 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header,
                       header.components == 1 ? "" : fmt::format(", {} numbers a sample", header.components));
   if (header.components > 1 && !header.component)
     text += fmt::format("numbers   {}: choose one with build --part, 0 to {}\n", header.components, header.components - 1);
-  if (header.time_points > 1)
+  if (header.time_points > 1 && !header.time_point)
     text += fmt::format("times     {}: choose one with build --time-point, 0 to {}\n", header.time_points, header.time_points - 1);
   if (header.slope != 1 || header.intercept != 0)
     text += fmt::format("values    {:g} times the stored number, plus {:g}\n", header.slope, header.intercept);

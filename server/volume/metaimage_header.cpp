@@ -121,8 +121,8 @@ Result<VolumeHeader> read_metaimage_header(const InputFile& file) {
   const auto type = lines.has("elementtype") ? metaimage_type(lines.value.at("elementtype")) : std::nullopt;
   if (!type) return unusable("ElementType, of integers of 8 to 32 bits or floats,");
   header.type = *type;
-  if (!take(lines.find({"elementnumberofchannels"}), channels, {1})) return unusable("ElementNumberOfChannels");
-  if (auto few = check_components(std::uint64_t(std::max<std::int64_t>(0, channels[0])), name); !few) return tl::unexpected<Error>(few.error());
+  if (!take(lines.find({"elementnumberofchannels"}), channels, {1}) || channels[0] < 0) return unusable("ElementNumberOfChannels");
+  if (auto few = check_components(std::uint64_t(channels[0]), name); !few) return tl::unexpected<Error>(few.error());
   header.components = unsigned(channels[0]);
   const auto affine = sides.size() == 3 ? metaimage_affine<3>(lines, name) : metaimage_affine<4>(lines, name);
   if (!affine) return tl::unexpected<Error>(affine.error());

@@ -174,7 +174,7 @@ Result<VolumeHeader> read_nifti_header(const InputFile& file) {
   const Version& version = *found->version;
   const Fields fields(*start, *found);
   header.format = version.name;
-  header.labels.space = "RAS";
+  if (fields.has_qform() || fields.has_sform()) header.labels.space = "RAS";
   header.big_endian = found->big_endian;
 
   const std::int64_t axes = fields.dim(0);

@@ -1,7 +1,7 @@
 // teem parses the grammar of fields, their aliases and types, but is not safe with hostile input. It overflows buffers
 // on long lines (its messages) and long words (its text reader), takes the header's file name for a printf format, and
 // leaves gzip's checksum unread. So the header is cut out and screened here, teem parses what is left, from memory and
-// without touching any file, and the data is read in volume_data.cpp.
+// without touching any file, and the data is read in file_samples.cpp.
 #include "server/volume/nrrd_header.h"
 
 #include <teem/biff.h>
@@ -266,7 +266,9 @@ Result<VolumeHeader> read_nrrd_header(const InputFile& file) {
   if (header) {
     header->data_file = screened->data_file;
     header->labels = screened->labels;
-    header->labels.space = space_of(nrrd->space);
+    const bool has_directions =
+        std::any_of(nrrd->axis, nrrd->axis + nrrd->dim, [](const NrrdAxisInfo& axis) { return !std::isnan(axis.spaceDirection[0]); });
+    if (nrrd->spaceDim > 0 && has_directions) header->labels.space = space_of(nrrd->space);
     header->data_offset = screened->data_file ? 0 : screened->end;
   }
   return header;

@@ -74,7 +74,7 @@ std::string decoded_start(const InputFile& file) {
 Result<void> choose_part(VolumeHeader& header, const std::optional<std::string>& part, const std::string& where) {
   if (!part) return {};
   const std::uint64_t parts = header.components > 1 ? header.components : header.time_points;
-  if (parts == 1) return misuse(where + " has one volume: leave out --part");
+  if (parts == 1) return misuse(where + " has one volume: leave out --part, or what follows ':'");
   const auto number = number_of<std::uint64_t>(std::string_view(*part).substr(part->starts_with('/') ? 1 : 0));
   if (!number || *number >= parts) return misuse(where + " has no part '" + printable(*part) + "': its parts are 0 to " + std::to_string(parts - 1));
   (header.components > 1 ? header.component : header.time_point) = *number;
@@ -87,13 +87,17 @@ std::string name_of(const std::filesystem::path& path) {
   return whole.has_filename() ? whole.stem().string() : whole.parent_path().filename().string();  // a folder's may end with '/'
 }
 
-std::string position_of(std::size_t index, const Grid& grid) {
+// first: of the samples that were read, in the file.
+std::string position_of(std::size_t index, const Grid& grid, const std::array<std::int64_t, 3>& first) {
   const auto x = static_cast<std::size_t>(grid.dims[0]), y = static_cast<std::size_t>(grid.dims[1]);
-  return std::string("(") + std::to_string(index % x) + ", " + std::to_string(index / x % y) + ", " + std::to_string(index / x / y) + ")";
+  const std::array<std::size_t, 3> at{index % x, index / x % y, index / x / y};
+  std::string text = "(";
+  for (std::size_t axis = 0; axis < 3; ++axis) text += (axis == 0 ? "" : ", ") + std::to_string(std::int64_t(at[axis]) + first[axis]);
+  return text + ")";
 }
 
 template <class Float>
-Result<void> check_floats(std::span<Float> samples, std::optional<double> replacement, const Volume& volume) {
+Result<void> check_floats(std::span<Float> samples, std::optional<double> replacement, const Volume& volume, const std::array<std::int64_t, 3>& at) {
   const auto bad = [](Float value) { return !std::isfinite(value); };
   if (replacement) {
     const auto value = static_cast<Float>(*replacement);
@@ -103,7 +107,7 @@ Result<void> check_floats(std::span<Float> samples, std::optional<double> replac
   }
   const auto first = std::find_if(samples.begin(), samples.end(), bad);
   if (first == samples.end()) return {};
-  return fail(std::string("sample ") + position_of(static_cast<std::size_t>(first - samples.begin()) / volume.components, volume.grid) + " of '" +
+  return fail(std::string("sample ") + position_of(static_cast<std::size_t>(first - samples.begin()) / volume.components, volume.grid, at) + " of '" +
               volume.name + "' is " + (std::isnan(*first) ? "NaN" : "infinite") + "; give such samples a value with --nan VALUE");
 }
 
@@ -154,10 +158,14 @@ Result<std::unique_ptr<VolumeReader>> open_volume(const std::filesystem::path& p
         in_quotes(path) +
         " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM, HDF5 or Zarr: say what its raw samples are with --dims X Y Z and --type TYPE");
   const VolumeHeader& found = **header;
-  if (found.time_point) time_point = found.time_point;
+  if (found.time_point) {
+    if (time_point && time_point != found.time_point)
+      return misuse(in_quotes(path) + ": --part and --time-point choose different time points: give one of them");
+    time_point = found.time_point;
+  }
   if (!found.component && found.components != 1 && found.components != kVectorComponents)
     return misuse(in_quotes(path) + " has " + std::to_string(found.components) + " numbers a sample: choose one, 0 to " +
-                  std::to_string(found.components - 1) + ", with --part");
+                  std::to_string(found.components - 1) + ", with --part, of a channel with FILE:/N");
   const auto file = InputFile::open(path);
   if (!file) return tl::unexpected<Error>(file.error());
   return open_samples(*file, found, time_point);
@@ -186,11 +194,11 @@ Volume component_of(const Volume& volume, unsigned component) {
   return one;
 }
 
-Result<void> check_finite(Volume& volume, std::optional<double> replacement) {
+Result<void> check_finite(Volume& volume, std::optional<double> replacement, const std::array<std::int64_t, 3>& first) {
   auto* const data = volume.bytes.data();
   const auto count = volume.bytes.size() / size_of(volume.type);
-  if (volume.type == SampleType::f32) return check_floats(std::span(reinterpret_cast<float*>(data), count), replacement, volume);
-  if (volume.type == SampleType::f64) return check_floats(std::span(reinterpret_cast<double*>(data), count), replacement, volume);
+  if (volume.type == SampleType::f32) return check_floats(std::span(reinterpret_cast<float*>(data), count), replacement, volume, first);
+  if (volume.type == SampleType::f64) return check_floats(std::span(reinterpret_cast<double*>(data), count), replacement, volume, first);
   return {};
 }
 

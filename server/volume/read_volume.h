@@ -1,6 +1,7 @@
 // Reads volumes in any supported format, and checks their samples.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -46,7 +47,7 @@ INTERVALE_EXPORT Result<Volume> read_volume(const std::filesystem::path& path, c
 [[nodiscard]] INTERVALE_EXPORT Volume component_of(const Volume& volume, unsigned component);
 
 // Fails if a sample is NaN or infinite, and gives the (i, j, k) of the first one; a replacement, if given, is stored in
-// all of them instead. A replacement that is not finite in the volume's type is misuse.
-INTERVALE_EXPORT Result<void> check_finite(Volume& volume, std::optional<double> replacement);
+// all of them instead. A replacement that is not finite in the volume's type is misuse. first: where a crop begins.
+INTERVALE_EXPORT Result<void> check_finite(Volume& volume, std::optional<double> replacement, const std::array<std::int64_t, 3>& first = {});
 
 }  // namespace intervale

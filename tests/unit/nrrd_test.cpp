@@ -82,7 +82,9 @@ TEST(Nrrd, LabelsThatCannotBeAreIgnored) {
     return volume ? volume->labels : Labels{};
   };
   EXPECT_EQ(labels("space dimension: 3\nspace units: \"mm\" \"mm\" \"mm\"\ncontent:  a head \nsample units: HU\n"), (Labels{"mm", "a head", "HU"}));
-  EXPECT_EQ(labels("space: left-posterior-superior\n"), (Labels{"", "", "", "LPS"}));
+  const std::string directions = "space directions: (1,0,0) (0,1,0) (0,0,1)\n";
+  EXPECT_EQ(labels("space: left-posterior-superior\n" + directions), (Labels{"", "", "", "LPS"}));
+  EXPECT_EQ(labels("space: left-posterior-superior\n"), Labels{}) << "no axis lies in it";
   EXPECT_EQ(labels("space dimension: 3\nspace units: \"mm\" \"mm\" \"m\"\n"), Labels{}) << "they differ";
   EXPECT_EQ(labels("content: " + std::string(65, 'x') + "\nsample units: \xff\n"), Labels{});
   EXPECT_EQ(labels("content: \x1b[2J\nsample units: \"unfinished\n"), Labels{});

@@ -103,10 +103,14 @@ class Viewer {
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
     wanted.is_opaque = view["opaque"].as<bool>();
+    // The last surface, if it shows the same, and more of it is still to come.
+    const auto& last = session_.view();
+    const bool hides = wanted.is_opaque && last && last->is_opaque && last->shown == wanted.shown && !is_previewing_ && !done();
+    const std::optional<DepthMap> depth = hides ? depth_map(wanted.camera) : std::nullopt;
     stale_ = true;  // a budget hides and shows at once
     is_previewing_ = false;
     for (DrawnRange& range : drawn_) range.use_exact();
-    const auto looked = session_.look(wanted, wanted.is_opaque ? depth_map(wanted.camera) : std::nullopt);
+    const auto looked = session_.look(wanted, depth);
     fit_to_mesh();
     return text_of(looked);
   }
@@ -224,7 +228,7 @@ class Viewer {
     }
     for (std::size_t i = drawn_.size(); i < ranges_sent_; ++i) reset.call<void>("push", double(i));
     ranges_sent_ = drawn_.size();
-    if (session_.wants_depth_map()) {
+    if (session_.wants_depth_map() && !is_previewing_) {
       if (auto map = depth_map(session_.view()->camera)) session_.send_depth_map(std::move(*map));
     }
     val result = val::object();

@@ -170,13 +170,13 @@ class Page {
     const pose = this.viewer.pose();
     if (!pose) return null;
     const { canvas } = this.viewer.picture;
-    const { pixelError, region, memory, clip, tets, wireframe, probe } = view.value;
+    const { pixelError, region, memory, clip, tets, thickness, wireframe, probe } = view.value;
     const hides = stylesOf(view.value).every((styles) => Object.values(styles).every(({ opacity }) => opacity === 1));
     const viewport: [number, number] = [canvas.width, canvas.height];
     const { dataset } = status.value;
     const volume = view.value.render === 'volume' && this.viewer.picture.volume.isAvailable;
     const maxTets = volume ? Math.min(view.value.maxTets ?? Infinity, kMostVolumeTets) : view.value.maxTets;
-    const opaque = hides && !volume && !clip && !wireframe && !tets;
+    const opaque = hides && !volume && !clip && !wireframe && !tets && !thickness;
     const [ranges, uniform] = [dataset ? rangesOf(dataset, view.value) : [], volume && !!dataset?.hasRangesWithin];
     const channel = channelOf(dataset, view.value)?.name ?? null;
     return {

@@ -184,11 +184,17 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
     return dataset.channels.find(({ name }) => name === this.options.colorBy) ?? null;
   }
 
+  // Nothing behind the surfaces is to be seen, whatever the materials are.
+  private get isOpaque(): boolean {
+    const shown = this.materials.slice(0, Math.max(1, this.ranges.length)).flat();
+    return shown.every((m) => m.visible && !m.transparent && !m.clippingPlanes?.length && !('wireframe' in m && m.wireframe));
+  }
+
   private view(dataset: Dataset): Partial<View> {
     const viewport: [number, number] = [this.viewport.x, this.viewport.y];
     const { ranges } = this;
     const channel = this.channelOf(dataset)?.name ?? null;
-    const common = { ranges, channel, pixelError: this.options.pixelError ?? 1, opaque: true };
+    const common = { ranges, channel, pixelError: this.options.pixelError ?? 1, opaque: this.camera !== null && this.isOpaque };
     return this.camera ? { ...common, camera: { ...this.pose(this.camera), viewport } } : { ...common, camera: viewOf(dataset, viewport).camera };
   }
 
