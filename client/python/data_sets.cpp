@@ -1,11 +1,16 @@
 #include <oneapi/tbb/global_control.h>
 #include <pybind11/functional.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "client/python/bindings.h"
@@ -58,6 +63,18 @@ py::array samples_of(const py::object& self) {
   return array;
 }
 
+using FirstAndLast = std::array<std::array<std::int64_t, 2>, 3>;  // on x, y and z
+
+std::optional<SampleBox> box_of(const std::optional<FirstAndLast>& crop) {
+  if (!crop) return {};
+  SampleBox box;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.first[axis] = (*crop)[axis][0];
+    box.last[axis] = (*crop)[axis][1];
+  }
+  return box;
+}
+
 DataSet build_data_set(const Volume& volume, std::optional<std::array<double, 2>> range, const std::string& refine, std::optional<double> step,
                        std::optional<double> nan, const std::vector<std::tuple<std::string, Volume, std::optional<double>>>& channels,
                        std::function<void(double)> progress, unsigned threads) {
@@ -82,6 +99,7 @@ py::dict info_of(const DataSetInfo& info) {
   result["unit"] = info.labels.unit;
   result["field"] = info.labels.field;
   result["field_unit"] = info.labels.field_unit;
+  result["space"] = info.labels.space;
   result["range"] = info.shown ? py::object(py::make_tuple(info.shown->range.alpha, info.shown->range.beta)) : py::none();
   result["values"] = py::make_tuple(info.values.alpha, info.values.beta);
   result["max_error"] = info.max_error;
@@ -97,23 +115,29 @@ py::dict info_of(const DataSetInfo& info) {
 void add_data_sets(py::module_& module) {
   py::class_<Volume>(module, "RawVolume")
       .def(py::init([](const py::array& array, const std::array<double, 12>& affine, std::string name, std::string unit, std::string field,
-                       std::string field_unit) {
-             return make_volume(array, affine, std::move(name), {std::move(unit), std::move(field), std::move(field_unit)});
+                       std::string field_unit, std::string space) {
+             return make_volume(array, affine, std::move(name), {std::move(unit), std::move(field), std::move(field_unit), std::move(space)});
            }),
-           py::arg("array"), py::arg("affine"), py::arg("name"), py::arg("unit"), py::arg("field"), py::arg("field_unit"))
+           py::arg("array"), py::arg("affine"), py::arg("name"), py::arg("unit"), py::arg("field"), py::arg("field_unit"), py::arg("space"))
       .def_property_readonly("array", &samples_of)
       .def_property_readonly("affine", [](const Volume& v) { return v.grid.affine.rows; })
       .def_property_readonly("name", [](const Volume& v) { return v.name; })
       .def_property_readonly("unit", [](const Volume& v) { return v.labels.unit; })
       .def_property_readonly("field", [](const Volume& v) { return v.labels.field; })
-      .def_property_readonly("field_unit", [](const Volume& v) { return v.labels.field_unit; });
+      .def_property_readonly("field_unit", [](const Volume& v) { return v.labels.field_unit; })
+      .def_property_readonly("space", [](const Volume& v) { return v.labels.space; });
+  module.def(
+      "named_volume",
+      [](const std::filesystem::path& text, const std::optional<std::string>& part) {
+        NamedVolume named = named_volume(text.string(), part);
+        return std::pair(std::move(named.path), std::move(named.part));
+      },
+      py::arg("text"), py::arg("part"));
   module.def(
       "read",
-      [](const std::string& path, const std::optional<std::string>& part, std::optional<std::uint64_t> time_point) {
-        const NamedVolume named = named_volume(path, part);
-        return value_of(read_volume(named.path, {}, time_point, named.part), Kind::format);
-      },
-      py::arg("path"), py::arg("part"), py::arg("time_point"), Release());
+      [](const std::filesystem::path& path, const std::optional<std::string>& part, std::optional<std::uint64_t> time_point,
+         const std::optional<FirstAndLast>& crop) { return value_of(read_volume(path, {}, time_point, part, box_of(crop)), Kind::format); },
+      py::arg("path"), py::arg("part"), py::arg("time_point"), py::arg("crop"), Release());
   module.def(
       "sample", [](const std::string& name, int size) { return value_of(make_sample(name, size), Kind::format); }, py::arg("name"), py::arg("size"),
       Release());

@@ -93,6 +93,9 @@ class Volumes(Package):
             np.testing.assert_array_equal(volume.array, array)
             np.testing.assert_allclose(volume.affine, expected.affine)
         self.assertEqual(intervale.Volume.wrap(xarray).field_unit, "HU")
+        self.assertEqual([intervale.Volume.wrap(image).space for image in (vtk, nibabel, xarray, sitk)], ["", "RAS", "", "LPS"])
+        self.assertEqual(intervale.Volume.wrap(nibabel, space="LPS").space, "LPS")
+        self.assertEqual(intervale.Volume.wrap(nibabel, affine=np.eye(4)).space, "")
         places["z"] = places["z"] ** 2
         self.assertRaises(ValueError, intervale.Volume.wrap, xarray)
 
@@ -105,6 +108,54 @@ class Volumes(Package):
         self.assertRaises(ValueError, intervale.build, intervale.Volume(ball(), spacing=(0, 1, 1)))
         (self.folder / "bad.nrrd").write_bytes(b"NRRD0004\ntype: what\n")
         self.assertRaises(intervale.FormatError, intervale.read, self.folder / "bad.nrrd")
+
+
+    def test_a_box_of_a_file(self):
+        volume = intervale.Volume(ball(), spacing=(1, 2, 3), origin=(4, 5, 6))
+        path = self.write_nrrd(ball(), "left-posterior-superior")
+        part = intervale.read(path, crop=((2, 20), (0, 28), (7, 8)))
+        np.testing.assert_array_equal(part.array, volume.array[7:9, 0:29, 2:21])
+        self.assertEqual(part.spacing, (1, 2, 3))
+        self.assertEqual(part.origin, (6, 5, 27))
+        whole = intervale.read(path, crop=np.array([[0, 26], [0, 28], [0, 32]]))
+        np.testing.assert_array_equal(whole.array, volume.array)
+        for wrong in (((0, 27), (0, 28), (0, 32)), ((-1, 9), (0, 28), (0, 32)), ((5, 4), (0, 28), (0, 32)),
+                      ((5, 5), (0, 28), (0, 32)), ((0, 9), (0, 9)), ((0, 9), (0, 9), (0, 9, 9))):
+            self.assertRaises(ValueError, intervale.read, path, crop=wrong)
+        self.assertRaises(TypeError, intervale.read, path, crop=((0, 9.5), (0, 9), (0, 9)))
+        self.assertRaises(TypeError, intervale.read, path, crop=9)
+
+    def test_where_the_axes_point_to(self):
+        path = self.write_nrrd(ball(), "left-posterior-superior")
+        self.assertEqual(intervale.read(path).space, "LPS")
+        self.assertEqual(intervale.read(path, crop=((0, 9), (0, 9), (0, 9))).space, "LPS")
+        data_set = intervale.build(path)
+        data_set.save(self.folder / "ball.ivm")
+        self.assertEqual([data_set.space, intervale.open(self.folder / "ball.ivm").space], ["LPS", "LPS"])
+        self.assertEqual(intervale.build(intervale.Volume(ball(), space="RAS")).space, "RAS")
+        self.assertEqual(intervale.build(ball()).space, "")
+        self.assertRaises(ValueError, intervale.build, intervale.Volume(ball(), space="x" * 65))
+
+    def test_what_is_not_there(self):
+        np.save(self.folder / "ball.npy", ball())
+        for call in (intervale.read, intervale.build):
+            for name in ("none.npy", "none.h5:/array", "none.zarr:/0/1", "none/ball.npy"):
+                for path in (self.folder / name, str(self.folder / name)):
+                    with self.assertRaises(FileNotFoundError) as caught:
+                        call(path)
+                    self.assertEqual(str(caught.exception.filename), str(path).split(":")[0])
+        self.assertRaises(FileNotFoundError, intervale.read, self.folder / "none.h5", "/array")
+        self.assertRaises(FileNotFoundError, intervale.build, ball(), channels={"flow": self.folder / "none.npy"})
+        self.assertRaises(ValueError, intervale.read, f"{self.folder}/ball.npy:/array")
+
+    def write_nrrd(self, array, space):
+        """At spacing 1, 2, 3 from 4, 5, 6."""
+        path = self.folder / "ball.nrrd"
+        sizes = " ".join(map(str, reversed(array.shape)))
+        header = ("NRRD0004", "type: float", "dimension: 3", f"space: {space}", f"sizes: {sizes}",
+                  "space directions: (1,0,0) (0,2,0) (0,0,3)", "space origin: (4,5,6)", "endian: little", "encoding: raw")
+        path.write_bytes("\n".join(header).encode() + b"\n\n" + array.astype("<f4").tobytes())
+        return path
 
 
 class DataSets(Package):
@@ -204,13 +255,13 @@ class DataSets(Package):
 
 class Streams(Package):
     def test_coarse_to_fine_and_other_ranges(self):
-        every = intervale.build(intervale.Volume(ball(65), name="the ball"))
+        every = intervale.build(intervale.Volume(ball(65), name="the ball", space="RAS"))
         with intervale.serve(every) as server:
             self.assertIn(server.url, server._repr_html_())
             (listed,) = intervale.data_sets(server.address)
             url = f"{server.address}/{listed['name']}"
             with intervale.connect(url, (3, 9)) as stream:
-                self.assertEqual(stream.dims, every.dims)
+                self.assertEqual((stream.dims, stream.space), (every.dims, "RAS"))
                 updates = [state.updates for state in stream]
                 self.assertEqual(updates, sorted(updates))
                 self.assertEqual(stream.mesh.digest, every.extract((3, 9)).digest)

@@ -25,3 +25,8 @@ def built(array: NDArray[Any]) -> intervale.DataSet:
     mesh = data_set.extract([(1, 2), (3, 4)], error_percent=1, channels=["flow"])
     mesh.save("mesh.vtu")
     return data_set
+
+
+def corner_of(path: Path) -> tuple[intervale.Volume, str]:
+    corner = intervale.read(path, part="1", crop=((0, 31), (0, 31), (0, 31)))
+    return intervale.Volume(corner.array, affine=corner.affine, space=corner.space), intervale.build(corner).space

@@ -10,7 +10,8 @@
         state.mesh                                    # coarse first, then finer
 
 Positions are in the world that the volume's affine says, lengths in its unit. Ranges are closed, and may be infinite.
-Wrong arguments raise ValueError, damaged files FormatError, servers that fail ConnectionError.
+Wrong arguments raise ValueError, damaged files FormatError, missing files FileNotFoundError, servers that fail
+ConnectionError.
 """
 
 from ._data_sets import DataSet, Histogram, build, decode, open

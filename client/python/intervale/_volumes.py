@@ -1,5 +1,6 @@
 """Volumes: from files, arrays, and the images of other packages."""
 
+import operator
 import os
 import sys
 
@@ -13,11 +14,12 @@ class Volume:
 
     array: NumPy, z, y, x (and the three components of vectors last), contiguous, of integers of 8, 16 or 32 bits or
     floats of 32 or 64 bits; a view of what was given where possible. affine: 3 x 4, from sample (i, j, k) on x, y, z to
-    the world. unit: of length; field, field_unit: what the values are; empty if not known.
+    the world. unit: of length; field, field_unit: what the values are; space: where the axes of the world point to, such
+    as "RAS" (right, anterior, superior) or "LPS"; empty if not known.
     """
 
     def __init__(self, array, axes="zyx", spacing=None, origin=None, direction=None, affine=None, unit="", name="volume",
-                 field="", field_unit=""):
+                 field="", field_unit="", space=""):
         """axes: what the array's axes are, such as "zyx" or "xyz"; components of vectors come last, without a letter.
         spacing, origin: x, y, z, whatever the axes; default 1 and 0. direction: 3 x 3, its columns are the directions of
         x, y and z. affine: 3 x 4 or 4 x 4, instead of those three.
@@ -43,18 +45,21 @@ class Volume:
             raise ValueError("affine says what spacing, origin and direction say: give one or the other")
         if self.affine.shape != (3, 4):
             raise ValueError("affine is 3 x 4 or 4 x 4")
-        self.unit, self.name, self.field, self.field_unit = unit, name, field, field_unit
+        self.unit, self.name, self.field, self.field_unit, self.space = unit, name, field, field_unit, space
 
     @classmethod
     def wrap(cls, image, **more):
         """An image of SimpleITK, nibabel, VTK, PyVista or xarray, or whatever NumPy takes for an array. more: arguments
-        of Volume that take the place of what the image says. Files are for read().
+        of Volume that take the place of what the image says. The space of nibabel's images is RAS, of SimpleITK's LPS,
+        and of neither if more says where the samples lie. Files are for read().
         """
         if hasattr(image, "GetDirection") and hasattr(image, "GetSpacing") and hasattr(image, "GetPixelIDValue"):
             array = sys.modules["SimpleITK"].GetArrayViewFromImage(image)
-            found = {"spacing": image.GetSpacing(), "origin": image.GetOrigin(), "direction": image.GetDirection()}
+            found = {"spacing": image.GetSpacing(), "origin": image.GetOrigin(), "direction": image.GetDirection(),
+                     "space": "LPS"}
         elif hasattr(image, "dataobj") and hasattr(image, "affine"):  # nibabel
-            array, found = np.asanyarray(image.dataobj), {"axes": "xyz", "affine": image.affine, "unit": "mm"}
+            array = np.asanyarray(image.dataobj)
+            found = {"axes": "xyz", "affine": image.affine, "unit": "mm", "space": "RAS"}
         elif hasattr(image, "GetPointData") and hasattr(image, "GetDimensions"):  # VTK and PyVista
             array, found = _from_vtk(image)
         elif hasattr(image, "dims") and hasattr(image, "coords"):  # xarray
@@ -62,7 +67,7 @@ class Volume:
         else:
             array, found = image, {}
         if any(name in more for name in ("spacing", "origin", "direction", "affine")):
-            for name in ("spacing", "origin", "direction", "affine"):
+            for name in ("spacing", "origin", "direction", "affine", "space"):
                 found.pop(name, None)
         return cls(array, **{**found, **more})
 
@@ -82,12 +87,12 @@ class Volume:
 
     def _raw(self):
         return _intervale.RawVolume(self.array, self.affine.ravel().tolist(), self.name, self.unit, self.field,
-                                    self.field_unit)
+                                    self.field_unit, self.space)
 
     @classmethod
     def _of(cls, raw):
         return cls(raw.array, affine=np.reshape(raw.affine, (3, 4)), unit=raw.unit, name=raw.name, field=raw.field,
-                   field_unit=raw.field_unit)
+                   field_unit=raw.field_unit, space=raw.space)
 
 
 def _from_vtk(image):
@@ -122,11 +127,19 @@ def _from_xarray(image):
                           "field_unit": str(image.attrs.get("units", ""))}
 
 
-def read(path, part=None, time_point=None):
+def read(path, part=None, time_point=None, crop=None):
     """The volume of a file or folder: NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM, HDF5 ("file.h5:/array") or
-    Zarr. part: which series, channel or array of several, by name. time_point: of several, from 0.
+    Zarr. part: which series, channel or array of several, by name. time_point: of several, from 0. crop: ((i0, i1),
+    (j0, j1), (k0, k1)), the first and last sample to keep on x, y and z, both included; only they are in memory, and they
+    stay where they are in the world.
     """
-    return Volume._of(_intervale.read(os.fspath(path), part, time_point))
+    if crop is not None:
+        crop = [tuple(map(operator.index, ends)) for ends in crop]
+        if [len(ends) for ends in crop] != [2, 2, 2]:
+            raise ValueError("crop is ((i0, i1), (j0, j1), (k0, k1)): the first and last sample on x, y and z")
+    path, part = _intervale.named_volume(path, part)
+    os.stat(path)  # what is not there is FileNotFoundError, as of any other file
+    return Volume._of(_intervale.read(path, part, time_point, crop))
 
 
 def sample(name, size=129):
