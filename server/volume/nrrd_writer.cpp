@@ -3,7 +3,6 @@
 #include <string>
 #include <string_view>
 
-#include "common/util/atomic_file.h"
 #include "server/volume/nrrd.h"
 
 namespace intervale {
@@ -56,11 +55,17 @@ std::string header(const Volume& volume) {
 
 }  // namespace
 
-Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume) {
+Result<NrrdWriter> NrrdWriter::create(const std::filesystem::path& path, const Volume& volume) {
   auto file = AtomicFile::create(path);
-  if (!file) return tl::unexpected<Error>(file.error());
+  if (!file) return tl::unexpected(file.error());
   const auto text = header(volume);
-  if (auto written = file->write(std::as_bytes(std::span(text))); !written) return written;
+  if (auto written = file->write(std::as_bytes(std::span(text))); !written) return tl::unexpected(written.error());
+  return NrrdWriter(*std::move(file));
+}
+
+Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume) {
+  auto file = NrrdWriter::create(path, volume);
+  if (!file) return tl::unexpected(file.error());
   if (auto written = file->write(volume.bytes); !written) return written;
   return file->commit();
 }

@@ -10,8 +10,8 @@
 
 namespace intervale {
 
-inline constexpr int kMinSampleSize = 2;  // samples a side
-inline constexpr int kMaxSampleSize = 1024;
+inline constexpr int kMinSampleSize = 2;     // samples a side
+inline constexpr int kMaxSampleSize = 1024;  // of a volume in memory
 
 // buckyball: Gaussians at the atoms of C60, 0 to 255; atoms and bonds lie in [128, 188].
 // gyroid: sin x cos y + sin y cos z + sin z cos x over two periods, -1.5 to 1.5; 0 is the minimal surface.
