@@ -40,7 +40,7 @@ bool LoadViews::advance(Time now) {
 
 void LoadViews::asked(std::uint64_t epoch) {
   if (first_epoch_ == 0) first_epoch_ = epoch;
-  epoch_ = epoch;
+  asked_.push_back(epoch);
   for (Open& view : open_) view.epoch = std::min(view.epoch, epoch);
 }
 
@@ -50,11 +50,16 @@ void LoadViews::note_bytes(std::size_t bytes) {
 }
 
 void LoadViews::serve(std::uint64_t epoch, Time now) {
-  if (!served_ || served_->epoch != epoch) {
+  if (const auto first = first_epoch_of(epoch); !served_ || served_->epoch != first) {
     count_bytes();
-    served_ = {epoch};
+    served_ = {first};
   }
   answer(epoch, now);
+}
+
+std::uint64_t LoadViews::first_epoch_of(std::uint64_t epoch) {
+  while (asked_.size() > 1 && asked_[1] <= epoch) asked_.pop_front();
+  return asked_.front();
 }
 
 void LoadViews::answer(std::uint64_t epoch, Time now) {
@@ -67,10 +72,11 @@ void LoadViews::answer(std::uint64_t epoch, Time now) {
 }
 
 void LoadViews::finish(std::uint64_t epoch, bool is_all, Time now) {
-  ++stats_.done_views;
   has_mesh_ = true;  // if it is empty now, it stays so
-  is_complete_ = is_all && epoch == epoch_;
   serve(epoch, now);
+  is_complete_ = is_all && asked_.size() == 1;
+  // A view that is sent again while its Done is under way has a second one.
+  if (!std::exchange(served_->is_done, true)) ++stats_.done_views;
   for (; !open_.empty() && open_.front().epoch <= epoch; open_.pop_front(), --answered_) {
     stats_.view_done_ms.push_back(milliseconds(now - open_.front().due));
   }

@@ -33,7 +33,9 @@ class LoadViews {
   [[nodiscard]] Time next_due() const;  // Time::max(): no view will be
   // Goes to the newest view that is due; those before it count as sent with it. False if none is due.
   bool advance(Time now);
-  void asked(std::uint64_t epoch);  // the newest view was sent, with this epoch, which is greater than the last
+  // The newest view was sent, with this epoch, which is greater than the last. Those that follow, up to the next one told
+  // of here, are of the same view sent again: an answer to any of them is one to that view.
+  void asked(std::uint64_t epoch);
 
   // Of the last view that was due.
   [[nodiscard]] std::uint64_t number() const { return view_; }
@@ -41,6 +43,7 @@ class LoadViews {
   [[nodiscard]] bool is_only_one() const { return path_.scenario == Scenario::full; }
 
   // What arrives.
+  // Epochs never decrease.
   void serve(std::uint64_t epoch, Time now);                // an answer to every view up to this one
   void finish(std::uint64_t epoch, bool is_all, Time now);  // ... and its Done; is_all: there was room for all of it
   // Of a batch, after serve(): they are of the view that it served, and stale for those that still wait.
@@ -65,18 +68,21 @@ class LoadViews {
     std::uint64_t epoch = UINT64_MAX;  // not sent yet
     std::uint64_t stale_bytes = 0;     // until it was answered
   };
+  [[nodiscard]] std::uint64_t first_epoch_of(std::uint64_t epoch);  // of the view that was sent with this one
   void answer(std::uint64_t epoch, Time now);
   void count_bytes();
   CameraPath path_;
   Time start_;
   LoadStats& stats_;
-  Time first_;                // when the first one was due
-  std::uint64_t view_ = 0;    // number of the last one
-  std::uint64_t epoch_ = 0;   // of the last one sent
+  Time first_;              // when the first one was due
+  std::uint64_t view_ = 0;  // number of the last one
+  // Of the last one answered, and of those asked for after it; ascending.
+  std::deque<std::uint64_t> asked_;
   std::deque<Open> open_;     // in order
   std::size_t answered_ = 0;  // so many of them were: the first ones
   struct Served {
-    std::uint64_t epoch = 0, bytes = 0;
+    std::uint64_t epoch = 0, bytes = 0;  // its first epoch
+    bool is_done = false;
   };
   std::optional<Served> served_;   // the last view that was, and the bytes of its batches
   std::uint64_t first_epoch_ = 0;  // of the first one sent

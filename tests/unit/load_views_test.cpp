@@ -80,6 +80,56 @@ TEST(LoadViews, AreDoneWithTheDoneForThemOrForANewerOne) {
   EXPECT_EQ(c.stats.unanswered_views, 0u);
 }
 
+// Each has a newer epoch, and answers to it are those that the view waits for.
+TEST(LoadViews, OneThatIsSentAgainIsStillTheSameView) {
+  Client c;
+  c.views.begin(at(0));
+  c.views.asked(1);  // again as 2
+  c.views.serve(1, at(10));
+  c.views.note_bytes(5000);
+  c.views.serve(2, at(20));
+  c.views.note_bytes(6000);
+  EXPECT_TRUE(c.views.advance(at(200)));
+  c.views.asked(3);  // again as 4 and 5
+  c.views.serve(2, at(205));
+  c.views.note_bytes(700);
+  c.views.serve(3, at(210));
+  c.views.note_bytes(30);
+  EXPECT_TRUE(c.views.advance(at(400)));
+  c.views.serve(4, at(405));
+  c.views.note_bytes(4);
+  c.views.asked(6);           // again as 7, while the Done for 6 is under way
+  c.views.serve(5, at(410));  // it does not answer the view of 6
+  c.views.note_bytes(50);
+  EXPECT_EQ(c.stats.view_change_ms, (std::vector<double>{10}));
+  c.views.finish(6, true, at(420));
+  EXPECT_TRUE(c.views.is_complete()) << "what is sent again lacks nothing";
+  c.views.finish(7, true, at(430));
+  EXPECT_TRUE(c.views.is_complete());
+  c.views.report_rest(false, at(1000));
+  EXPECT_EQ(c.stats.view_change_ms, (std::vector<double>{10, 20}));
+  EXPECT_EQ(c.stats.view_done_ms, (std::vector<double>{220, 20}));
+  EXPECT_EQ(c.stats.stale_bytes, (std::vector<double>{700, 54}));
+  EXPECT_EQ(c.stats.view_bytes, (std::vector<double>{84, 0}));
+  EXPECT_EQ(c.stats.views, 3u);
+  EXPECT_EQ(c.stats.done_views, 1u);
+  EXPECT_EQ(c.stats.unanswered_views, 0u);
+  EXPECT_EQ(c.stats.complete, 1u);
+}
+
+TEST(LoadViews, AreCompleteWithTheDoneForTheNewestOnly) {
+  Client c;
+  c.views.begin(at(0));
+  c.views.asked(1);
+  EXPECT_TRUE(c.views.advance(at(200)));
+  c.views.asked(3);
+  c.views.finish(2, true, at(210));
+  EXPECT_FALSE(c.views.is_complete());
+  c.views.finish(4, false, at(220));
+  EXPECT_FALSE(c.views.is_complete()) << "there was no room";
+  EXPECT_EQ(c.stats.done_views, 2u);
+}
+
 // The first view brings the mesh, and later ones change it.
 TEST(LoadViews, TheBytesOfEachAnsweredViewButTheFirstCount) {
   Client c;
