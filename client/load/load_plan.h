@@ -38,6 +38,8 @@ struct LoadOptions {
   bool verify = false;
   Budget budget;       // of each of these meshes
   RangeRequest shown;  // of the data set; ranges are needed if it has every range
+  // Tell the server what the mesh of each client hides, as the viewer does. Requires verify, and a scenario with cameras.
+  bool depth_maps = false;
   // How long a client tries to reach a lost server again; off: the client has failed. Requires verify: without a mesh
   // there is nothing to resume with.
   std::optional<LoadClock::duration> reconnect;

@@ -56,8 +56,8 @@ std::optional<Percentiles> percentiles_of(std::vector<double> samples) {
 void LoadStats::add(LoadStats&& other) {
   for (const auto member :
        {&LoadStats::connected, &LoadStats::failed, &LoadStats::updates, &LoadStats::bytes, &LoadStats::views, &LoadStats::late_views,
-        &LoadStats::unanswered_views, &LoadStats::done_views, &LoadStats::complete, &LoadStats::protocol_closes, &LoadStats::reconnects,
-        &LoadStats::repeated_updates, &LoadStats::repeated_bytes, &LoadStats::resume_bytes}) {
+        &LoadStats::unanswered_views, &LoadStats::done_views, &LoadStats::depth_maps, &LoadStats::complete, &LoadStats::protocol_closes,
+        &LoadStats::reconnects, &LoadStats::repeated_updates, &LoadStats::repeated_bytes, &LoadStats::resume_bytes}) {
     this->*member += other.*member;
   }
   for (const auto member : {&LoadStats::first_mesh_ms, &LoadStats::first_mesh_bytes, &LoadStats::view_change_ms, &LoadStats::view_done_ms,
@@ -90,6 +90,7 @@ Json to_json(const LoadReport& report) {
             {"done_views", f.done_views},
             {"late_views", f.late_views},
             {"unanswered_views", f.unanswered_views},
+            {"depth_maps", f.depth_maps},
             {"threads", report.threads},
             {"own_cpu_share", rounded(report.own_cpu_share)},
             {"busiest_thread", rounded(report.busiest_thread)},
@@ -125,6 +126,7 @@ std::string to_text(const LoadReport& report) {
       "{} views, {} served to the end, {} sent late, {} unanswered; this harness took {:.0f} % of the machine, and its busiest thread {:.0f} % of a "
       "core\n",
       f.views, f.done_views, f.late_views, f.unanswered_views, 100 * report.own_cpu_share, 100 * report.busiest_thread);
+  if (f.depth_maps > 0) text += fmt::format("{} depth maps sent\n", f.depth_maps);
   if (f.reconnects > 0) {
     text += line_of("resumed within", f.resume_ms, "ms");
     text += fmt::format("{} sessions resumed; {} sent to name the updates of clients; {} updates, and {} in all, received twice\n", f.reconnects,

@@ -29,6 +29,7 @@ struct LoadStats {
   std::uint64_t late_views = 0;
   std::uint64_t unanswered_views = 0;  // at the end; view_change_ms has the time that they waited
   std::uint64_t done_views = 0;        // Done messages, but for a second one for the same view
+  std::uint64_t depth_maps = 0;        // sent
   std::uint64_t complete = 0;          // clients that received all of their last view
   std::uint64_t protocol_closes = 0;   // sessions that the server ended
   std::uint64_t reconnects = 0;        // connections after the first of a client

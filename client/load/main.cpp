@@ -43,6 +43,8 @@ Result<void> run(const LoadCommand& options) {
   if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
   const auto ranges = parse_ranges(options.range);
   if (!ranges) return tl::unexpected(ranges.error());
+  if (options.load.depth_maps && options.load.scenario == Scenario::full)
+    return misuse("--depth-maps tells what a camera sees, and the clients of --scenario full have none");
   LoadOptions load = options.load;
   load.shown = {*ranges, parse_refine(options.refine)};
   const auto report = run_load(*url, load);
@@ -134,6 +136,10 @@ void add_options(CLI::App& app, LoadCommand& options) {
                      "With --verify: most updates that each client keeps, some 15 bytes each; it gives up the least important ones, and the server "
                      "sends them again when needed"),
       0, 1e15, "N")
+      ->needs(verify);
+  app.add_flag("--depth-maps", load.depth_maps,
+               "With --verify: each client tells the server what its mesh hides, as the viewer does, for it to send that last; takes up to a fifth "
+               "of a second of a core for each map. Not for full")
       ->needs(verify);
   add_seconds(app, "--reconnect", load.reconnect, 0.1,
               "With --verify: how long a client tries to reach a lost server again, to resume (default: the client has failed)")

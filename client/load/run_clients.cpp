@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "client/core/client_session.h"
+#include "client/core/draw_depth_map.h"
 #include "client/load/load_connection.h"
 #include "client/load/load_views.h"
 #include "client/load/range_path.h"
@@ -156,7 +157,13 @@ class LoadClient {
     const Time before = LoadClock::now();
     const bool drags = plan_.scenario == Scenario::range;  // as the viewer does
     const auto coarse = drags ? std::optional(kCoarseErrorPercent) : std::nullopt;
-    (void)session_.look({lod, lod.camera, plan_.budget, shown(), drags, coarse});  // these ranges are of the data set
+    (void)session_.look({.lod = lod,
+                         .camera = lod.camera,
+                         .budget = plan_.budget,
+                         .shown = shown(),  // of the data set
+                         .early = drags,
+                         .coarse_error_percent = coarse,
+                         .is_opaque = plan_.depth_maps});
     const std::chrono::duration<double, std::milli> took = LoadClock::now() - before;
     if (sets_range) stats_.set_range_ms.push_back(took.count());
   }
@@ -230,7 +237,16 @@ class LoadClient {
     if (mesh && mesh->tet_count() > plan_.budget.max_tets && mesh->tet_count() > root_tets()) return fail("a mesh exceeds its budget");
     const bool is_seen = batch.updates > 0 && (!mesh || mesh->tet_count() > 0);
     if (is_seen) views_.note_mesh(session_.stats().bytes, mesh ? LoadClock::now() : now);
+    if (session_.wants_depth_map()) send_depth_map(*mesh);
     leave_if_answered();
+  }
+
+  // Of the view that was sent last, which is sent again with it.
+  void send_depth_map(const StreamClient& mesh) {
+    auto map = draw_depth_map(mesh, *views_.lod().camera);
+    if (!map) return;
+    session_.send_depth_map(*std::move(map));
+    ++stats_.depth_maps;
   }
 
   void take_done(const ClientSession::Event& done, Time now) {

@@ -5,15 +5,13 @@
 #include <utility>
 
 #include "client/core/backoff.h"
+#include "client/core/draw_depth_map.h"
 #include "client/net/connection.h"
-#include "common/mesh/boundary.h"
 
 namespace intervale {
 namespace {
 
 using Clock = ClientSession::Clock;
-
-constexpr std::uint64_t kMostUpdatesOfMap = 250'000;  // of a mesh that is drawn into a depth map: a fifth of a second
 
 class Fetch {
  public:
@@ -68,8 +66,10 @@ class Fetch {
     if (stats_.seconds_first_mesh == 0 && client.tet_count() > 0) stats_.seconds_first_mesh = elapsed();
     stats_.session = session_.stats();
     if (event->kind == ClientSession::Event::Kind::batch && events_.on_batch) events_.on_batch(client, stats_);
-    if (!session_.wants_depth_map() || client.updates() > kMostUpdatesOfMap) return {};
-    session_.send_depth_map(depth_map(client.mesh()));
+    if (!session_.wants_depth_map()) return {};
+    auto map = draw_depth_map(client, *options_.lod.camera);
+    if (!map) return {};
+    session_.send_depth_map(*std::move(map));
     return connection_->send(session_);
   }
 
@@ -87,13 +87,6 @@ class Fetch {
                           .shown = {options_.shown.ranges, refine},
                           .channels = options_.channels,
                           .is_opaque = options_.is_opaque});
-  }
-
-  // What the camera sees of a mesh.
-  [[nodiscard]] DepthMap depth_map(const Mesh& mesh) const {
-    DepthBuffer buffer(*options_.lod.camera);
-    for (const auto& [a, b, c] : boundary_triangles(mesh)) buffer.draw({mesh.points[a], mesh.points[b], mesh.points[c]});
-    return buffer.map();
   }
 
   // Fails with `why` once the time for it is over, or as stream() does.

@@ -150,6 +150,26 @@ TEST(Load, ClientsThatKeepLittleForgetWhatTheServerForgets) {
   EXPECT_GT(figures.at("updates"), 4 * 3000) << "something came again";
 }
 
+// The views are as many as without, and the meshes are as right.
+TEST(Load, ClientsTellWhatTheirMeshesHide) {
+  const EveryRangeFolder every;
+  ServerProgram one, any(every.file);
+  const std::vector<std::string> options{"--clients",     "3",   "--duration", "1", "--ramp",   "0",           "--views-per-second", "5",
+                                         "--pixel-error", "0.5", "--threads",  "2", "--verify", "--depth-maps"};
+  for (const std::string scenario : {"orbit", "range"}) {
+    std::vector<std::string> all = options;
+    all.insert(all.end(), {"--scenario", scenario});
+    const auto figures = load(scenario == "range" ? any.url("every") : one.url("buckyball"), all);
+    EXPECT_GE(figures.at("depth_maps"), 3) << scenario;
+    EXPECT_EQ(figures.at("verified"), 3);
+    EXPECT_EQ(figures.at("differing"), 0);
+    EXPECT_EQ(figures.at("unanswered_views"), 0);
+    EXPECT_LE(figures.at("views"), 3 * (1 + 5));
+    EXPECT_LE(figures.at("done_views"), figures.at("views"));
+  }
+  EXPECT_EQ(load(one.url("buckyball"), {"--clients", "1", "--duration", "0.5", "--verify"}).at("depth_maps"), 0);
+}
+
 TEST(Load, ARateIsKeptTo) {
   ServerProgram server;
   const auto figures = load(server.url("buckyball"), {"--clients", "2", "--duration", "0.5", "--ramp", "0", "--scenario", "full", "--rate", "40000"});
@@ -241,6 +261,8 @@ TEST(Load, WrongUsageIsStatus2) {
   expect_refusal(run(command(url, with({"--rate", "1"}))), 2, "--rate");
   expect_refusal(run(command(url, with({"--views-per-second", "0"}))), 2, "--views-per-second");
   expect_refusal(run(command(url, with({"--reconnect", "5"}))), 2, "--verify");
+  expect_refusal(run(command(url, with({"--depth-maps"}))), 2, "--verify");
+  expect_refusal(run(command(url, with({"--depth-maps", "--verify", "--scenario", "full"}))), 2, "--scenario full");
   expect_refusal(run(command("ws://127.0.0.1:1", good)), 2, "NAME");
   expect_refusal(run(command("http://127.0.0.1:1/x", good)), 2, "ws://");
 }
