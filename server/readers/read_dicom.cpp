@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -60,6 +61,10 @@ class Pixels {
     if (format.GetSamplesPerPixel() != 1) return fail(in_quotes(path) + " is in colour; a volume has one number a sample");
     const auto type = type_of(format);
     if (!type) return fail(in_quotes(path) + ": its pixels are no integers of 8, 16 or 32 bits and no floats");
+    // Writers do not agree on the order of these bytes, and the transfer syntax is retired (PS3.5, annex A.3).
+    if (format.GetBitsAllocated() == 32 &&
+        pixels->reader_.GetFile().GetHeader().GetDataSetTransferSyntax() == gdcm::TransferSyntax::ExplicitVRBigEndian)
+      return fail(in_quotes(path) + " has pixels of 32 bits, big endian: store it little endian first");
     pixels->type_ = *type;
     return pixels;
   }
@@ -74,10 +79,30 @@ class Pixels {
     out.resize(bytes);
     if (!image().GetBuffer(reinterpret_cast<char*>(out.data())))
       return fail(in_quotes(path_) + ": its pixels are damaged or coded in a way that is not read");
+    extend_signs(out);
     return {};
   }
 
  private:
+  // Some codecs leave the bits above those that are stored empty.
+  void extend_signs(std::vector<std::byte>& samples) const {
+    const gdcm::PixelFormat& format = image().GetPixelFormat();
+    if (format.GetPixelRepresentation() != 1 || format.GetBitsStored() == 0 || format.GetHighBit() + 1 != format.GetBitsStored()) return;
+    const int unused = format.GetBitsAllocated() - format.GetBitsStored();
+    const Volume shape{{}, {}, type_, {}};
+    visit_samples(shape, [&]<class T>(std::span<const T>) {
+      if constexpr (std::is_integral_v<T>) {
+        if (unused <= 0 || unused >= int(8 * sizeof(T))) return;
+        for (std::size_t at = 0; at + sizeof(T) <= samples.size(); at += sizeof(T)) {
+          T number;
+          std::memcpy(&number, &samples[at], sizeof number);
+          number = T(T(std::make_unsigned_t<T>(number) << unused) >> unused);
+          std::memcpy(&samples[at], &number, sizeof number);
+        }
+      }
+    });
+  }
+
   std::filesystem::path path_;
   gdcm::ImageReader reader_;
   SampleType type_ = SampleType::u8;

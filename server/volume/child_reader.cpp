@@ -133,9 +133,7 @@ class Child {
     if (is_stuck_) return {where + ": its reader has given nothing for a minute; is it damaged?"};
     output_.set(-1);
     const int status = wait();
-    std::string text(kMaxMessage, '\0');
-    text.resize(std::size_t(std::max<ssize_t>(0, ::pread(complaints_.get(), text.data(), text.size(), 0))));
-    text = text.substr(0, text.find('\n'));
+    const std::string text = last_complaint();
     const bool was_stopped = WIFSIGNALED(status) && WTERMSIG(status) != SIGPIPE;
     if (was_stopped) return {where + ": its reader was stopped by signal " + std::to_string(WTERMSIG(status)) + "; is it damaged?"};
     if (WIFEXITED(status) && (WEXITSTATUS(status) == 1 || WEXITSTATUS(status) == 2) && !text.empty())
@@ -144,6 +142,15 @@ class Child {
   }
 
  private:
+  // Its last line; those before are the libraries'.
+  [[nodiscard]] std::string last_complaint() const {
+    const off_t end = ::lseek(complaints_.get(), 0, SEEK_END), begin = std::max<off_t>(0, end - off_t(kMaxMessage));
+    std::string text(std::size_t(std::max<off_t>(0, end - begin)), '\0');
+    text.resize(std::size_t(std::max<ssize_t>(0, ::pread(complaints_.get(), text.data(), text.size(), begin))));
+    while (text.ends_with('\n')) text.pop_back();
+    return text.substr(text.rfind('\n') + 1);
+  }
+
   int wait() {
     int status = 0;
     const pid_t process = std::exchange(process_, 0);

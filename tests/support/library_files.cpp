@@ -51,7 +51,8 @@ std::string elements_of(const DicomImage& image, WriteElement write) {
   file += write(0x20, 0x32, "DS", image.position) + write(0x20, 0x37, "DS", image.orientation);
   const auto number = [write](std::uint16_t at, std::uint16_t value) { return write(0x28, at, "US", little(value)); };
   file += number(2, 1) + write(0x28, 4, "CS", "MONOCHROME2") + number(0x10, image.rows) + number(0x11, image.columns);
-  file += write(0x28, 0x30, "DS", "0.5\\0.25") + number(0x100, 16) + number(0x101, 16) + number(0x102, 15) + number(0x103, 1);
+  file += write(0x28, 0x30, "DS", "0.5\\0.25") + number(0x100, 16) + number(0x101, image.bits) + number(0x102, std::uint16_t(image.bits - 1)) +
+          number(0x103, 1);
   file += write(0x28, 0x1052, "DS", image.intercept) + write(0x28, 0x1053, "DS", image.slope);
   return file + write(0x7fe0, 0x10, "OW", samples(image.pixels));
 }

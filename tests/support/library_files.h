@@ -22,6 +22,7 @@ struct DicomImage {
   std::string series = "1.2.3", position = "0\\0\\0", orientation = "1\\0\\0\\0\\1\\0", slope = "1", intercept = "0";
   int instance = 1;
   std::uint16_t columns = 3, rows = 2;
+  std::uint16_t bits = 16;  // of those of a pixel that are stored
   std::vector<std::int16_t> pixels{};
 };
 [[nodiscard]] std::string dicom_file(const DicomImage& image);           // PS3.10, explicit little endian

@@ -276,6 +276,21 @@ TEST_F(Dicom, ImagesMayHaveScalesOfTheirOwn) {
   EXPECT_EQ(samples_of(*volume)[12], 200 - 1024);
 }
 
+// Of 13 bits, whatever the others are.
+TEST_F(Dicom, SignsAreThoseOfTheStoredBits) {
+  auto images = slices(2);
+  for (auto& image : images) {
+    image.bits = 13;
+    image.intercept = "0";
+    image.slope = "1";
+    image.pixels = {6192, -2000, 2000, 4095, 4096, 8191};
+  }
+  const auto volume = read_volume(scan(images), {});
+  ASSERT_TRUE(volume) << volume.error().message;
+  const std::vector<double> expected{-2000, -2000, 2000, 4095, -4096, -1};
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(samples_of(*volume)[i], expected[i]) << i;
+}
+
 TEST_F(Dicom, WhatIsDamagedIsNamed) {
   const auto path = scan(slices(3));
   const std::string whole = contents_of(path / "1");
