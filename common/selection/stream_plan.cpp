@@ -162,8 +162,7 @@ void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden) {
   if (searched_ != lod) {
     searched_ = lod;
     budget_.reset();
-    search_.reset();
-    if (lod.max_updates) search_ = std::make_shared<BudgetSearch>(volume_, relevant_, lod);
+    search_ = lod.max_updates ? std::make_shared<BudgetSearch>(volume_, relevant_, lod) : nullptr;
   }
   ranking_.emplace(*volume_, *relevant_, lod, hidden);
   rank_bricks();
@@ -390,14 +389,6 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
   Batch batch{encode_batch(*volume_, shown_, sent_, groups), builder.updates, {}};
   if (!wanted_channels_.empty()) batch.channels = send_values(groups, {});
   return batch;
-}
-
-std::size_t StreamPlan::memory_bytes() const {
-  std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
-  bytes += pending_.capacity() * sizeof(Pending) + steps_page_.capacity() * sizeof steps_page_[0] + steps_.capacity() * sizeof steps_[0];
-  if (ranking_) bytes += ranking_->memory_bytes();
-  for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
-  return bytes;
 }
 
 }  // namespace intervale

@@ -98,4 +98,12 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
   return Batch{{}, 0, send_values(groups, std::move(names))};
 }
 
+std::size_t StreamPlan::memory_bytes() const {
+  std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
+  bytes += pending_.capacity() * sizeof(Pending) + steps_page_.capacity() * sizeof steps_page_[0] + steps_.capacity() * sizeof steps_[0];
+  if (ranking_) bytes += ranking_->memory_bytes();
+  for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
+  return bytes;
+}
+
 }  // namespace intervale

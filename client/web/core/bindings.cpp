@@ -21,6 +21,7 @@
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
 #include "client/view/volume_tets.h"
+#include "client/web/core/js_values.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/mesh_digest.h"
 #include "common/view/palette.h"
@@ -28,44 +29,12 @@
 namespace intervale {
 namespace {
 
-using emscripten::val;
-
 constexpr std::uint64_t kMostTets = 200'000;            // drawn one by one
 constexpr std::uint64_t kMostTrianglesOfMap = 300'000;  // drawn into a depth map
 
 ViewingSession::Clock::time_point time_of(double milliseconds) {
   return ViewingSession::Clock::time_point(
       std::chrono::duration_cast<ViewingSession::Clock::duration>(std::chrono::duration<double, std::milli>(milliseconds)));
-}
-
-template <class T>
-val buffer_of(const std::vector<T>& items) {
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(items.data());
-  return val(emscripten::typed_memory_view(items.size() * sizeof(T), bytes)).call<val>("slice")["buffer"];
-}
-
-template <class Array>
-val array_of(const Array& items) {
-  val array = val::array();
-  for (std::size_t i = 0; i < items.size(); ++i) array.set(i, double(items[i]));
-  return array;
-}
-
-std::array<double, 3> three(const val& array) { return {array[0].as<double>(), array[1].as<double>(), array[2].as<double>()}; }
-Box box_of(const val& box) { return {three(box["min"]), three(box["max"])}; }
-
-// Pairs of numbers.
-std::vector<Range> ranges_of(const val& list) {
-  std::vector<Range> ranges;
-  const auto count = list["length"].as<unsigned>();
-  ranges.reserve(count);
-  for (unsigned i = 0; i < count; ++i) ranges.push_back({list[i][0].as<double>(), list[i][1].as<double>()});
-  return ranges;
-}
-
-// null: as much as there is.
-std::uint64_t limit_of(const val& number) {
-  return number.isNull() || number.isUndefined() ? UINT64_MAX : std::uint64_t(std::max(0.0, number.as<double>()));
 }
 
 // All palettes, the default first: {name, colours}; colours: 256 of them, red, green and blue, a byte each, sRGB. The
