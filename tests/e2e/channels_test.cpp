@@ -136,7 +136,7 @@ TEST_F(Channels, WrongUsageIsSaid) {
   complaint({"--channel-step", "heat=1"}, 2, "no channel is named 'heat'");
   complaint(both + Arguments{"--channel-step", "wind=fast"}, 2, "'fast' is not a number");
   complaint(both + Arguments{"--channel-step", "wind=-1"}, 2, "channel 'wind'");
-  expect_complaint(run({program("intervale"), "build", folder / "wind.nrrd", "-o", folder / "x.ivm"}), 2, "vectors are read by --channel",
+  expect_complaint(run({program("intervale"), "build", folder / "wind.nrrd", "-o", folder / "x.ivm"}), 2, "choose a component with --part 0, 1 or 2",
                    "intervale: ");
   const ServerProgram server(folder.path().string());
   expect_complaint(run({program("intervale"), "extract", one, "--channel", "rain"}), 2, "no channel 'rain'; it has heat, wind", "intervale: ");
