@@ -78,7 +78,13 @@ std::vector<std::byte> MissingNumbers::as_nan(std::span<const std::byte> samples
       std::memcpy(&out[i * sizeof(To)], &value, sizeof(To));
     }
   };
-  visit_type(type, [&]<class T>(T sample) { to == SampleType::f32 ? convert(sample, float()) : convert(sample, double()); });
+  visit_type(type, [&]<class T>(T sample) {
+    if (to == SampleType::f32) {
+      convert(sample, float());
+    } else {
+      convert(sample, double());
+    }
+  });
   return out;
 }
 

@@ -156,7 +156,7 @@ Result<void> write_volume(hid_t file, const Array& array, VolumeHeader header, c
   const double slope = header.slope, intercept = header.intercept;
   if (missing.any() && !is_float(array.type) && request.time_point < array.times()) {
     bool are_there = false;
-    const auto looked = read_slices(file, array, request, [&](std::span<const std::byte> samples) -> Result<void> {
+    auto looked = read_slices(file, array, request, [&](std::span<const std::byte> samples) -> Result<void> {
       are_there = missing.are_in(samples, array.type);
       return are_there ? fail("") : Result<void>();
     });

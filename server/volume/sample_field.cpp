@@ -24,7 +24,7 @@ std::vector<double> places_of(int size) {
 }
 
 template <class T>
-T number_of(double value, const SampleFormula& formula) {
+T stored_number(double value, const SampleFormula& formula) {
   if constexpr (std::is_floating_point_v<T>) {
     return T(value);
   } else {
@@ -68,7 +68,7 @@ void SampleField::fill(std::uint64_t first, std::span<std::byte> out) const {
       for (std::size_t i = some.begin(); i != some.end(); ++i) {
         row_((first + i) % places_, (first + i) / places_, values);
         std::transform(values.begin(), values.end(), numbers.begin() + std::ptrdiff_t(i * places_),
-                       [this](double value) { return number_of<T>(value, *formula_); });
+                       [this](double value) { return stored_number<T>(value, *formula_); });
       }
     });
   });
