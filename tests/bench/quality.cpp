@@ -120,7 +120,7 @@ struct Picture {
       wrong += most > kVisible;
     }
     to.decibels = sum == 0 ? 99 : std::min(99.0, 10 * std::log10(255.0 * 255 * double(pixels.size()) / sum));
-    to.wrong_percent = 100.0 * double(wrong) / double(pixels.size() / 3);
+    to.wrong_percent = 300.0 * double(wrong) / double(pixels.size());
   }
 
   // Of the full mesh's surface from a mesh's, and of that from the full one's: what is missing, and what is too much.
@@ -138,6 +138,7 @@ struct Picture {
  private:
   [[nodiscard]] Deviation of(const std::vector<Vector>& some, const SurfaceDistance& distance) const {
     std::vector<double> off;
+    off.reserve(some.size());
     for (const Vector& p : some) off.push_back(distance(p) * camera.pixels_per_unit(p));
     std::sort(off.begin(), off.end());
     return {off[off.size() / 2], off[off.size() * 9 / 10], off[off.size() * 99 / 100], off.back()};

@@ -134,7 +134,7 @@ TEST_F(Hdf5, UnevenCoordinatesAreRefusedByName) {
 
 // Samples from 0 on, in steps of 1, of which 5 stands for no value.
 TEST_F(Hdf5, FillValuesAreNoValues) {
-  const auto read_with = [this](const char* attribute, std::vector<double> missing, double slope, double offset) {
+  const auto read_with = [this](const char* attribute, const std::vector<double>& missing, double slope, double offset) {
     const hid_t file = create();
     add(file, "t", {2, 2, 2}, 0);
     add_attribute(file, "t", attribute, missing);
