@@ -46,7 +46,7 @@ using testing::Vector;
 
 constexpr double kPixelError = 1;
 constexpr double kEnough = 0.4;       // pixels: no need to look further
-constexpr double kFirstBytes = 4096;  // of the first picture that is measured; each further one has half as much again
+constexpr double kFirstBytes = 2048;  // of the first picture that is measured; each further one has half as much again
 
 using Sigma = std::shared_ptr<const IntervalVolume>;
 
