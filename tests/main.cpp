@@ -1,7 +1,7 @@
 // Runs the tests of one folder.
 #include <gmock/gmock.h>
 
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 
 int main(int argc, char** argv) {
   ::testing::InitGoogleMock(&argc, argv);

@@ -1,6 +1,6 @@
 // Makes a volume, builds a data set of every range from it, and extracts a mesh: build_and_extract OUT.ivm OUT.vtu
 #include <intervale/boundary.h>
-#include <intervale/data_set.h>
+#include <intervale/build.h>
 #include <intervale/mesh_digest.h>
 #include <intervale/mesh_writer.h>
 
@@ -34,7 +34,7 @@ int fail(const intervale::Error& error) {
 
 int main(int argc, char** argv) {
   if (argc != 3) return fail({"usage: build_and_extract OUT.ivm OUT.vtu"});
-  const auto ball = intervale::DataSet::build(make_ball());
+  const auto ball = intervale::build_data_set(make_ball());
   if (!ball) return fail(ball.error());
   if (auto saved = ball->save(argv[1]); !saved) return fail(saved.error());
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "client/python/bindings.h"
+#include "intervale/build.h"
 #include "intervale/data_set.h"
 #include "intervale/read_volume.h"
 #include "intervale/samples.h"
@@ -75,9 +76,9 @@ std::optional<SampleBox> box_of(const std::optional<FirstAndLast>& crop) {
   return box;
 }
 
-DataSet build_data_set(const Volume& volume, std::optional<std::array<double, 2>> range, const std::string& refine, std::optional<double> step,
-                       std::optional<double> nan, const std::vector<std::tuple<std::string, Volume, std::optional<double>>>& channels,
-                       std::function<void(double)> progress, unsigned threads) {
+DataSet build(const Volume& volume, std::optional<std::array<double, 2>> range, const std::string& refine, std::optional<double> step,
+              std::optional<double> nan, const std::vector<std::tuple<std::string, Volume, std::optional<double>>>& channels,
+              std::function<void(double)> progress, unsigned threads) {
   DataSetOptions options;
   if (range) options.range = Range{(*range)[0], (*range)[1]};
   if (refine != "boundary" && refine != "uniform") throw py::value_error("refine is 'boundary' or 'uniform'");
@@ -88,7 +89,7 @@ DataSet build_data_set(const Volume& volume, std::optional<std::array<double, 2>
   for (const auto& [name, samples, channel_step] : channels) options.channels.push_back({name, samples, channel_step});
   std::optional<tbb::global_control> limit;
   if (threads != 0) limit.emplace(tbb::global_control::max_allowed_parallelism, threads);
-  return value_of(DataSet::build(volume, std::move(options)), Kind::format);
+  return value_of(build_data_set(volume, std::move(options)), Kind::format);
 }
 
 py::dict info_of(const DataSetInfo& info) {
@@ -157,7 +158,7 @@ void add_data_sets(py::module_& module) {
       .def("_enclosed_volume", [](const DataSet& set, double low, double high) {
         return set.enclosed_volume({low, high});
       });
-  module.def("build", &build_data_set, py::arg("volume"), py::arg("range"), py::arg("refine"), py::arg("step"), py::arg("nan"), py::arg("channels"),
+  module.def("build", &build, py::arg("volume"), py::arg("range"), py::arg("refine"), py::arg("step"), py::arg("nan"), py::arg("channels"),
              py::arg("progress"), py::arg("threads"), Release());
   module.def(
       "open", [](const std::string& path) { return value_of(DataSet::open(path), Kind::format); }, py::arg("path"), Release());

@@ -232,6 +232,12 @@ Result<std::span<const std::byte>> Container::stream(StreamType type, std::size_
   return fail(name_of(std::uint32_t(type)) + " has " + std::to_string(found.size()) + " bytes, " + std::to_string(bytes) + " expected");
 }
 
+bool begins_as_ivm(const std::filesystem::path& path) {
+  char start[sizeof kMagic] = {};
+  std::ifstream(path, std::ios::binary).read(start, sizeof start);
+  return std::memcmp(start, kMagic, sizeof kMagic) == 0;
+}
+
 std::optional<FileScope> scope_of(std::span<const std::byte> file) {
   const auto head = read_head(file, file.size());
   return head ? std::optional(head->scope()) : std::nullopt;

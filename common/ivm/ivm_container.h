@@ -103,6 +103,9 @@ class Container {
   std::array<std::span<const std::byte>, kStreamTypes> streams_;
 };
 
+// Whether a file begins as an .ivm file of any version, whole or not.
+[[nodiscard]] bool begins_as_ivm(const std::filesystem::path& path);
+
 // The scope of a file, from its beginning. Nothing if it cannot be read, or is not a whole file of this version: those
 // who open it say why.
 [[nodiscard]] std::optional<FileScope> scope_of(const std::filesystem::path& path);

@@ -4,7 +4,7 @@
 
 #include "common/ivm/paged_values.h"
 #include "common/ivm/value_page.h"
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/value_steps.h"
 #include "server/volume/read_volume.h"

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/ivm/value_page.h"
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/make_volume_table.h"

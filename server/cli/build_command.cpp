@@ -13,11 +13,11 @@
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/value_file.h"
+#include "common/parallel/all_cores.h"
 #include "common/patch/visit_samples.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
-#include "server/builder/all_cores.h"
 #include "server/builder/build_data_set.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"

@@ -13,6 +13,7 @@
 #include "common/ivm/load_volume.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/join.h"
+#include "common/parallel/all_cores.h"
 #include "common/picture/picture.h"
 #include "common/picture/picture_options.h"
 #include "common/program/channel_option.h"
@@ -20,9 +21,8 @@
 #include "common/program/mesh_figures.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
+#include "common/ranges/extract_meshes.h"
 #include "common/util/printable.h"
-#include "server/builder/all_cores.h"
-#include "server/builder/extract_meshes.h"
 #include "server/cli/commands.h"
 
 namespace intervale {

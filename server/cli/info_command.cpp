@@ -1,20 +1,22 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <type_traits>
 
 #include "common/ivm/extraction.h"
+#include "common/ivm/ivm_container.h"
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_verify.h"
 #include "common/ivm/verify.h"
 #include "common/mesh/mesh.h"
+#include "common/parallel/all_cores.h"
 #include "common/program/range_option.h"
 #include "common/ranges/find_relevant_updates.h"
 #include "common/util/printable.h"
 #include "common/view/lod.h"
-#include "server/builder/all_cores.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
 #include "server/volume/read_volume.h"
@@ -166,6 +168,8 @@ void add(Program& program, const char* name, const char* description) {
       const auto header = read_volume_header(volume.path, volume.part);
       if (header && *header) return print_input(*options, **header, volume.part.has_value());
       if (!header) return tl::unexpected(header.error());
+      if (!begins_as_ivm(options->file) && std::filesystem::path(options->file).extension() != ".ivm")
+        return fail(in_quotes(options->file) + " is neither an interval volume (.ivm) nor " + kVolumeFormats);
     }
     return is_value_file(options->file) ? load_values(options->file, on_all_cores).and_then(run) : load_ivm(options->file).and_then(run);
   });

@@ -1,4 +1,4 @@
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/cli/commands.h"
 
 int main(int argc, char** argv) {

@@ -3,7 +3,7 @@
 #include <boost/unordered/unordered_flat_set.hpp>
 #include <utility>
 
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 
 namespace intervale {
 

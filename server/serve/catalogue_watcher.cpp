@@ -7,8 +7,8 @@
 #include <system_error>
 
 #include "common/ivm/load_volume.h"
+#include "common/parallel/all_cores.h"
 #include "protocol/codec.h"
-#include "server/builder/all_cores.h"
 
 namespace intervale {
 namespace {

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <ctime>
 
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 
 namespace intervale {
 namespace {

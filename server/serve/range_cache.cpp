@@ -4,7 +4,7 @@
 #include <exception>
 #include <utility>
 
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 
 namespace intervale {
 

@@ -21,7 +21,7 @@
 #include <thread>
 #include <utility>
 
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/serve/catalogue_watcher.h"
 #include "server/serve/server.h"
 

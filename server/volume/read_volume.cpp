@@ -25,6 +25,8 @@
 #include "server/volume/vtk_header.h"
 
 namespace intervale {
+
+const char* const kVolumeFormats = "NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM, HDF5 or Zarr";
 namespace {
 
 // A format of files that describe themselves.
@@ -153,10 +155,7 @@ Result<std::unique_ptr<VolumeReader>> open_volume(const std::filesystem::path& p
   if (layout && (header || find_format_by_name(path) != nullptr))
     return misuse(in_quotes(path) + " describes itself: leave out --dims and --type, or rename the file if its samples are raw");
   if (!header) return tl::unexpected<Error>(header.error());
-  if (!*header)
-    return misuse(
-        in_quotes(path) +
-        " is not NRRD, NIfTI, MetaImage, MRC, NumPy, VTK, TIFF, DICOM, HDF5 or Zarr: say what its raw samples are with --dims X Y Z and --type TYPE");
+  if (!*header) return misuse(in_quotes(path) + " is not " + kVolumeFormats + ": say what its raw samples are with --dims X Y Z and --type TYPE");
   const VolumeHeader& found = **header;
   if (found.time_point) {
     if (time_point && time_point != found.time_point)

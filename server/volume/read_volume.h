@@ -30,6 +30,9 @@ struct NamedVolume {
 // volume. None: the file's samples are raw. part: which of several volumes (VolumeHeader::parts); none: the first.
 [[nodiscard]] Result<std::optional<VolumeHeader>> read_volume_header(const std::filesystem::path& path, const std::optional<std::string>& part = {});
 
+// Their names, for complaints: "NRRD, ... or Zarr".
+extern const char* const kVolumeFormats;
+
 // For a file that describes itself a layout is misuse, and so is none for any other, whose samples are raw. To choose no
 // part or time point of several, or one that is not there, is misuse. part: see read_volume_header(); of a
 // file with several numbers a sample which of them, from 0, or else which time point. Without a part, three numbers are a

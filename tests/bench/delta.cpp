@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "common/diamond/supercube.h"
+#include "common/parallel/all_cores.h"
 #include "common/patch/visit_samples.h"
 #include "common/ranges/border_shape.h"
 #include "common/ranges/interpolation_error.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
-#include "server/builder/all_cores.h"
 #include "server/builder/find_keys.h"
 #include "tests/bench/cases.h"
 

@@ -12,7 +12,7 @@
 
 #include "client/api/fetch_mesh.h"
 #include "common/mesh/mesh_digest.h"
-#include "server/api/data_set.h"
+#include "server/api/build.h"
 #include "server/serve/catalogue_watcher.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/serving.h"
@@ -44,7 +44,7 @@ Result<MeshState> finished(LiveMesh& live) {
 
 class LiveMeshes : public ::testing::Test {
  public:
-  LiveMeshes() : every(DataSet::build(testing::gyroid({33, 30, 35})).value()) {
+  LiveMeshes() : every(build_data_set(testing::gyroid({33, 30, 35})).value()) {
     EXPECT_TRUE(every.save(file));
     server = start({}, file);
   }

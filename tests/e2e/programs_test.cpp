@@ -232,6 +232,14 @@ TEST(Programs, ServeTakesNoLimitThatIsNone) {
   }
 }
 
+TEST(Programs, InfoNamesTheFormatsOfAFileThatIsNoneOfThem) {
+  const TempDir folder;
+  const auto notes = folder.file("notes.txt", "neither this nor that");
+  expect_complaint(run({program("intervale"), "info", notes}), 1, "neither an interval volume (.ivm) nor NRRD, NIfTI,", "intervale: ");
+  const auto damaged = folder.file("damaged.ivm", "neither this nor that");
+  expect_complaint(run({program("intervale"), "info", damaged}), 1, "not an interval volume file", "intervale: ");
+}
+
 TEST(Programs, NamesDoNotReachTheTerminalAsTheyAre) {
   const TempDir folder;
   const std::string path = folder / "red \x1b[31m\xff.ivm";

@@ -59,6 +59,11 @@ def main(folder):
     request = ["--range", "10", "20", "--error-percent", "0.1", "--digest"]
     assert digest_in(built) == digest_in(run(intervale, "extract", ball, *request))
 
+    extracted = run(examples / "extract_to_file", ball, 10, 20, 0.1, mesh)
+    assert digest_in(extracted) == digest_in(built)
+    needed = run("readelf", "-d", examples / "extract_to_file")
+    assert "libintervale-core" in needed and "libintervale-builder" not in needed, needed
+
     # The same with pkg-config.
     folder_of_pc = next(prefix.rglob("intervale-client.pc")).parent
     environment["PKG_CONFIG_PATH"] = str(folder_of_pc)

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/ivm/ivm_file.h"
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/temp_dir.h"

@@ -1,5 +1,5 @@
 // Data sets as programs that embed the builder library have them.
-#include "server/api/data_set.h"
+#include "server/api/build.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -46,7 +46,7 @@ std::vector<std::byte> bytes_of(const std::filesystem::path& path) {
 TEST(DataSet, OfOneRangeIsTheIntervalVolumeOfThatRange) {
   const Volume volume = testing::digits(kDims, 5);
   const IntervalVolume expected = testing::build(volume, {.range = {3, 5.5}});
-  const auto made = DataSet::build(volume, {.range = Range{3, 5.5}});
+  const auto made = build_data_set(volume, {.range = Range{3, 5.5}});
   ASSERT_TRUE(made) << made.error().message;
   const TempDir folder;
   ASSERT_TRUE(made->save(folder / "made.ivm"));
@@ -62,12 +62,12 @@ TEST(DataSet, OfOneRangeIsTheIntervalVolumeOfThatRange) {
 
 TEST(DataSet, OfEveryRangeHasTheMeshesOfDataSetsOfEachRange) {
   const Volume volume = testing::stretched(testing::digits(kDims, 6));
-  const auto every = DataSet::build(volume);
+  const auto every = build_data_set(volume);
   ASSERT_TRUE(every) << every.error().message;
   EXPECT_FALSE(every->info().shown);
   EXPECT_EQ(every->info().tets, 0u);
   for (const Range& range : {Range{3, 5.5}, Range{-std::numeric_limits<double>::infinity(), 2}, Range{4, 4}}) {
-    const auto one = DataSet::build(volume, {.range = range});
+    const auto one = build_data_set(volume, {.range = range});
     ASSERT_TRUE(one);
     const auto mesh = every->extract(shown({range})), expected = one->extract();
     ASSERT_TRUE(mesh && expected);
@@ -80,7 +80,7 @@ TEST(DataSet, SavedOpenedAndSavedAgainIsTheSame) {
   const TempDir folder;
   const Volume volume = testing::gyroid(kDims);
   for (const std::optional<Range>& range : {std::optional<Range>(), std::optional(Range{-0.3, 0.2})}) {
-    const auto made = DataSet::build(volume, {.range = range});
+    const auto made = build_data_set(volume, {.range = range});
     ASSERT_TRUE(made && made->save(folder / "first.ivm"));
     const auto opened = DataSet::open(folder / "first.ivm");
     ASSERT_TRUE(opened) << opened.error().message;
@@ -101,7 +101,7 @@ TEST(DataSet, SavedOpenedAndSavedAgainIsTheSame) {
 TEST(DataSet, BringsChannelsAndPartsAlong) {
   DataSetOptions options;
   options.channels = {{.name = "flow", .volume = testing::noise(kDims, 3, 50, 1)}, {.name = "heat", .volume = testing::noise(kDims, 1, 50, 2)}};
-  const auto made = DataSet::build(testing::gyroid(kDims), options);
+  const auto made = build_data_set(testing::gyroid(kDims), options);
   ASSERT_TRUE(made) << made.error().message;
   ASSERT_EQ(made->info().channels.size(), 2u);
   EXPECT_EQ(made->info().channels[0].components, 3u);
@@ -119,28 +119,28 @@ TEST(DataSet, BringsChannelsAndPartsAlong) {
 
 TEST(DataSet, RefusesWhatItCannotBuildOrExtract) {
   const Volume volume = testing::gyroid(kDims);
-  expect_misuse(DataSet::build(volume, {.range = Range{2, 1}}), "LO <= HI");
-  expect_misuse(DataSet::build(volume, {.refine = Refine::uniform}), "with a range");
-  expect_misuse(DataSet::build(volume, {.step = -1}), "step");
+  expect_misuse(build_data_set(volume, {.range = Range{2, 1}}), "LO <= HI");
+  expect_misuse(build_data_set(volume, {.refine = Refine::uniform}), "with a range");
+  expect_misuse(build_data_set(volume, {.step = -1}), "step");
   Volume cut = volume;
   cut.bytes.pop_back();
-  expect_misuse(DataSet::build(cut), "bytes");
+  expect_misuse(build_data_set(cut), "bytes");
   Volume flat = volume;
   flat.grid.dims[1] = 1;
-  EXPECT_FALSE(DataSet::build(flat));
-  expect_misuse(DataSet::build(testing::noise(kDims, 3, 9, 1)), "vectors");
+  EXPECT_FALSE(build_data_set(flat));
+  expect_misuse(build_data_set(testing::noise(kDims, 3, 9, 1)), "vectors");
   DataSetOptions options;
   options.channels = {{.name = "value", .volume = volume}};
-  EXPECT_FALSE(DataSet::build(volume, options));
+  EXPECT_FALSE(build_data_set(volume, options));
   options.channels = {{.name = "heat", .volume = testing::gyroid({5, 5, 5})}};
-  EXPECT_FALSE(DataSet::build(volume, options));
+  EXPECT_FALSE(build_data_set(volume, options));
   Volume hole = volume;
   const float nan = std::numeric_limits<float>::quiet_NaN();
   std::memcpy(hole.bytes.data() + 40, &nan, sizeof nan);
-  EXPECT_FALSE(DataSet::build(hole));
-  EXPECT_TRUE(DataSet::build(hole, {.nan = 0}));
+  EXPECT_FALSE(build_data_set(hole));
+  EXPECT_TRUE(build_data_set(hole, {.nan = 0}));
 
-  const auto every = DataSet::build(volume);
+  const auto every = build_data_set(volume);
   ASSERT_TRUE(every);
   expect_misuse(every->extract(), "every range");
   expect_misuse(every->extract(shown({{1, 0}})), "LO <= HI");

@@ -13,7 +13,7 @@
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_page.h"
 #include "common/ivm/verify.h"
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/value_builder.h"
 #include "server/builder/value_steps.h"

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/parallel/all_cores.h"
 #include "common/ranges/find_relevant_updates.h"
-#include "server/builder/all_cores.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/special_values.h"
 

@@ -11,7 +11,7 @@
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/load_volume.h"
 #include "common/ivm/value_file.h"
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/builder/value_builder.h"
 #include "server/builder/value_steps.h"
 #include "tests/support/interval_volumes.h"

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "common/mesh/mesh_digest.h"
-#include "server/api/data_set.h"
+#include "server/api/build.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/session_server.h"
@@ -28,7 +28,7 @@ struct DrivenSession {
 TEST(Session, EndsWithTheMeshOfItsLastRequest) {
   const Volume volume = testing::gyroid({17, 20, 15});
   auto shared = testing::build_shared(volume, {.range = {-0.3, 0.2}});
-  const auto data_set = DataSet::build(volume, {.range = Range{-0.3, 0.2}, .step = 0});
+  const auto data_set = build_data_set(volume, {.range = Range{-0.3, 0.2}, .step = 0});
   ASSERT_TRUE(data_set) << data_set.error().message;
   MeshRequest coarse;
   coarse.lod.error_percent = 30;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/ivm/relevant_updates.h"
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/parents.h"

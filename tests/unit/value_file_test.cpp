@@ -7,7 +7,7 @@
 
 #include "common/ivm/value_page.h"
 #include "common/ivm/value_verify.h"
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 #include "server/builder/field_hierarchy.h"
 #include "server/builder/value_builder.h"
 #include "tests/support/seeds.h"

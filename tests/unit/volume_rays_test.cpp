@@ -12,9 +12,9 @@
 
 #include "common/ivm/extraction.h"
 #include "common/mesh/join.h"
+#include "common/parallel/all_cores.h"
 #include "common/picture/viewpoint.h"
 #include "common/picture/volume_picture.h"
-#include "server/builder/all_cores.h"
 #include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
 

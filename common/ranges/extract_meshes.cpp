@@ -1,4 +1,4 @@
-#include "server/builder/extract_meshes.h"
+#include "common/ranges/extract_meshes.h"
 
 #include "common/ivm/extraction.h"
 #include "common/ranges/find_relevant_updates.h"

@@ -1,4 +1,4 @@
-#include "server/builder/all_cores.h"
+#include "common/parallel/all_cores.h"
 
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
