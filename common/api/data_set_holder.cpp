@@ -63,7 +63,8 @@ class FromMeshes : public DataSetHolder {
 
 class HeldVolume final : public FromMeshes {
  public:
-  HeldVolume(Volume volume, std::vector<std::byte> file) : FromMeshes(info_of(volume->description())), volume_(std::move(volume)), file_(std::move(file)) {}
+  HeldVolume(Volume volume, std::vector<std::byte> file)
+      : FromMeshes(info_of(volume->description())), volume_(std::move(volume)), file_(std::move(file)) {}
 
   [[nodiscard]] Result<void> save(const std::filesystem::path& path) const override {
     return file_.empty() ? save_ivm(path, *volume_, on_all_cores) : save_container(path, file_);

@@ -93,7 +93,8 @@ void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set
   }
 }
 
-Result<StoredChannels> read_channels(const Container& file, const Grid& grid, const SupercubeSet& set, const ParallelFor& parallel) {
+Result<StoredChannels> read_channels(const Container& file, const Grid& grid, const SupercubeSet& set, const ParallelFor& parallel,
+                                     PageFaults* faults) {
   StoredChannels stored;
   auto bytes = file[StreamType::channels], pages = file[StreamType::channel_pages];
   const int levels = Domain(grid.dims).levels();
@@ -111,7 +112,7 @@ Result<StoredChannels> read_channels(const Container& file, const Grid& grid, co
       if (set.size() > most_coded_bits(pages.size())) return fail("the file claims more values than it can hold");
       ValueKeys& to = keys.emplace_back(0, component->format.last);
       file.claim(set.size() * std::uint64_t(to.width()));
-      if (auto ok = take_pages(bytes, pages, {grid, set, *component, to}, parallel); !ok) return tl::unexpected(ok.error());
+      if (auto ok = take_pages(bytes, pages, {grid, set, *component, to}, parallel, faults, *name); !ok) return tl::unexpected(ok.error());
       channel.components.push_back(std::move(*component));
     }
   }

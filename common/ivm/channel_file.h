@@ -6,6 +6,7 @@
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/page_faults.h"
 #include "common/ivm/value_keys.h"
 #include "common/patch/channel.h"
 #include "common/util/parallel.h"
@@ -23,6 +24,8 @@ struct StoredChannels {
   std::vector<ChannelKeys> keys;
 };
 // The inverse, of bytes from outside; none if the file has none.
-[[nodiscard]] Result<StoredChannels> read_channels(const Container& file, const Grid& grid, const SupercubeSet& set, const ParallelFor& parallel);
+// faults: as of read_pages().
+[[nodiscard]] Result<StoredChannels> read_channels(const Container& file, const Grid& grid, const SupercubeSet& set, const ParallelFor& parallel,
+                                                   PageFaults* faults);
 
 }  // namespace intervale

@@ -24,7 +24,7 @@ IntervalVolume::IntervalVolume(Parts parts)
       keys_(std::move(parts.keys)),
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
-      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, {}, std::move(parts.surface)),
+      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, std::move(parts.left), std::move(parts.surface)),
       bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
 
@@ -32,6 +32,7 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
   if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.surface.to_distance.size() != parts.set.supercubes() ||
+      (!parts.left.empty() && parts.left.size() != parts.set.supercubes()) ||
       (!parts.surface.slopes.empty() && parts.surface.slopes.size() != parts.set.size()) ||
       (!parts.surface.distances.empty() && parts.surface.distances.size() != parts.set.size()))
     return fail("the numbers of values, errors or supercubes do not match the set");
@@ -78,6 +79,12 @@ Result<void> IntervalVolume::set_channels(std::vector<Channel> channels, std::ve
   description_.channels = std::move(channels);
   channel_keys_ = std::move(keys);
   return {};
+}
+
+std::uint64_t IntervalVolume::lost_updates() const {
+  std::uint64_t lost = size();
+  for (BrickIndex brick{0}; brick < set_.bricks().size(); ++brick) lost -= relevant_.brick_updates(brick);
+  return lost;
 }
 
 std::size_t IntervalVolume::memory_bytes() const {

@@ -41,6 +41,7 @@ class IntervalVolume {
     std::vector<float> error_steps;   // ascending, at most kMaxErrorSteps
     SurfaceErrors surface;            // by supercube, and by number of the update
     std::shared_ptr<const FieldStatistics> statistics = {};
+    std::vector<std::uint64_t> left = {};  // by supercube: the slots whose values are known, closed under parents; empty: all
   };
   // Fails where sizes or ranges of the parts do not match; validate() checks the meaning.
   static Result<IntervalVolume> assemble(Parts parts);
@@ -57,8 +58,10 @@ class IntervalVolume {
   [[nodiscard]] std::span<const std::uint8_t> steps() const { return steps_; }
   [[nodiscard]] ValueKey key(UpdateIndex i) const { return keys_[i]; }  // of the value at the diamond's centre
   [[nodiscard]] const ValueKeys& keys() const { return keys_; }
-  // What the range of the description needs: all updates.
+  // What the range of the description needs: all updates, but for those that a damaged file has lost (page_faults.h).
   [[nodiscard]] const RelevantUpdates& relevant() const { return relevant_; }
+  // How many updates relevant() lacks for that reason. O(bricks).
+  [[nodiscard]] std::uint64_t lost_updates() const;
   // For other ranges than its own; it must have been refined uniformly. The first call finds them, in O(updates);
   // calls meanwhile wait for it. Any thread.
   [[nodiscard]] const ValueBounds& bounds(const ParallelFor& parallel = serial) const;

@@ -205,7 +205,7 @@ void Container::claim(std::uint64_t bytes) const {
   if (room_ != kAnyRoom) room_ -= bytes;
 }
 
-Result<Container> Container::open(std::span<const std::byte> file, FileScope scope, std::uint64_t room) {
+Result<Container> Container::open(std::span<const std::byte> file, FileScope scope, std::uint64_t room, bool tolerates_damage) {
   const auto head = read_head(file, file.size(), scope);
   if (!head) return tl::unexpected(head.error());
   if (head->header.content_hash != hash_of_contents(head->entries)) return fail("the header is damaged (content hash)");
@@ -216,7 +216,8 @@ Result<Container> Container::open(std::span<const std::byte> file, FileScope sco
   for (const Entry& e : head->entries) {
     const auto bytes = file.subspan(e.offset, e.bytes);
     const bool is_pages = StreamType(e.type) == StreamType::pages;
-    if (e.checksum != (is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size()))) return fail(name_of(e.type) + " is damaged (checksum)");
+    const bool is_left = tolerates_damage && StreamType(e.type) == StreamType::channel_pages;
+    if (!is_left && e.checksum != (is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size()))) return fail(name_of(e.type) + " is damaged (checksum)");
     if (e.type < kStreamTypes) container.streams_[e.type] = bytes;
     if (StreamType(e.type) == StreamType::channels) {
       const std::array<std::uint64_t, 2> both{container.content_hash_, e.checksum};

@@ -83,7 +83,8 @@ void append(std::vector<std::byte>& out, std::span<const T> values) {
 class Container {
  public:
   // The file must outlive the result. Fails, in one line, if it is not a file of this scope. room: of bytes, for claim().
-  static Result<Container> open(std::span<const std::byte> file, FileScope scope, std::uint64_t room = kAnyRoom);
+  // tolerates_damage: the pages of channels are left to their own checksums, too.
+  static Result<Container> open(std::span<const std::byte> file, FileScope scope, std::uint64_t room = kAnyRoom, bool tolerates_damage = false);
 
   // What will be allocated for its contents, at most: throws NoRoom if all claims exceed the room. Called before anything
   // is allocated.

@@ -215,8 +215,9 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
   return make_container(FileScope::one_range, streams);
 }
 
-Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room) {
-  const auto file = Container::open(bytes, FileScope::one_range, room);
+Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room,
+                                  PageFaults* faults) {
+  const auto file = Container::open(bytes, FileScope::one_range, room, faults != nullptr);
   if (!file) return tl::unexpected(file.error());
   IntervalVolume::Parts parts;
   Description& d = parts.description;
@@ -232,10 +233,11 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   if (!set) return tl::unexpected(set.error());
   parts.set = std::move(*set);
   parts.keys = ValueKeys(0, d.format.last);
-  if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_pages(*file, parts, parallel, faults); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_errors(*file, *record, parts, parallel); !ok) return tl::unexpected(ok.error());
-  auto channels = read_channels(*file, d.grid, parts.set, parallel);
+  auto channels = read_channels(*file, d.grid, parts.set, parallel, faults);
   if (!channels) return tl::unexpected(channels.error());
+  parts.left = take_faults(Domain(d.grid.dims), parts.set, faults, d.content_hash);
   auto volume = IntervalVolume::assemble(std::move(parts));
   if (!volume) return volume;
   if (auto ok = volume->set_channels(std::move(channels->channels), std::move(channels->keys)); !ok) return tl::unexpected(ok.error());

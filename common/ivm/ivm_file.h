@@ -10,6 +10,7 @@
 
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/page_faults.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 
@@ -21,9 +22,10 @@ namespace intervale {
 
 // The inverse, for bytes from outside: checks every checksum, and every count against what the bytes can hold before it
 // allocates; what is decoded grows with what was read. `parallel` may stop it. Throws NoRoom if it would take more memory
-// than `room`, besides the bytes.
+// than `room`, besides the bytes. faults: takes damaged pages (page_faults.h), and the volume's relevant() has what is left;
+// null: they are an error.
 [[nodiscard]] Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
-                                                std::uint64_t room = kAnyRoom);
+                                                std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
 // Writes a temporary file and renames it.
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);

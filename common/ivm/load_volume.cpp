@@ -13,17 +13,18 @@ Result<std::vector<std::byte>> read_volume_file(const std::filesystem::path& pat
   return read_container(path, {}, parallel);
 }
 
-Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room) {
-  if (scope_of(bytes) != FileScope::every_range) return decode_ivm(bytes, std::move(name), parallel, room);
-  auto values = decode_values(bytes, std::move(name), parallel, room);
+Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room,
+                                     PageFaults* faults) {
+  if (scope_of(bytes) != FileScope::every_range) return decode_ivm(bytes, std::move(name), parallel, room, faults);
+  auto values = decode_values(bytes, std::move(name), parallel, room, faults);
   if (!values) return tl::unexpected(values.error());
   return of_every_range(std::move(*values).take(), parallel);
 }
 
-Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel) {
+Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel, PageFaults* faults) {
   const auto bytes = read_volume_file(path, parallel);
   if (!bytes) return tl::unexpected(bytes.error());
-  auto volume = decode_volume(*bytes, path.stem().string(), parallel);
+  auto volume = decode_volume(*bytes, path.stem().string(), parallel, kAnyRoom, faults);
   if (!volume) return fail(path.string() + ": " + volume.error().message);
   return std::make_shared<const IntervalVolume>(std::move(*volume));
 }

@@ -10,6 +10,7 @@
 
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/page_faults.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 
@@ -20,11 +21,12 @@ namespace intervale {
 [[nodiscard]] Result<std::vector<std::byte>> read_volume_file(const std::filesystem::path& path, const ParallelFor& parallel = serial);
 
 // A data set from outside: as decode_ivm() or decode_values() checks it. One of every range is as of_every_range() makes
-// it. room: as of decode_ivm().
+// it. room, faults: as of decode_ivm().
 [[nodiscard]] Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
-                                                   std::uint64_t room = kAnyRoom);
+                                                   std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
 // Both. The name is the file's, without folders and extension. Errors begin with the path.
-[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel = serial);
+[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel = serial,
+                                                                        PageFaults* faults = nullptr);
 
 }  // namespace intervale

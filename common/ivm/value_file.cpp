@@ -116,8 +116,9 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
   return make_container(FileScope::every_range, streams);
 }
 
-Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room) {
-  const auto file = Container::open(bytes, FileScope::every_range, room);
+Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room,
+                                  PageFaults* faults) {
+  const auto file = Container::open(bytes, FileScope::every_range, room, faults != nullptr);
   if (!file) return tl::unexpected(file.error());
   ValueVolume::Parts parts;
   FieldDescription& d = parts.description;
@@ -136,11 +137,12 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
   if (auto ok = read_volumes((*file)[StreamType::volumes], d); !ok) return tl::unexpected(ok.error());
   parts.set = all_diamonds(domain, parallel);
   parts.keys = ValueKeys(0, d.format.last);
-  if (auto ok = read_pages(*file, parts, parallel); !ok) return tl::unexpected(ok.error());
-  auto channels = read_channels(*file, d.grid, parts.set, parallel);
+  if (auto ok = read_pages(*file, parts, parallel, faults); !ok) return tl::unexpected(ok.error());
+  auto channels = read_channels(*file, d.grid, parts.set, parallel, faults);
   if (!channels) return tl::unexpected(channels.error());
   d.channels = std::move(channels->channels);
   parts.channel_keys = std::move(channels->keys);
+  parts.left = take_faults(domain, parts.set, faults, d.content_hash);
   return ValueVolume(std::move(parts));
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/page_faults.h"
 #include "common/ivm/value_volume.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
@@ -24,9 +25,9 @@ namespace intervale {
 [[nodiscard]] std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel = serial);
 
 // The inverse, for bytes from outside: checks every checksum, and that the bytes can hold as many values as they claim
-// before it allocates. `parallel` and room: as of decode_ivm(); what of_every_range() takes is included.
+// before it allocates. `parallel`, room and faults: as of decode_ivm(); what of_every_range() takes is included.
 [[nodiscard]] Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
-                                                std::uint64_t room = kAnyRoom);
+                                                std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
 // Writes a temporary file and renames it. Returns the number of bytes.
 [[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial);

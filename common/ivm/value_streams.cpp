@@ -3,7 +3,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <iterator>
@@ -84,6 +84,9 @@ struct StoredPage {
   std::span<const std::byte> bytes;
   std::uint64_t checksum = 0;
 };
+
+// lost: it may need what is. invalid: intact, but no page; no writer makes it.
+enum class PageState : std::uint8_t { intact, damaged, lost, invalid };
 
 constexpr std::size_t kPagesAtOnce = 16;  // whose values are allocated together, or as many as were decoded before
 
@@ -168,35 +171,60 @@ Result<void> read_weights(const Container& file, int levels, ValueWeights& to) {
   return {};
 }
 
-Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel) {
+Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel, PageFaults* faults) {
   auto index = file[StreamType::page_index], pages = file[StreamType::pages];
-  if (auto ok = take_pages(index, pages, to, parallel); !ok) return ok;
+  if (auto ok = take_pages(index, pages, to, parallel, faults); !ok) return ok;
   if (!index.empty() || !pages.empty()) return fail("the index of the pages is damaged");
   return {};
 }
 
 // Pages of one scale in parallel: they depend on coarser ones only. What is allocated grows with what was decoded, so a
 // file that claims more than it holds is found out before it takes much.
-Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& from, const DecodedValues& to, const ParallelFor& parallel) {
+Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& from, const DecodedValues& to, const ParallelFor& parallel,
+                        PageFaults* faults, const std::string& channel) {
   const SupercubeSet& set = to.values.set;
   const std::vector<ValuePage> pages = pages_of(set);
   const auto stored = take_stored(index, from, pages.size());
   if (!stored) return tl::unexpected(stored.error());
   const auto scale = [&](std::size_t page) { return scale_of_key(set.bricks()[pages[page].front().first].key); };
-  constexpr std::size_t kNone = ~std::size_t(0);
-  std::atomic<std::size_t> damaged = kNone;
-  for (std::size_t first = 0, end = 0; first < pages.size() && damaged == kNone; first = end) {
+  LostPages lost(set, pages);
+  for (std::size_t first = 0, end = 0; first < pages.size(); first = end) {
     while (end < pages.size() && end - first < std::max(first, kPagesAtOnce) && scale(end) == scale(first)) ++end;
     grow(to, pages[end - 1]);
+    std::vector<PageState> states(end - first);
     parallel(end - first, [&](std::size_t i) {
-      const std::size_t page = first + i;
-      const auto& [bytes, checksum] = (*stored)[page];
-      const bool is_intact = XXH3_64bits(bytes.data(), bytes.size()) == checksum;
-      if (!is_intact || !decode_page(to, pages[page], octets(bytes))) damaged = page;
+      const auto& [bytes, checksum] = (*stored)[first + i];
+      if (XXH3_64bits(bytes.data(), bytes.size()) != checksum)
+        states[i] = PageState::damaged;
+      else if (lost.needs_lost(first + i))
+        states[i] = PageState::lost;
+      else if (!decode_page(to, pages[first + i], octets(bytes)))
+        states[i] = PageState::invalid;
     });
+    for (std::size_t i = 0; i < states.size(); ++i) {
+      if (states[i] == PageState::intact) continue;
+      if (states[i] != PageState::lost) {
+        DamagedPage page = place_of(set, pages, first + i, to.values.grid.dims);
+        page.channel = channel;
+        if (faults == nullptr || first + i == 0 || states[i] == PageState::invalid) return fail(to_text(page) + " is damaged");
+        faults->damaged.push_back(std::move(page));
+      }
+      lost.lose(first + i);
+    }
   }
-  if (damaged != kNone) return fail("page " + std::to_string(damaged.load()) + " of " + std::to_string(pages.size()) + " is damaged");
+  if (!lost.any()) return {};
+  faults->lost.resize(pages.size());
+  for (std::size_t page = 0; page < pages.size(); ++page) faults->lost[page] = faults->lost[page] || lost.lost()[page];
   return {};
+}
+
+std::vector<std::uint64_t> take_faults(const Domain& domain, const SupercubeSet& set, PageFaults* faults, std::uint64_t& content_hash) {
+  if (faults == nullptr || !faults->any()) return {};
+  std::vector<std::uint64_t> left = slots_left(domain, set, faults->lost);
+  faults->lost_updates = set.size();
+  for (const std::uint64_t slots : left) faults->lost_updates -= std::uint64_t(std::popcount(slots));
+  content_hash = XXH3_64bits_withSeed(left.data(), left.size() * sizeof left[0], content_hash);
+  return left;
 }
 
 }  // namespace intervale

@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/page_faults.h"
 #include "common/ivm/paged_values.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
@@ -24,13 +26,18 @@ void append_labels(Streams& streams, const Labels& labels);
 [[nodiscard]] Result<void> read_labels(const Container& file, Labels& to);
 // levels: of the field's domain
 [[nodiscard]] Result<void> read_weights(const Container& file, int levels, ValueWeights& to);
-// Sets keys and error levels, which have no elements at first, and grow with what is decoded. All the rest is known.
-[[nodiscard]] Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel);
+// Sets keys and error levels, which have no elements at first, and grow with what is decoded. All the rest is known. faults:
+// takes damaged pages, whose keys and levels are any; null: they are an error, as the first page always is.
+[[nodiscard]] Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel, PageFaults* faults);
 
 // Appends the pages of some values, and their index: for each page its bytes and their XXH3-64, two numbers of 8 bytes.
 void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& pages, const ParallelFor& parallel);
 // The inverse, of bytes from outside: takes them off the front of both.
 [[nodiscard]] Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& pages, const DecodedValues& to,
-                                      const ParallelFor& parallel);
+                                      const ParallelFor& parallel, PageFaults* faults, const std::string& channel = {});
+
+// What is left once all pages of field and channels were read: by supercube, as slots_left(); empty if nothing is lost. Sets
+// lost_updates, and changes the hash of the contents, which are others now.
+[[nodiscard]] std::vector<std::uint64_t> take_faults(const Domain& domain, const SupercubeSet& set, PageFaults* faults, std::uint64_t& content_hash);
 
 }  // namespace intervale

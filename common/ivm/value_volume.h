@@ -64,6 +64,7 @@ class ValueVolume {
     ValueKeys keys;                              // by number
     std::vector<ErrorLevel> error_levels;        // by number; of all diamonds of scale 1 and coarser, which come first
     std::vector<ChannelKeys> channel_keys = {};  // by channel of the description, and component
+    std::vector<std::uint64_t> left = {};        // as in IntervalVolume::Parts
   };
   explicit ValueVolume(Parts parts);
 

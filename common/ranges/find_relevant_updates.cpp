@@ -83,6 +83,7 @@ SurfaceErrors PartFinder::measure(const Range& range, const std::vector<std::uin
 
 std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
   std::vector<std::uint64_t> slots = relevant_slots(volume_, part.shown, parallel_);
+  for (SupercubeIndex s{0}; s < slots.size(); ++s) slots[s] &= volume_.relevant().slots(s, volume_.set().occupancy()[s]);
   SurfaceErrors surface{std::vector<ErrorToDistance>(volume_.set().supercubes())};
   if (part.distances == Distances::estimated) surface.to_distance = estimate_distances(volume_, part.shown.range, slots, parallel_);
   if (part.distances == Distances::measured) surface = measure(part.shown.range, slots);

@@ -37,6 +37,7 @@ struct ExtractCommand {
   std::vector<std::string> channels;
   Lod lod;
   unsigned threads = 0;
+  bool tolerates_damage = false;
   bool digest = false;
   bool json = false;
 };
@@ -110,8 +111,13 @@ Result<void> run(const ExtractCommand& options) {
   }
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  const auto volume = load_volume(options.file, on_all_cores);
+  PageFaults faults;
+  const auto volume = load_volume(options.file, on_all_cores, options.tolerates_damage ? &faults : nullptr);
   if (!volume) return tl::unexpected(volume.error());
+  if (faults.any()) {
+    fmt::print(stderr, "intervale: warning: {}: {}; {} of {} updates are left out\n", printable(options.file), to_text(faults), faults.lost_updates,
+               (*volume)->size());
+  }
   const Description& description = (*volume)->description();
   const auto shown = shown_of(options, description);
   if (!shown) return tl::unexpected(shown.error());
@@ -144,6 +150,7 @@ void add_extract_command(Program& program) {
   add_lod_options(command, options->lod);
   add_picture_options(command, options->picture);
   command.add_option("--threads", options->threads, "Number of threads; 0: one for each core")->capture_default_str();
+  command.add_flag("--tolerate-damage", options->tolerates_damage, "Leave out what damaged pages of the file hold, instead of failing");
   add_digest_flag(command, options->digest);
   add_json_flag(command, options->json);
 }

@@ -13,6 +13,7 @@
 #include "common/ivm/verify.h"
 #include "common/mesh/mesh.h"
 #include "common/parallel/all_cores.h"
+#include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/ranges/find_relevant_updates.h"
 #include "common/util/printable.h"
@@ -77,6 +78,20 @@ struct Info {
     return print(text);
   }
 };
+
+// The data set of a file. `parallel` shows progress. faults: as of decode_ivm().
+template <class Use>
+Result<void> with_data_set(const std::string& file, const ParallelFor& parallel, PageFaults* faults, const Use& use) {
+  const auto bytes = read_container(file, {}, parallel);
+  if (!bytes) return tl::unexpected(bytes.error());
+  const std::string name = std::filesystem::path(file).stem().string();
+  const auto with = [&](auto set) -> Result<void> {
+    if (!set) return fail(file + ": " + set.error().message);
+    return use(std::make_shared<const typename decltype(set)::value_type>(std::move(*set)));
+  };
+  return scope_of(*bytes) == FileScope::every_range ? with(decode_values(*bytes, name, parallel, kAnyRoom, faults))
+                                                    : with(decode_ivm(*bytes, name, parallel, kAnyRoom, faults));
+}
 
 struct Verify {
   template <class DataSet>
@@ -171,7 +186,15 @@ void add(Program& program, const char* name, const char* description) {
       if (!begins_as_ivm(options->file) && std::filesystem::path(options->file).extension() != ".ivm")
         return fail(in_quotes(options->file) + " is neither an interval volume (.ivm) nor " + kVolumeFormats);
     }
-    return is_value_file(options->file) ? load_values(options->file, on_all_cores).and_then(run) : load_ivm(options->file).and_then(run);
+    if constexpr (std::is_same_v<Command, Verify>) {
+      std::optional<Progress> progress("verifying " + printable(options->file));
+      PageFaults faults;
+      return with_data_set(options->file, with_progress(*progress, on_all_cores), &faults, [&](const auto& set) -> Result<void> {
+        progress.reset();
+        return faults.any() ? fail(options->file + ": " + to_text(faults)) : run(set);
+      });
+    }
+    return with_data_set(options->file, on_all_cores, nullptr, run);
   });
   constexpr bool is_info = std::is_same_v<Command, Info>;
   command.add_option("FILE", options->file, is_info ? "Interval volume (.ivm), or a volume or folder that build reads" : "Interval volume (.ivm)")

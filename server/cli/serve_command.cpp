@@ -192,6 +192,8 @@ void add_serve_command(Program& program) {
       .add_option("--viewer", options->serve.viewer,
                   "Folder of the browser viewer. Default: ../share/intervale/viewer, relative to the program's folder, if it exists")
       ->type_name("FOLDER");
+  command.add_flag("--tolerate-damage", options->serve.tolerates_damage,
+                   "Serve what is left of files with damaged pages: coarser where pages are missing. Without it they are refused");
   command.add_option("--threads", options->serve.threads, "Number of threads; 0: one for each core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

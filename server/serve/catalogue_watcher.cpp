@@ -48,14 +48,18 @@ struct Read {
   Result<IntervalVolume> contents;
 };
 
-// Throws NoRoom if that takes more memory than `room`.
-Read read(const fs::path& path, const std::string& name, std::uint64_t room, const ParallelFor& parallel) {
+void log_faults(const fs::path& path, const PageFaults& faults, const IntervalVolume& volume) {
+  if (faults.any()) spdlog::warn("{}: {}; {} of {} updates are not served", path.string(), to_text(faults), faults.lost_updates, volume.size());
+}
+
+// Throws NoRoom if that takes more memory than `room`. faults: as of decode_volume().
+Read read(const fs::path& path, const std::string& name, std::uint64_t room, const ParallelFor& parallel, PageFaults* faults) {
   spdlog::debug("reads {}", path.string());
   std::error_code ignored;
   if (const auto size = fs::file_size(path, ignored); !ignored && size > room) throw NoRoom();
   const auto bytes = catching(path, [&] { return read_volume_file(path, parallel); });
   if (!bytes) return {true, tl::unexpected(bytes.error())};
-  auto volume = catching(path, [&] { return decode_volume(*bytes, name, parallel, room - std::min<std::uint64_t>(room, bytes->size())); });
+  auto volume = catching(path, [&] { return decode_volume(*bytes, name, parallel, room - std::min<std::uint64_t>(room, bytes->size()), faults); });
   if (!volume) return {false, std::move(volume)};
   if (auto fits = protocol::check_sendable(volume->description()); !fits) return {false, tl::unexpected(fits.error())};
   return {false, std::move(volume)};
@@ -72,8 +76,10 @@ Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
       continue;
     }
     spdlog::debug("reads {}", input.string());
-    auto volume = catching(input, [&] { return load_volume(input, parallel); });
+    PageFaults faults;
+    auto volume = catching(input, [&] { return load_volume(input, parallel, tolerates_damage_ ? &faults : nullptr); });
     if (!volume) return tl::unexpected(volume.error());
+    log_faults(input, faults, **volume);
     files_.emplace_back(input, counted(memory_, Memory::Holder::datasets, std::move(*volume)));
   }
   return catalogue(true);
@@ -107,7 +113,8 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
   const std::uint64_t room = memory_.room();
   try {
     if (room <= file.too_little) throw NoRoom();
-    auto volume = read(path, name, room, parallel);
+    PageFaults faults;
+    auto volume = read(path, name, room, parallel, tolerates_damage_ ? &faults : nullptr);
     file.too_little = 0;
     // Not the file's fault, perhaps: out of descriptors, or no permission; tried again even if the file stays as it is.
     if (volume.is_unread) return skip(volume.contents.error().message);
@@ -116,6 +123,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
     if (!volume.contents) return skip(path.string() + ": " + volume.contents.error().message);
     // It includes a hash of the contents.
     if (file.volume && file.volume->description() == volume.contents->description()) return false;
+    log_faults(path, faults, *volume.contents);
     file.volume = counted(memory_, Memory::Holder::datasets, std::make_shared<const IntervalVolume>(std::move(*volume.contents)));
     return true;
   } catch (const NoRoom&) {

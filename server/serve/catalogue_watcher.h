@@ -24,8 +24,10 @@ namespace intervale {
 class CatalogueWatcher {
  public:
   // inputs: files, and folders of *.ivm files (without their subfolders). memory: counts the data sets, and must outlive
-  // them; files of folders that would take more than its room are not read until there is more.
-  CatalogueWatcher(std::vector<std::filesystem::path> inputs, Memory& memory) : inputs_(std::move(inputs)), memory_(memory) {}
+  // them; files of folders that would take more than its room are not read until there is more. tolerates_damage: files
+  // with damaged pages are served without what these hold (page_faults.h), which is logged.
+  CatalogueWatcher(std::vector<std::filesystem::path> inputs, Memory& memory, bool tolerates_damage = false)
+      : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage) {}
 
   // The catalogue at the start. A file in a folder that is damaged, or whose name is invalid, is logged and skipped.
   // A named file with such a fault is an error; so are two data sets of one name, and a folder that cannot be read.
@@ -53,6 +55,7 @@ class CatalogueWatcher {
 
   std::vector<std::filesystem::path> inputs_;
   Memory& memory_;
+  bool tolerates_damage_;
   std::vector<std::pair<std::filesystem::path, Catalogue::Volume>> files_;  // named as inputs
   std::map<std::filesystem::path, File> folder_files_;                      // in folders
   std::set<std::filesystem::path> unreadable_folders_;                      // that were logged

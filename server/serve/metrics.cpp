@@ -94,7 +94,11 @@ void Metrics::count_close(unsigned code) {
 std::string Metrics::text(const Gauges& now) const {
   std::vector<MetricFamily> families = registry_.Collect();
   std::vector<prometheus::ClientMetric> memory;
-  for (const auto& [name, volume] : now.catalogue.volumes()) memory.push_back(value(double(volume->memory_bytes()), {{"dataset", name}}));
+  std::uint64_t lost = 0;
+  for (const auto& [name, volume] : now.catalogue.volumes()) {
+    memory.push_back(value(double(volume->memory_bytes()), {{"dataset", name}}));
+    lost += volume->lost_updates();
+  }
   std::vector<prometheus::ClientMetric> held;
   held.reserve(Memory::kHolders.size());
   for (const Memory::Holder holder : Memory::kHolders)
@@ -104,6 +108,8 @@ std::string Metrics::text(const Gauges& now) const {
                             {value(double(uncounted_bytes(now.memory)))}));
   families.push_back(gauges("intervale_queued_bytes", "Unsent bytes of streaming messages.", {value(double(now.queued_bytes))}));
   families.push_back(gauges("intervale_datasets", "Data sets served.", {value(double(now.catalogue.volumes().size()))}));
+  families.push_back(gauges("intervale_lost_updates", "Updates that damaged files have lost, of the data sets served: see --tolerate-damage.",
+                            {value(double(lost))}));
   families.push_back(gauges("intervale_dataset_memory_bytes", "Memory of a data set.", std::move(memory)));
   if (now.certificate_expires) {
     const std::chrono::duration<double> time = now.certificate_expires->time_since_epoch();

@@ -23,6 +23,7 @@ struct ServeOptions {
   std::string listen = "127.0.0.1:8080";                   // IPv6 addresses in brackets; port 0: any free port
   std::optional<std::string> metrics_listen;               // a port of its own for /metrics; nullopt: on the main port
   std::optional<std::filesystem::path> viewer;             // folder of the viewer, see StaticFiles; nullopt: none
+  bool tolerates_damage = false;                           // serves what is left of files with damaged pages (page_faults.h)
   unsigned threads = 0;                                    // 0: one for each core
   std::optional<std::filesystem::path> tokens;             // file, see Tokens; nullopt: no token is required
   std::vector<std::string> allowed_origins;                // that may open sessions; empty: the request's host

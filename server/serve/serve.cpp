@@ -79,10 +79,13 @@ class LevelSwitch {
 class Loading {
  public:
   // where: the end of the line that tells what is served. failed: called on that thread if nothing can be served.
-  Loading(const std::vector<std::filesystem::path>& inputs, Server& server, std::string where, std::function<void(const Error&)> failed)
-      : watcher_(inputs, server.memory()), server_(server), where_(std::move(where)), failed_(std::move(failed)), thread_([this](const auto& stop) {
-          run(stop);
-        }) {}
+  Loading(const std::vector<std::filesystem::path>& inputs, bool tolerates_damage, Server& server, std::string where,
+          std::function<void(const Error&)> failed)
+      : watcher_(inputs, server.memory(), tolerates_damage),
+        server_(server),
+        where_(std::move(where)),
+        failed_(std::move(failed)),
+        thread_([this](const auto& stop) { run(stop); }) {}
   void poll_now() {
     const std::lock_guard lock(mutex_);
     wanted_ = true;
@@ -161,12 +164,13 @@ Result<void> serve(const ServeOptions& requested, const LogOptions& log, const s
   auto server = Server::start(options);
   if (!server) return tl::unexpected(server.error());
   Result<void> loaded;
-  Loading loading(inputs, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(), [&](const Error& error) {
-    boost::asio::post(signals, [&, error] {
-      loaded = tl::unexpected(error);
-      signals.stop();
-    });
-  });
+  Loading loading(inputs, options.tolerates_damage, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(),
+                  [&](const Error& error) {
+                    boost::asio::post(signals, [&, error] {
+                      loaded = tl::unexpected(error);
+                      signals.stop();
+                    });
+                  });
   boost::asio::steady_timer timer(signals);
   LevelSwitch level(log);
   on_each_signal(hang_up, [&] {

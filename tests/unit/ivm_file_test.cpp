@@ -243,7 +243,7 @@ TEST(IvmFile, ASetWithoutAncestorsIsRefused) {
   ASSERT_TRUE(assembled);
   const auto decoded = decode_exact(encode_ivm(*assembled));
   ASSERT_FALSE(decoded);
-  EXPECT_THAT(decoded.error().message, HasSubstr("page 0 of 1 is damaged"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("page 0 of 1 (scale 0, samples (0, 0, 0) to (8, 6, 5)) is damaged"));
 }
 
 // Pages are decoded in parallel where a scale has several.
