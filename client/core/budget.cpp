@@ -52,12 +52,13 @@ void for_each_parent(Front::Handle handle, const Visit& visit) {
 
 class Balance {
  public:
-  Balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance)
-      : fronts_(fronts), max_tets_(max_tets), groups_(by_importance(fronts[0].splits(), importance)), end_(groups_.size()) {
+  Balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance, const SeenBox* region)
+      : fronts_(fronts), max_tets_(max_tets), region_(region), groups_(by_importance(fronts[0].splits(), importance)), end_(groups_.size()) {
     for (std::size_t g = 0; g < end_; ++g) place_.emplace(groups_[g].key, g);
   }
 
   void run() {
+    if (region_ != nullptr) hide_outside();
     fit();
     show_what_fits();
     if (tet_count() <= max_tets_) return;
@@ -81,6 +82,29 @@ class Balance {
     return tets;
   }
 
+  // The slots of a supercube whose diamonds meet the region.
+  [[nodiscard]] std::uint64_t slots_in_region(SupercubeKey key) const {
+    if (region_ == nullptr) return ~std::uint64_t(0);
+    const ScreenError::Region around = region_of(fronts_[0].state().domain, key, 1);
+    if (!region_->meets(around.middle, around.reach)) return 0;
+    std::uint64_t slots = 0;
+    for (int i = 0; i < kSlots; ++i) slots |= std::uint64_t(region_->meets(centre_of(key, Slot(i)), std::int32_t(1) << scale_of_key(key))) << i;
+    return slots;
+  }
+
+  // Children before their parents: a split can be hidden if none of its children is shown.
+  void hide_outside() {
+    std::vector<SlotGroup> groups = fronts_[0].splits();  // coarse scales first
+    for (auto group = groups.rbegin(); group != groups.rend(); ++group) {
+      const std::uint64_t outside = group->slots & ~slots_in_region(group->key);
+      for (Front& front : fronts_) {
+        for (int cls = 2; cls >= 0; --cls) {
+          for (const Slot slot : set_bits<Slot>(front.shown_slots(group->key) & outside & kSlotsOfClass[cls])) front.hide({group->key, slot});
+        }
+      }
+    }
+  }
+
   void fit() {
     while (tet_count() > max_tets_ && hide_least(HUGE_VAL)) {
     }
@@ -92,7 +116,8 @@ class Balance {
       for (std::size_t f = 0; f < fronts_.size(); ++f) {
         if (fronts_[f].withheld_count() == 0) continue;
         any = true;
-        const std::uint64_t hidden = counting_slots(fronts_[f], groups_[g].key) & ~fronts_[f].shown_slots(groups_[g].key);
+        std::uint64_t hidden = counting_slots(fronts_[f], groups_[g].key) & ~fronts_[f].shown_slots(groups_[g].key);
+        if (hidden != 0) hidden &= slots_in_region(groups_[g].key);
         for (const Slot slot : set_bits<Slot>(hidden)) {
           wanted_.clear();
           if (!show({f, {groups_[g].key, slot}}, groups_[g].importance / kHysteresis)) return;
@@ -154,6 +179,7 @@ class Balance {
 
   std::span<Front> fronts_;
   std::uint64_t max_tets_;
+  const SeenBox* region_;                                       // null: everywhere
   std::vector<Group> groups_;                                   // the most important first
   boost::unordered_flat_map<SupercubeKey, std::size_t> place_;  // of a supercube in groups_
   std::size_t end_ = 0;                                         // everything from here on that can be hidden is hidden
@@ -169,7 +195,9 @@ Importance size_on_screen(const Camera& camera, const Grid& grid) {
   };
 }
 
-void balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance) { Balance(fronts, max_tets, importance).run(); }
+void balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance, const SeenBox* region) {
+  Balance(fronts, max_tets, importance, region).run();
+}
 
 std::vector<SlotGroup> least_important(const Front& front, std::uint64_t count, std::size_t max_supercubes, const Importance& importance) {
   const std::vector<SlotGroup> splits = front.splits();

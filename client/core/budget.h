@@ -13,6 +13,7 @@
 
 #include "common/front/front.h"
 #include "common/view/lod.h"
+#include "common/view/seen_box.h"
 
 namespace intervale {
 
@@ -26,8 +27,11 @@ using Importance = std::function<double(SupercubeKey)>;
 // Hides and shows splits of fronts of one data set, which have the same splits, until their meshes have at most max_tets
 // tetrahedra together and, as far as that allows, the most important splits with their ancestors. On the way they have
 // at most max_tets tetrahedra, or fewer than before. O(n log n) in a front's supercubes.
-void balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance);
-inline void balance(Front& front, std::uint64_t max_tets, const Importance& importance) { balance(std::span(&front, 1), max_tets, importance); }
+// region: if not null, splits of diamonds that do not meet it are hidden, but for ancestors of those that do.
+void balance(std::span<Front> fronts, std::uint64_t max_tets, const Importance& importance, const SeenBox* region = nullptr);
+inline void balance(Front& front, std::uint64_t max_tets, const Importance& importance, const SeenBox* region = nullptr) {
+  balance(std::span(&front, 1), max_tets, importance, region);
+}
 
 // The least important splits of a front: `count` of them, or those of max_supercubes supercubes if these have fewer.
 // All children of a split in the result are in it too, so Front::forget undoes every one. Keys ascending.

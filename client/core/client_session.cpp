@@ -28,7 +28,7 @@ Result<void> ClientSession::look(ViewRequest request) {
   }
   view_ = std::move(request);
   map_due_ = view_->depth ? std::max(kDepthMapUpdates, 2 * updates_) : kDepthMapUpdates;
-  if (mesh_ && view_->camera) mesh_->look(*view_->camera);
+  if (mesh_ && view_->camera) mesh_->look(*view_->camera, view_->within);
   if (state_ != State::connecting) send_view();
   return {};
 }
@@ -106,6 +106,7 @@ Result<ClientSession::Event> ClientSession::take(const protocol::Batch& batch, C
   if (auto accepted = accept_answer(batch.epoch, true); !accepted) return tl::unexpected(accepted.error());
   if (!credit_.spend(protocol::cost_of(batch))) return violation("a batch exceeds the credit");
   if (auto applied = apply(batch); !applied) return tl::unexpected(applied.error());
+  if (mesh_ && state_ == State::idle) mesh_->settle();  // it had coarse updates
   if (batch.epoch == epoch_) {
     stats_.remaining_error = batch.remaining_error;
     stats_.remaining_pixels = batch.remaining_pixels;
@@ -122,6 +123,7 @@ Result<ClientSession::Event> ClientSession::take(const protocol::Done& done, Clo
   credit_.note_pause();
   if (done.epoch == epoch_) {
     state_ = State::idle;
+    if (mesh_) mesh_->settle();
     stats_.is_full = done.full;
     if (!done.full) stats_.remaining_error = stats_.remaining_pixels = 0, stats_.updates_to_go = 0;
   }
@@ -153,7 +155,7 @@ Result<void> ClientSession::start_mesh() {
     if (!channels) return tl::unexpected(channels.error());
     mesh_->show_channels(*channels);
   }
-  if (view_ && view_->camera) mesh_->look(*view_->camera);
+  if (view_ && view_->camera) mesh_->look(*view_->camera, view_->within);
   return {};
 }
 

@@ -34,6 +34,7 @@ struct ViewRequest {
   Lod lod;  // one that check_lod accepts
   // Likewise. A mesh at its budget keeps what is largest on this camera's screen; without one, what came first.
   std::optional<Camera> camera = {};
+  std::optional<Box> within = {};  // likewise, with a camera: see StreamClient::look
   Budget budget = {};
   RangeRequest shown = {};  // of the data set
   bool early = false;       // see protocol::View

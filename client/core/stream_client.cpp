@@ -30,7 +30,7 @@ Result<void> StreamClient::apply(std::span<const std::uint8_t> payload, std::uin
     if (auto taken = apply_channels(named, fronts_[0], payload, channels.bytes); !taken) return taken;
   }
   if (updates() > std::max(before, budget_.max_updates)) return fail("more updates than the room that the view names");
-  rebalance();
+  if (over_budget()) rebalance();
   return {};
 }
 
@@ -67,9 +67,21 @@ std::uint64_t StreamClient::sum(std::uint64_t (Front::*count)() const) const {
   return sum;
 }
 
-void StreamClient::look(const Camera& camera) {
+void StreamClient::look(const Camera& camera, const std::optional<Box>& region) {
   importance_ = size_on_screen(camera, description_.grid);
+  const bool had_region = region_.has_value();
+  region_.reset();
+  if (region) region_.emplace(*region, description_.grid);
+  if (had_region && !region_) show_all();
   rebalance();
+}
+
+// As far as there is room.
+void StreamClient::show_all() {
+  for (std::size_t i = 0; i < fronts_.size(); ++i) {
+    Front& front = fronts_[i];
+    if (front.withheld_count() > 0) front.set_range(front.range(), front.refine(), tets_left(fronts_, i, budget_.max_tets));
+  }
 }
 
 void StreamClient::set_budget(const Budget& budget, std::uint64_t epoch) {
@@ -91,7 +103,7 @@ void StreamClient::keep_to_budget(std::uint64_t epoch) {
 }
 
 void StreamClient::rebalance() {
-  if (importance_ && over_budget()) balance(fronts_, budget_.max_tets, importance_);
+  if (importance_ && (region_ || over_budget())) balance(fronts_, budget_.max_tets, importance_, region_ ? &*region_ : nullptr);
 }
 
 std::vector<SlotGroup> StreamClient::give_up(std::uint64_t epoch, std::size_t max_supercubes) {

@@ -47,8 +47,15 @@ class StreamClient {
   // changes nothing, if the data set has not all of it. Linear in the updates for each mesh that shows another range.
   Result<void> show(const RangeRequest& shown);
 
-  // Where the mesh is seen from now on. camera: one that check_lod accepts.
-  void look(const Camera& camera);
+  // Where the mesh is seen from now on. camera: one that check_lod accepts. region: likewise; outside it the meshes are
+  // only as fine as conformity requires, and what is here beyond that is kept, but hidden. Linear in the updates if there
+  // is a region, or was one.
+  void look(const Camera& camera, const std::optional<Box>& region = {});
+  // Hides what has arrived from outside the region since look(), or since the last call. Not linear in the batch: for
+  // when a view is complete.
+  void settle() {
+    if (region_) rebalance();
+  }
 
   // Takes effect at once; but a lower max_updates only with the first answer to the view of this epoch, since the
   // server fills the old one until it has that view.
@@ -68,7 +75,7 @@ class StreamClient {
   // Of those, the ones that a mesh is made with: those that count for its range, as far as there is room, and their
   // ancestors. Here and in the next two, the sum of all meshes.
   [[nodiscard]] std::uint64_t updates_in_mesh() const { return sum(&Front::shown_count); }
-  [[nodiscard]] std::uint64_t updates_left_out() const { return sum(&Front::withheld_count); }  // for want of room
+  [[nodiscard]] std::uint64_t updates_left_out() const { return sum(&Front::withheld_count); }  // for want of room, or outside the region
   [[nodiscard]] std::uint64_t tet_count() const { return sum(&Front::tet_count); }              // O(1)
   [[nodiscard]] const Description& description() const { return description_; }
   // The updates that another session resumes with; see Front::splits. None of them is given up any more.
@@ -94,6 +101,7 @@ class StreamClient {
   }
   [[nodiscard]] std::uint64_t sum(std::uint64_t (Front::*count)() const) const;
   void rebalance();
+  void show_all();
   bool forget(std::uint64_t epoch);
   void keep_to_budget(std::uint64_t epoch);
   Description description_;
@@ -106,6 +114,7 @@ class StreamClient {
   };
   std::optional<LessRoom> less_room_;
   Importance importance_;           // empty before look()
+  std::optional<SeenBox> region_;   // of look()
   std::vector<SlotGroup> forget_;   // to be forgotten with the first answer to
   std::uint64_t forget_epoch_ = 0;  // ... the view of this epoch
 };

@@ -12,6 +12,7 @@ Result<void> ViewingSession::look(const WantedView& view, std::optional<DepthMap
   if (view.region) lod.camera.reset();
   const ViewRequest request{.lod = lod,
                             .camera = view.camera,
+                            .within = view.region,
                             .budget = view.budget,
                             .shown = view.shown,
                             .early = true,

@@ -17,7 +17,7 @@ namespace intervale {
 // What is to be seen.
 struct WantedView {
   Camera camera;                           // pixel_error: how far surfaces may be off, if there is no region
-  std::optional<Box> region;               // refined to error 0; the rest only as far as conformity requires
+  std::optional<Box> region;               // refined to error 0; the rest only as far as conformity requires, whatever is here
   Budget budget;                           // max_updates: at least kMinRoom
   RangeRequest shown;                      // of the data set
   std::vector<std::string> channels = {};  // likewise

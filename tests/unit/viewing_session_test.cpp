@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <random>
 
+#include "client/view/coarse_front.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_file.h"
 #include "protocol/codec.h"
+#include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
 #include "tests/support/session_server.h"
@@ -127,6 +130,84 @@ TEST_F(ViewingSessionTest, KeepsTheRoomForUpdatesWhichMayChange) {
     server.run();
   }
   EXPECT_LE(session.mesh()->updates(), 1100u);
+}
+
+// Within the samples of a grid, or reaching a little beyond.
+Box random_region_of_view(const Grid& grid, std::mt19937& random) {
+  Box region;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double side = box_of(grid).max[i] - box_of(grid).min[i];
+    region.min[i] = box_of(grid).min[i] + testing::uniform(random, -0.1, 0.8) * side;
+    region.max[i] = region.min[i] + testing::uniform(random, 0.05, 0.5) * side;
+  }
+  return region;
+}
+
+// Views before it do not matter; and what they received is shown again after it, without being sent again.
+TEST(RegionOfAView, ShowsTheMeshOfAClientThatAskedForTheRegionOnly) {
+  for (const unsigned seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    std::mt19937 random(seed);
+    const auto volume = volume_of({33, 21, 17});
+    ViewingSession session("made", "test");
+    ASSERT_TRUE(session.look({.camera = kSessionCamera}));
+    ViewingServer server(volume, session);
+    server.run();
+    for (int k = 0; k < 4; ++k) {
+      const WantedView view{.camera = kSessionCamera, .region = random_region_of_view(volume->description().grid, random)};
+      ASSERT_TRUE(session.look(view));
+      server.run(k);  // a view may come before the last one is complete
+      if (k % 2 == 1) continue;
+      server.run();
+      ViewingSession fresh("made", "test");
+      ASSERT_TRUE(fresh.look(view));
+      ViewingServer its_server(volume, fresh);
+      its_server.run();
+      ASSERT_EQ(canonical(session.mesh()->mesh()), canonical(fresh.mesh()->mesh()));
+      ASSERT_EQ(session.mesh()->front().validate(), std::nullopt);
+      EXPECT_GT(session.mesh()->updates(), fresh.mesh()->updates()) << "what the first view received is kept";
+    }
+    ASSERT_TRUE(session.look({.camera = kSessionCamera}));
+    server.run();
+    EXPECT_EQ(session.mesh()->updates_left_out(), 0u);
+    EXPECT_EQ(session.session().stats().updates, session.mesh()->updates()) << "nothing is sent twice";
+    EXPECT_EQ(canonical(session.mesh()->mesh()), canonical(coarse_front(*session.mesh(), 0).mesh())) << "all is shown again";
+  }
+}
+
+// Of every range, one of several ranges changes while there is a region; then updates of any range follow, ahead.
+TEST(RegionOfAView, HoldsForEachOfSeveralRanges) {
+  const auto volume = testing::build_shared(testing::gyroid({33, 33, 33}), {.range = {-1, 1}, .refine = Refine::uniform});
+  const RangeRequest one{.ranges = {{-0.3, 0.2}, {0.4, 0.6}}}, other{.ranges = {{-0.3, 0.2}, {0.3, 0.7}}};
+  ViewingSession session("made", "test");
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .shown = one}));
+  ViewingServer server(volume, session);
+  server.run();
+  const Box region{{3, 4, 5}, {14, 12, 13}};
+  for (const RangeRequest& shown : {one, other}) {
+    const WantedView view{.camera = kSessionCamera, .region = region, .shown = shown};
+    ASSERT_TRUE(session.look(view));
+    server.run();
+    ViewingSession fresh("made", "test");
+    ASSERT_TRUE(fresh.look(view));
+    ViewingServer its_server(volume, fresh);
+    its_server.run();
+    EXPECT_EQ(canonical(session.mesh()->mesh()), canonical(fresh.mesh()->mesh()));
+  }
+}
+
+TEST(RegionOfAView, KeepsTheBudgetOfTetrahedra) {
+  const auto volume = volume_of({17, 17, 17});
+  ViewingSession session("made", "test");
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .budget = {.max_tets = 3000}}));
+  ViewingServer server(volume, session);
+  server.run();
+  ASSERT_TRUE(session.look({.camera = kSessionCamera, .region = Box{{2, 2, 2}, {12, 12, 12}}, .budget = {.max_tets = 3000}}));
+  for (int k = 0; k < 1000 && !session.is_done(); ++k) {
+    server.run(1);
+    ASSERT_LE(session.mesh()->tet_count(), 3000u);
+  }
+  EXPECT_EQ(session.mesh()->front().validate(), std::nullopt);
 }
 
 TEST_F(ViewingSessionTest, InvalidMessagesAndFaultsEndIt) {

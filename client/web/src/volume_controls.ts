@@ -75,8 +75,8 @@ export class VolumeControls {
     if (input('volume').disabled) {
       return 'Volume rendering needs floating-point render targets (EXT_color_buffer_float), which this graphics card or driver does not support.';
     }
-    const { render, maxTets } = this.view.value;
-    if (render !== 'volume' || !progress || progress.updatesShown >= progress.updates || (maxTets !== null && maxTets < kMostVolumeTets)) return '';
+    const { render, maxTets, region } = this.view.value;
+    if (render !== 'volume' || region || !progress || progress.updatesShown >= progress.updates || (maxTets !== null && maxTets < kMostVolumeTets)) return '';
     return `At most ${count(kMostVolumeTets)} tetrahedra are drawn: what was received is finer.`;
   }
 
