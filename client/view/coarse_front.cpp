@@ -2,6 +2,7 @@
 
 #include <cassert>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/util/bits.h"
@@ -16,18 +17,10 @@ std::uint64_t slots_that_stay(int scale, int levels) {
   return slots;
 }
 
-}  // namespace
-
-Front coarse_front(const StreamClient& client, int levels) {
-  const Front& fine = client.front();
-  std::vector<SlotGroup> groups;
-  const std::vector<SlotGroup> all = fine.splits();  // coarse scales first
-  groups.reserve(all.size());
-  for (SlotGroup group : all) {
-    group.slots &= slots_that_stay(scale_of_key(group.key), levels);
-    if (group.slots != 0) groups.push_back(group);
-  }
-  const Description& description = client.description();
+// Of splits that have their parents with them, coarse scales first.
+Front without_finest(std::vector<SlotGroup> groups, const Description& description, const Front& fine, int levels) {
+  for (SlotGroup& group : groups) group.slots &= slots_that_stay(scale_of_key(group.key), levels);
+  std::erase_if(groups, [](const SlotGroup& group) { return group.slots == 0; });
   Front coarse(description.grid, description.format, description.corners, fine.range(), fine.refine());
   const auto keys_of = [&fine](const SlotGroup& group, std::span<ValueKey, kSlots> keys) {
     const FrontState::Block* const block = fine.state().find_block(scale_of_key(group.key), position_of_key(group.key));
@@ -36,6 +29,18 @@ Front coarse_front(const StreamClient& client, int levels) {
   [[maybe_unused]] const auto misfit = coarse.split_all(groups, keys_of);
   assert(!misfit && "parents are of coarser levels");
   return coarse;
+}
+
+}  // namespace
+
+Front coarse_front(const StreamClient& client, int levels) {
+  return without_finest(client.front().splits(), client.description(), client.front(), levels);
+}
+
+Front coarse_shown_front(const StreamClient& client, const Front& fine, int levels) {
+  std::vector<SlotGroup> groups = fine.splits();
+  for (SlotGroup& group : groups) group.slots &= fine.shown_slots(group.key);
+  return without_finest(std::move(groups), client.description(), fine, levels);
 }
 
 }  // namespace intervale

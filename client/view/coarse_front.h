@@ -1,4 +1,4 @@
-// A coarser stand-in for a mesh: what a viewer shows while its range changes from moment to moment.
+// A coarser stand-in for a mesh: what a viewer shows while its range or its camera changes from moment to moment.
 #pragma once
 
 #include "client/core/stream_client.h"
@@ -10,5 +10,8 @@ namespace intervale {
 // scale and class, of which each has about half as many as the next finer one. levels: at least 0; 3 for each scale.
 // O(the client's splits).
 [[nodiscard]] Front coarse_front(const StreamClient& client, int levels);
+
+// The same of what one of the client's fronts shows, for its range: nothing that this front hides.
+[[nodiscard]] Front coarse_shown_front(const StreamClient& client, const Front& fine, int levels);
 
 }  // namespace intervale

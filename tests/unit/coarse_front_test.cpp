@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
 #include "client/view/boundary_surface.h"
 #include "client/view/drawn_range.h"
 #include "client/view/point_values.h"
+#include "client/view/stand_in.h"
 #include "common/selection/stream_plan.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
@@ -78,6 +80,40 @@ TEST_P(CoarseFrontOf, IsDrawnInPlaceOfTheMeshUntilThatIsAskedFor) {
   EXPECT_TRUE(drawn.values().empty());
   const BoundarySurface::Change none = drawn.update(false, {});
   EXPECT_TRUE(!none.reset && none.pieces.empty() && none.removed.empty());
+}
+
+TEST_P(CoarseFrontOf, StandsInForWhatIsShownOnly) {
+  const Grid& grid = client_.description().grid;
+  Box half = box_of(grid);
+  half.max[0] = (half.min[0] + half.max[0]) / 2;
+  client_.look({.eye = {60, 50, 70}}, half);
+  const Front& shown = client_.front();
+  ASSERT_GT(shown.withheld_count(), 0u);
+  EXPECT_EQ(canonical(coarse_shown_front(client_, shown, 0).mesh()), canonical(client_.mesh()));
+  for (const int levels : {1, 3, 5}) {
+    const Front coarse = coarse_shown_front(client_, shown, levels);
+    EXPECT_EQ(coarse.validate(), std::nullopt);
+    EXPECT_LE(coarse.shown_count(), shown.shown_count());
+  }
+}
+
+TEST_P(CoarseFrontOf, AStandInHasNoMoreTrianglesThanThereIsTimeFor) {
+  ASSERT_TRUE(client_.show({.ranges = {client_.front().range(), {client_.front().range().alpha, client_.front().range().alpha + 0.2}}}));
+  std::uint64_t full = 0;
+  for (const Front& front : client_.fronts()) {
+    BoundarySurface surface(front);
+    (void)surface.update();
+    full += surface.triangles();
+  }
+  for (const std::uint64_t most : {2 * full, full, full - 1, full / 3, full / 10, std::uint64_t(0)}) {
+    StandIn stand_in(client_, full, most);
+    ASSERT_EQ(stand_in.ranges().size(), 2u);
+    const std::uint64_t coarsest = StandIn(client_, full, 0).triangles();
+    EXPECT_LE(stand_in.triangles(), std::max(most, coarsest));
+    if (most >= full) {
+      EXPECT_EQ(stand_in.triangles(), full);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Random, CoarseFrontOf, ::testing::Range(0u, 4u));

@@ -18,9 +18,11 @@
 #include "client/view/cross_section.h"
 #include "client/view/drawn_range.h"
 #include "client/view/point_values.h"
+#include "client/view/stand_in.h"
 #include "client/view/tets_in_box.h"
 #include "client/view/viewing_session.h"
 #include "client/view/volume_tets.h"
+#include "client/web/core/js_surface.h"
 #include "client/web/core/js_values.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/mesh/mesh_digest.h"
@@ -157,14 +159,11 @@ class Viewer {
     progress.set("remainingPixels", session_.remaining_pixels());
     progress.set("done", done());
     progress.set("full", stats.is_full);
-    double triangles = 0, bound = 0;
+    double bound = 0;
     std::vector<double> volumes;
     volumes.reserve(drawn_.size());
-    for (const DrawnRange& range : drawn_) {
-      triangles += double(range.surface().triangles());
-      volumes.push_back(range.surface().volume());
-    }
-    progress.set("triangles", triangles);
+    for (const DrawnRange& range : drawn_) volumes.push_back(range.surface().volume());
+    progress.set("triangles", double(surface_triangles()));
     progress.set("volumes", array_of(volumes));
     const bool rests = !drawn_.empty() && done() && !is_previewing_ && !stale_;  // the bound takes about as long as the surface
     for (DrawnRange& range : drawn_) bound += rests ? range.volume_bound() : 0;
@@ -192,8 +191,8 @@ class Viewer {
       const BoundarySurface::Change change = drawn_[i].update(all, wanted_values());
       if (change.reset) reset.call<void>("push", double(i));
       is_other_mesh = is_other_mesh || change.is_other_mesh;
-      for (const std::uint32_t id : change.removed) removed.call<void>("push", piece_id(i, id));
-      for (const std::uint32_t id : change.pieces) pieces.call<void>("push", piece(i, id, edges));
+      for (const std::uint32_t id : change.removed) removed.call<void>("push", js_piece_id(i, id));
+      for (const std::uint32_t id : change.pieces) pieces.call<void>("push", js_piece(i, drawn_[i], id, edges));
     }
     for (std::size_t i = drawn_.size(); i < ranges_sent_; ++i) reset.call<void>("push", double(i));
     ranges_sent_ = drawn_.size();
@@ -206,6 +205,26 @@ class Viewer {
     result.set("removed", removed);
     result.set("isOtherMesh", is_other_mesh);
     result.set("ranges", double(drawn_.size()));
+    return result;
+  }
+
+  // The same of a coarser surface, with at most so many triangles; null if that of the mesh has no more. With values if
+  // the last update_surface() had. Not while a preview is shown.
+  val stand_in(double triangles, bool edges) const {
+    const std::uint64_t most = std::uint64_t(std::max(0.0, triangles)), full = surface_triangles();
+    if (drawn_.empty() || full <= most) return val::null();
+    StandIn stand_in(*session_.mesh(), full, most);
+    val pieces = val::array(), reset = val::array();
+    for (std::size_t i = 0; i < kMaxRanges; ++i) reset.call<void>("push", double(i));
+    for (std::size_t i = 0; i < stand_in.ranges().size(); ++i) {
+      DrawnRange& range = stand_in.ranges()[i];
+      for (const std::uint32_t id : range.update(true, wanted_values()).pieces) pieces.call<void>("push", js_piece(i, range, id, edges));
+    }
+    val result = val::object();
+    result.set("reset", reset);
+    result.set("pieces", pieces);
+    result.set("removed", val::array());
+    result.set("ranges", double(stand_in.ranges().size()));
     return result;
   }
 
@@ -281,10 +300,16 @@ class Viewer {
     return result ? std::string() : result.error().message;
   }
 
-  // What a camera sees of the last surface; none if that would take too long.
-  [[nodiscard]] std::optional<DepthMap> depth_map(const Camera& camera) const {
+  // Of the last surface.
+  [[nodiscard]] std::uint64_t surface_triangles() const {
     std::uint64_t triangles = 0;
     for (const DrawnRange& range : drawn_) triangles += range.surface().triangles();
+    return triangles;
+  }
+
+  // What a camera sees of the last surface; none if that would take too long.
+  [[nodiscard]] std::optional<DepthMap> depth_map(const Camera& camera) const {
+    const std::uint64_t triangles = surface_triangles();
     if (triangles == 0 || triangles > kMostTrianglesOfMap) return {};
     DepthBuffer buffer(camera);
     for (const DrawnRange& range : drawn_) range.surface().draw(buffer);
@@ -309,24 +334,6 @@ class Viewer {
     const std::vector<ChannelValues>& channels = session_.mesh()->channels();
     const auto found = std::find_if(channels.begin(), channels.end(), [this](const ChannelValues& one) { return one.channel().name == channel_; });
     return DrawnRange::WantedValues{found == channels.end() ? nullptr : &*found};
-  }
-
-  // Of a piece of the i-th range.
-  static double piece_id(std::size_t i, std::uint32_t id) { return double(std::uint64_t(id) * kMaxRanges + i); }
-  val piece(std::size_t i, std::uint32_t id, bool edges) {
-    const SurfacePiece p = drawn_[i].piece(id, edges);
-    val piece = val::object();
-    piece.set("id", piece_id(i, p.id));
-    piece.set("range", double(i));
-    piece.set("vertices", buffer_of(p.vertices));
-    piece.set("values", drawn_[i].values().empty() ? val::null() : buffer_of(values_of(p.points, drawn_[i].values())));
-    piece.set("indices", buffer_of(p.indices));
-    piece.set("edges", edges ? buffer_of(p.edges) : val::null());
-    piece.set("triangles", array_of(p.triangles));
-    piece.set("edgeCounts", array_of(p.edge_counts));
-    piece.set("min", array_of(p.min));
-    piece.set("max", array_of(p.max));
-    return piece;
   }
 
   ViewingSession session_;
@@ -359,6 +366,7 @@ EMSCRIPTEN_BINDINGS(intervale) {
       .function("isNewMesh", &Viewer::is_new_mesh)
       .function("updates", &Viewer::updates)
       .function("done", &Viewer::done)
+      .function("standIn", &Viewer::stand_in)
       .function("isStale", &Viewer::is_stale)
       .function("faultCode", &Viewer::fault_code)
       .function("progress", &Viewer::progress)

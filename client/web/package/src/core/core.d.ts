@@ -22,6 +22,8 @@ export interface Viewer {
   wantValues(wanted: boolean, channel: string): void;
   // all: every piece, changed or not. isOtherMesh: tetrahedra changed, perhaps only some inside.
   updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version' | 'hasValues'> & { isOtherMesh: boolean };
+  // A coarser surface, of all its pieces; null: the last updateSurface() has no more than so many triangles.
+  standIn(triangles: number, edges: boolean): Omit<SurfaceChange, 'version' | 'hasValues'> | null;
   isStale(): boolean; // the mesh may have changed since the last updateSurface(): cap(), tets() and volume() must not be called
   cap(plane: Plane): Pick<Cap, 'vertices' | 'values' | 'triangles'>;
   tets(box: Box): Omit<Tets, 'box'>;
