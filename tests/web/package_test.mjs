@@ -203,3 +203,35 @@ test('an element shows its data set, follows its attributes and the mouse, and t
   await page.evaluate(() => document.querySelector('intervale-view').remove());
   assert.deepEqual(errors, []);
 });
+
+// Pictures follow each other no faster than the screen, whose rate is below 240 a second.
+test('an element draws a coarser mesh while its camera moves, if there is a frame rate, and all of it at rest', async () => {
+  await page.evaluate((src) => {
+    window.events = [];
+    const view = document.createElement('intervale-view');
+    view.addEventListener('load-end', () => window.events.push('load-end'));
+    view.setAttribute('range', '128 188');
+    view.setAttribute('frame-rate', '0');
+    view.setAttribute('src', src);
+    document.querySelector('#views').append(view);
+  }, address('any'));
+  await page.waitForFunction(() => window.events.length > 0);
+  // How many of the pictures of a move have the coarser mesh.
+  const coarse = () => page.evaluate(async () => {
+    const view = document.querySelector('intervale-view');
+    const { pose } = view;
+    let count = 0;
+    for (let i = 0; i < 90; ++i) {
+      view.setPose({ ...pose, eye: pose.eye.map((x, axis) => x + (axis === 0 ? i / 100 : 0)) });
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+      count += view.volume.isCoarse ? 1 : 0;
+    }
+    return count;
+  });
+  assert.equal(await coarse(), 0);
+  await page.evaluate(() => document.querySelector('intervale-view').setAttribute('frame-rate', '240'));
+  await eventually(async () => assert.ok((await coarse()) > 0));
+  await page.waitForFunction(() => !document.querySelector('intervale-view').volume.isCoarse);
+  await page.evaluate(() => document.querySelector('intervale-view').remove());
+  assert.deepEqual(errors, []);
+});

@@ -10,6 +10,7 @@ import { applied, boxAround, center, corners, diagonal } from '../package/src/ve
 
 interface PieceObjects {
   range: number;
+  triangles: number;
   mesh: Mesh;
   lines: LineSegments | null; // the edges
 }
@@ -20,6 +21,7 @@ export class BoundarySurfaceView {
   version = 0; // of what is shown; 0: nothing yet
   hasValues = false; // what is shown
   ranges = 0; // that are shown; 0: nothing yet
+  triangles = 0; // shown
   private pieces = new Map<number, PieceObjects>(); // shown, by id
   private pending: SurfaceChange[] = []; // oldest first
   private uploaded: { id: number; objects: PieceObjects }[] = []; // of the first pending one
@@ -58,6 +60,7 @@ export class BoundarySurfaceView {
     for (const { id, objects } of this.uploaded) {
       this.remove(id);
       this.pieces.set(id, objects);
+      this.triangles += objects.triangles;
       this.faces.add(objects.mesh);
       if (objects.lines) this.edges.add(objects.lines);
     }
@@ -85,6 +88,7 @@ export class BoundarySurfaceView {
     const objects = this.pieces.get(id);
     if (!objects) return;
     this.pieces.delete(id);
+    this.triangles -= objects.triangles;
     this.faces.remove(objects.mesh);
     if (objects.lines) this.edges.remove(objects.lines);
     dispose(objects);
@@ -108,7 +112,7 @@ export class BoundarySurfaceView {
     const mesh = new Mesh(geometry(piece.indices, piece.triangles, 3), this.materials[piece.range]!.opaque);
     setValues(mesh.geometry, piece.values);
     const lines = piece.edges ? new LineSegments(geometry(piece.edges, piece.edgeCounts, 2), this.materials[piece.range]!.edges) : null;
-    return { range: piece.range, mesh, lines };
+    return { range: piece.range, triangles: piece.triangles.reduce((sum, count) => sum + count, 0), mesh, lines };
   }
 }
 

@@ -98,7 +98,7 @@ class Page {
       this.mesh.shown(version);
       status.set({ surfaceVersion: version });
     };
-    viewer.onResize = () => this.updateMesh();
+    viewer.onResize = viewer.onStandIn = () => this.updateMesh();
     viewer.onContext = (isLost) => status.set({ notice: isLost ? kContextLost : null });
     viewer.onDrawn = () => {
       const pose = viewer.pose();
@@ -186,6 +186,7 @@ class Page {
       edges: wireframe,
       values: showsValues(view.value) || probe,
       volume,
+      standIn: volume ? null : this.viewer.wantedStandIn,
     };
   }
 

@@ -11,6 +11,7 @@ import type { Store } from './store';
 // The positions of the sliders; null: no limit.
 const kTetBudgets = [null, 10e3, 20e3, 50e3, 100e3, 200e3, 500e3, 1e6, 2e6, 5e6, 10e6];
 const kMemoryBudgets = [null, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]; // MB
+const kFrameRates = [null, 5, 10, 15, 20, 30, 60, 120]; // null: any
 
 // What is reset when another data set is chosen: values of the last one, and coordinates in its box.
 export const kReset: Partial<ViewState> = { range: null, ranges: [], span: null, opacity: null, pose: null, clip: null, region: null, tets: false };
@@ -79,14 +80,17 @@ function watchSwitches(view: Store<ViewState>): void {
 }
 
 function watchSliders(view: Store<ViewState>): void {
-  const [pixels, tets, memory] = [input('pixel-error'), input('max-tets'), input('memory')];
+  const [pixels, tets, memory, rate] = [input('pixel-error'), input('max-tets'), input('memory'), input('frame-rate')];
   pixels.addEventListener('input', () => view.set({ pixelError: pixelsAt(pixels.valueAsNumber) }));
   tets.addEventListener('input', () => view.set({ maxTets: kTetBudgets[tets.valueAsNumber] ?? null }));
   memory.addEventListener('input', () => view.set({ memory: kMemoryBudgets[memory.valueAsNumber] ?? null }));
-  view.watch(['pixelError', 'maxTets', 'memory'], (value) => {
+  rate.addEventListener('input', () => view.set({ frameRate: kFrameRates[rate.valueAsNumber] ?? 0 }));
+  view.watch(['pixelError', 'maxTets', 'memory', 'frameRate'], (value) => {
     pixels.value = String(positionOf(value.pixelError));
     tets.value = String(nearest(kTetBudgets, value.maxTets));
     memory.value = String(nearest(kMemoryBudgets, value.memory));
+    rate.value = String(nearest(kFrameRates, value.frameRate || null));
+    setText(element('frame-rate-out'), value.frameRate === 0 ? 'any' : `${short(value.frameRate)} a second`);
     setText(element('pixel-error-out'), `${short(value.pixelError)} px`);
     setText(element('max-tets-out'), value.maxTets === null ? 'no limit' : `at most ${count(value.maxTets)}`);
     setText(element('memory-out'), value.memory === null ? 'no limit' : `at most ${count(value.memory)} MB`);

@@ -27,12 +27,14 @@ export interface Probed {
 export class Picture {
   readonly renderer: WebGLRenderer;
   readonly surface: BoundarySurfaceView;
+  readonly standIn: BoundarySurfaceView; // a coarser one, drawn in its place while the camera moves
   readonly outlines = new Outlines();
   readonly thickness: Thickness;
   readonly uploader: Uploader;
   readonly cap: CapView;
   readonly tets: TetsView;
   readonly volume: VolumeView;
+  private drawn: BoundarySurfaceView; // of the two
   private materials = surfaceMaterials(false);
   private valueMaterials = surfaceMaterials(true);
   private transparency = new Transparency();
@@ -48,7 +50,8 @@ export class Picture {
     this.renderer.outputColorSpace = LinearSRGBColorSpace; // no conversion: the shaders write sRGB
     this.compileShaders();
     this.uploader = new Uploader(this.renderer);
-    this.surface = new BoundarySurfaceView(this.uploader, this.materials);
+    this.surface = this.drawn = new BoundarySurfaceView(this.uploader, this.materials);
+    this.standIn = new BoundarySurfaceView(this.uploader, this.materials);
     this.cap = new CapView(this.uploader);
     this.tets = new TetsView(this.uploader);
     this.thickness = new Thickness(this.renderer);
@@ -76,6 +79,7 @@ export class Picture {
     shared.coarsestLevel.value = frame.coarsestLevel;
     this.thickness.reset();
     this.surface.clear();
+    this.standIn.clear();
     this.setCap(frame, null);
     this.tets.discardPending();
     this.showTets(frame, null);
@@ -113,12 +117,14 @@ export class Picture {
     shared.hiddenMax.value.set(...(box ? toDrawing(frame, box.max) : ([-1, -1, -1] as Vec3)));
   }
 
-  draw(frame: Frame, pose: Pose, view: ViewState, withOutlines: boolean): void {
+  // surface: which of the two.
+  draw(frame: Frame, pose: Pose, view: ViewState, withOutlines: boolean, surface = this.surface): void {
     this.setCamera(frame, pose);
+    this.drawn = surface;
     const { renderer, camera } = this;
     // What has no values yet is drawn in the colours of the surfaces.
     const isByValue = (part: { hasValues: boolean }) => view.colorBy === 'value' && part.hasValues && shared.palette.value !== null;
-    const materials = isByValue(this.surface) ? this.valueMaterials : this.materials;
+    const materials = isByValue(surface) ? this.valueMaterials : this.materials;
     const cap = isByValue(this.cap) ? this.cap.valueMaterials : this.cap.materials;
     const tets = isByValue(this.tets) ? this.tets.valueMaterial : this.tets.material;
     renderer.setRenderTarget(null);
@@ -130,7 +136,7 @@ export class Picture {
       this.thickness.draw(renderer, camera, () => this.drawThicknessLayers(frame, pose));
     } else {
       this.drawOpaque(materials.map(({ opaque }) => opaque), cap, tets);
-      if (view.wireframe) renderer.render(this.surface.edges, camera);
+      if (view.wireframe) renderer.render(surface.edges, camera);
       const transparent = materials.map((of) => of.transparent);
       if (transparent.flat().some((material) => material.visible)) {
         const drawDepth = () => this.drawOpaque(materials.map(({ depth }) => depth), this.cap.depth, this.tets.depth);
@@ -143,6 +149,7 @@ export class Picture {
   // What is drawn in the pixel at x, y (CSS pixels from the canvas's upper left corner); null: nothing.
   probe(frame: Frame, pose: Pose, x: number, y: number): Probed | null {
     this.setCamera(frame, pose);
+    this.drawn = this.surface;
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     const [column, row] = [Math.floor(x), Math.floor(y)];
     const surface = (this.surface.hasValues ? this.valueMaterials : this.materials).map(({ pick }) => pick);
@@ -161,8 +168,8 @@ export class Picture {
   }
 
   private drawSurface(materials: Material | Material[][]): void {
-    this.surface.use(materials);
-    this.renderer.render(this.surface.faces, this.camera);
+    this.drawn.use(materials);
+    this.renderer.render(this.drawn.faces, this.camera);
   }
 
   private drawOpaque(surface: Material | Material[][], cap: Material | Material[], tets: Material): void {

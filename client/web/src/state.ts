@@ -4,7 +4,8 @@
 //   #data=NAME&eye=x,y,z&at=x,y,z&up=x,y,z&fov=30
 //
 // and, where they differ from the defaults: range=low,high (either may be -inf or inf), or several
-// range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe,
+// range=low,high,rrggbb,opacity; px (pixel error), tets and mb (budgets), fps (frame rate while the camera
+// moves; 0: any), clip=nx,ny,nz,offset, roi=x0,y0,z0,x1,y1,z1, show (comma-separated: tets, thickness, levels, wireframe,
 // probe), shrink, color=value, channel (a name), palette (a name),
 // span=low,high, render=volume, opacity=value:opacity,value:opacity,..., and alpha, beta and box (each rrggbb,opacity).
 import { kFov, type Pose } from '../package/src/camera';
@@ -39,6 +40,7 @@ export class ViewState {
   pixelError = 1; // largest screen-space error, pixels; 0.1 to 64
   maxTets: number | null = null; // null: no limit
   memory: number | null = null; // MB for updates; null: no limit
+  frameRate = 60; // pictures a second while the camera moves, for which the mesh may be coarser; 0: always all of it
   clip: Plane | null = null;
   region: Box | null = null;
   tets = false; // shrunken tetrahedra in the region
@@ -97,6 +99,7 @@ export function toHash(state: ViewState): string {
   if (state.pixelError !== kDefaults.pixelError) put('px', write([state.pixelError]));
   if (state.maxTets !== null) put('tets', write([state.maxTets]));
   if (state.memory !== null) put('mb', write([state.memory]));
+  if (state.frameRate !== kDefaults.frameRate) put('fps', write([state.frameRate]));
   if (state.clip) put('clip', write([...state.clip.normal, state.clip.offset]));
   if (state.region) put('roi', write([...state.region.min, ...state.region.max]));
   const flags = kFlags.filter((flag) => state[flag]);
@@ -179,6 +182,7 @@ export function fromHash(hash: string): ViewState {
   state.pixelError = readClamped(get('px'), 0.1, 64) ?? kDefaults.pixelError;
   state.maxTets = readClamped(get('tets'), 1, 1e9);
   state.memory = readClamped(get('mb'), 1, 1e5);
+  state.frameRate = readClamped(get('fps'), 0, 240) ?? kDefaults.frameRate;
   const clip = read(get('clip'), 4);
   if (clip && (clip[0] || clip[1] || clip[2])) state.clip = { normal: unit(clip.slice(0, 3) as Vec3), offset: clip[3]! };
   const roi = read(get('roi'), 6);

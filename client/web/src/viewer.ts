@@ -3,16 +3,25 @@
 import { fitted, type Pose } from '../package/src/camera';
 import type { Dataset } from '../package/src/datasets';
 import { type Frame, frameOf } from '../package/src/frame';
+import { FramePace } from '../package/src/frame_pace';
 import { GpuFence } from './gpu_fence';
 import type { LiveMesh } from '../package/src/live_mesh';
-import type { Cap, Volume } from '../package/src/messages';
+import type { Cap, SurfaceChange, Volume } from '../package/src/messages';
 import { Picture, type Probed } from './picture';
 import type { ViewState } from './state';
 import type { Store } from './store';
 import { add, sub } from '../package/src/vec';
 
+const kRestMs = 150; // after which the camera rests that has not moved
+const kShare = 0.9; // of the time between two frames that a picture may take
+const kPollMs = 4; // how often to look whether a picture is done
+
 export class Stats {
   frames = 0; // drawn
+  coarseFrames = 0; // ... of those, with the stand-in
+  isCoarse = false; // the last picture has the stand-in
+  standInTriangles = 0; // of the stand-in that could be drawn; 0: there is none
+  longestFrame = 0; // ms: the longest that a picture took, on the graphics card, too, since it was last set to 0
   longestBlock = 0; // ms: longest block of this thread by uploads, since it was last set to 0
   surfaceVersion = 0; // of the boundary surface shown; 0: none
   capTriangles = 0; // shown
@@ -28,6 +37,7 @@ export class Viewer {
   frame: Frame | null = null; // of the open data set
   onShown: (version: number) => void = () => {}; // of the surface
   onDrawn: () => void = () => {};
+  onStandIn: () => void = () => {}; // another stand-in is wanted: see wantedStandIn
   onProbed: (found: Probed | null) => void = () => {}; // the answer to probe(); null: nothing is drawn there
   onResize: () => void = () => {};
   onContext: (isLost: boolean) => void = () => {}; // the WebGL context was lost or restored
@@ -37,6 +47,11 @@ export class Viewer {
   private isDirty = true; // a draw is needed
   private isScheduled = false; // step() is requested
   private isLost = false; // the WebGL context
+  private pace = new FramePace();
+  private restTimer = 0; // runs while the camera moves
+  private hasMoved = false; // since the last picture
+  // The picture that is being drawn. isMove: of another camera than the last one's.
+  private timed: { start: number; triangles: number; isCoarse: boolean; isMove: boolean } | null = null;
   private fence: GpuFence;
 
   // Throws if there is no WebGL 2.
@@ -50,6 +65,7 @@ export class Viewer {
     }).observe(canvas);
     canvas.addEventListener('webglcontextlost', () => {
       this.isLost = true;
+      this.timed = null;
       this.fence.forget();
       this.onContext(true);
     });
@@ -59,6 +75,15 @@ export class Viewer {
       this.invalidate(); // three.js uploads the buffers again, from the arrays it keeps
     });
     this.picture.thickness.onMaximum = () => this.invalidate();
+    let pose = view.value.pose;
+    view.watch(['pose'], (value) => {
+      if (value.pose !== pose) this.moved();
+      pose = value.pose;
+    });
+    view.watch(['frameRate'], () => {
+      this.pace = new FramePace();
+      this.onStandIn();
+    });
     view.watch([], () => {
       this.restyle();
       this.invalidate();
@@ -71,7 +96,28 @@ export class Viewer {
     if (ranges === 0 || ranges === Math.max(1, this.view.value.ranges.length)) this.picture.setStyles(this.view.value);
   }
 
+  // Triangles of a stand-in that would be drawn in time; null: none is needed.
+  get wantedStandIn(): number | null {
+    return this.view.value.frameRate > 0 ? this.pace.budget : null;
+  }
+
+  private moved(): void {
+    this.hasMoved = true;
+    this.restSoon();
+  }
+
+  // Counts from when the picture of the last move is done: what moves the camera may wait for that.
+  private restSoon(): void {
+    window.clearTimeout(this.restTimer);
+    this.restTimer = window.setTimeout(() => {
+      if (this.timed?.isMove) return this.restSoon();
+      this.restTimer = 0;
+      if (this.stats.isCoarse) this.invalidate();
+    }, kRestMs);
+  }
+
   open(dataset: Dataset): void {
+    this.pace = new FramePace();
     this.pendingCap = this.pendingVolume = null;
     this.frame = frameOf(dataset);
     this.picture.open(this.frame);
@@ -95,6 +141,7 @@ export class Viewer {
   // Shows what arrives of a mesh.
   watch(mesh: LiveMesh): void {
     mesh.addEventListener('surface', ({ detail }) => this.take(() => this.picture.surface.take(detail.change)));
+    mesh.addEventListener('standIn', ({ detail }) => this.take(() => this.takeStandIn(detail.change)));
     mesh.addEventListener('cap', ({ detail }) => this.take(() => (this.pendingCap = detail.cap)));
     mesh.addEventListener('tets', ({ detail }) => this.take(() => this.picture.tets.take(detail.tets)));
     mesh.addEventListener('volume', ({ detail }) => this.take(() => (this.pendingVolume = detail.volume)));
@@ -104,6 +151,14 @@ export class Viewer {
   private take(change: () => void): void {
     change();
     this.schedule();
+  }
+
+  private takeStandIn(change: SurfaceChange | null): void {
+    const { standIn } = this.picture;
+    if (change) return standIn.take(change);
+    standIn.clear();
+    this.stats.standInTriangles = 0;
+    if (this.stats.isCoarse) this.isDirty = true;
   }
 
   private takeOrder(version: number, order: ArrayBuffer): void {
@@ -152,12 +207,13 @@ export class Viewer {
     if (this.isLost) return;
     // While the graphics card draws, any other WebGL call could block this thread until it is done; so none is made.
     if (this.fence.isPending) return this.schedule();
+    this.measure();
     const start = performance.now();
     const shown = this.frame && this.isUploading() ? this.upload(this.frame) : 0;
     this.stats.longestBlock = Math.max(this.stats.longestBlock, performance.now() - start);
     const pose = this.pose();
     if (this.isDirty) this.draw();
-    else if (this.probedAt && this.frame && pose) {
+    else if (this.probedAt && this.frame && pose && !this.stats.isCoarse) {
       const [x, y] = this.probedAt;
       this.probedAt = null;
       this.stats.probes++;
@@ -170,16 +226,17 @@ export class Viewer {
       }
       this.onShown(shown);
     }
-    if (this.isUploading() || this.isDirty || this.probedAt) this.schedule();
+    if (this.isUploading() || this.isDirty || (this.probedAt && !this.stats.isCoarse)) this.schedule();
   }
 
   private isUploading(): boolean {
-    return this.picture.surface.isBusy || this.picture.tets.isBusy || this.pendingCap !== null || this.pendingVolume !== null;
+    const { surface, standIn, tets } = this.picture;
+    return surface.isBusy || standIn.isBusy || tets.isBusy || this.pendingCap !== null || this.pendingVolume !== null;
   }
 
   // Uploads for one frame's budget. Returns the version of the surface that this completed; 0: none.
   private upload(frame: Frame): number {
-    const { surface, tets, uploader } = this.picture;
+    const { surface, standIn, tets, uploader } = this.picture;
     uploader.beginFrame();
     let shown = 0;
     if (surface.upload(frame)) {
@@ -189,6 +246,11 @@ export class Viewer {
       this.picture.thickness.surfaceChanged();
       shown = surface.version;
       this.isDirty = true;
+    }
+    if (standIn.upload(frame)) {
+      standIn.swap();
+      this.stats.standInTriangles = standIn.triangles;
+      this.isDirty ||= this.isMoving;
     }
     const cap = this.pendingCap;
     if (cap && (!surface.isBusy || cap.version <= surface.version)) {
@@ -218,10 +280,45 @@ export class Viewer {
     if (!this.frame || !pose || this.isLost) return;
     this.isDirty = false;
     const { clip, region } = this.view.value;
+    const start = performance.now();
     this.picture.outlines.set(this.frame, region, clip);
-    this.picture.draw(this.frame, pose, this.view.value, withOutlines);
+    this.stats.isCoarse = withOutlines && this.isMoving && this.wantedStandIn !== null && this.picture.standIn.version > 0;
+    const drawn = this.stats.isCoarse ? this.picture.standIn : this.picture.surface;
+    this.picture.draw(this.frame, pose, this.view.value, withOutlines, drawn);
     this.fence.insert();
+    this.timed = { start, triangles: drawn.triangles, isCoarse: this.stats.isCoarse, isMove: this.hasMoved };
+    this.hasMoved = false;
+    window.setTimeout(() => this.poll(), kPollMs);
     this.stats.frames++;
+    if (this.stats.isCoarse) this.stats.coarseFrames++;
     this.onDrawn();
+  }
+
+  private get isMoving(): boolean {
+    return this.restTimer !== 0;
+  }
+
+  // More often than there are frames: how long a picture took would not be known well otherwise.
+  private poll(): void {
+    if (!this.timed || this.isLost) return;
+    if (this.fence.isPending) window.setTimeout(() => this.poll(), kPollMs);
+    else this.measure();
+  }
+
+  // The picture is done: learns from the time that it took.
+  private measure(): void {
+    if (!this.timed) return;
+    const { start, triangles, isCoarse, isMove } = this.timed;
+    this.timed = null;
+    if (isMove && this.isMoving) this.restSoon();
+    const ms = performance.now() - start;
+    this.stats.longestFrame = Math.max(this.stats.longestFrame, ms);
+    const { frameRate, render } = this.view.value;
+    if (frameRate === 0 || render === 'volume') return;
+    const before = this.pace.budget;
+    const allowed = (kShare * 1000) / frameRate;
+    if (isCoarse) this.pace.drewStandIn(triangles, ms, allowed);
+    else this.pace.drewAll(triangles, ms, allowed);
+    if (this.pace.budget !== before) this.onStandIn();
   }
 }

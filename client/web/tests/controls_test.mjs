@@ -2,7 +2,7 @@
 // on the requests to the worker.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { difference, eventually, pixels, share } from './browser.mjs';
+import { decode, difference, eventually, pixels, share } from './browser.mjs';
 import { changesPicture, openPage, recordRequests, refined, settled, sharedPages, startFakeServer, state } from './fake_server.mjs';
 
 const shared = sharedPages();
@@ -294,4 +294,32 @@ test('without WebGL 2 the banner says so', async () => {
   await page.waitForFunction(() => document.querySelector('#banner-text').textContent.includes('WebGL 2'));
   await eventually(async () => assert.ok(await page.isVisible('#banner')));
   await page.context().close();
+});
+
+// A software renderer takes longer than 1/240 s for any picture.
+onPage('while the camera moves a coarser mesh is drawn, if there is a frame rate, and all of it at rest', async (page) => {
+  await recordRequests(page);
+  const standIns = () => page.evaluate(() => window.requests.filter(({ type }) => type === 'standIn').map(({ triangles }) => triangles));
+  const turn = () => page.evaluate(async () => {
+    for (let i = 0; i < 60; ++i) {
+      const pose = { eye: [150 * Math.cos(i / 60), 150 * Math.sin(i / 60), 60], lookAt: [0, 0, 0], up: [0, 0, 1], fov: 30 };
+      window.intervale.set({ pose });
+      await new Promise((resolve) => requestAnimationFrame(resolve));
+    }
+  });
+  await page.evaluate(() => window.intervale.set({ frameRate: 0 }));
+  await turn();
+  assert.equal((await stats(page)).coarseFrames, 0);
+  assert.deepEqual((await standIns()).filter((triangles) => triangles !== null), []);
+  await settled(page);
+  const picture = async () => decode(page, (await page.locator('#canvas').screenshot()).toString('base64'));
+  const full = await picture();
+  await page.evaluate(() => window.intervale.set({ frameRate: 240 }));
+  await turn();
+  await turn();
+  assert.ok((await stats(page)).coarseFrames > 0);
+  assert.ok((await standIns()).at(-1) >= 1000);
+  await page.waitForFunction(() => !window.intervale.stats.isCoarse);
+  await settled(page);
+  assert.ok(difference(full, await picture()).share < 0.001, 'the same as without a frame rate');
 });

@@ -268,6 +268,12 @@ function postSurface(reset) {
   if (plane) postCap();
   if (box) postTets();
 }
+// The mesh of the coarsest grid, whatever the page has time for.
+function postStandIn(most) {
+  if (most === null) return post({ type: 'standIn', change: null });
+  const pieces = ranges.flatMap((range, index) => new Mesh(kGrids[0], range, index).boundary());
+  post({ type: 'standIn', change: { version: ++standIns, hasValues: wantsValues, ranges: ranges.length, reset: [0, 1, 2, 3], pieces, removed: [] } });
+}
 function makeMeshes() {
   meshes = ranges.map((range, index) => new Mesh(kGrids[step], range, index));
 }
@@ -312,6 +318,7 @@ const palette = (name, color) => ({ name, colours: Uint8Array.from({ length: 768
 post({ type: 'palettes', palettes: [palette('warm', (x) => [x, 0, 255 - x]), palette('green', (x) => [0, x, 0])] });
 
 let viewNumber = 0;
+let standIns = 0;
 self.onmessage = ({ data }) => {
   if (data.type === 'open') {
     open(data.dataset);
@@ -328,6 +335,8 @@ self.onmessage = ({ data }) => {
   } else if (data.type === 'tets') {
     box = data.box;
     postTets();
+  } else if (data.type === 'standIn') {
+    postStandIn(data.triangles);
   } else if (data.type === 'edges') {
     wantsEdges = data.wanted;
     if (meshes.length > 0) postSurface(false);

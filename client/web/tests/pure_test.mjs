@@ -49,6 +49,7 @@ test('an address restores the view that it was written from', () => {
       pixelError: random(0.5, 16),
       maxTets: i % 4 ? null : Math.round(random(1e4, 1e7)),
       memory: i % 5 ? null : 20,
+      frameRate: [60, 0, 24.5][i % 3],
       clip: i % 3 ? { normal: vec.unit(randomVec()), offset: random(-9, 9) } : null,
       region: { min: a.map((x, d) => Math.min(x, b[d])), max: a.map((x, d) => Math.max(x, b[d])) },
       tets: i % 2 === 0,
@@ -77,6 +78,7 @@ test('an invalid address gives the default view', () => {
     assert.deepEqual(fromHash(hash), kDefaults, hash);
   }
   assert.equal(fromHash('#px=1e9').pixelError, 64);
+  assert.equal(fromHash('#fps=-5').frameRate, 0);
   assert.equal(fromHash('#show=tets').tets, false, 'tetrahedra need a region');
 });
 

@@ -6,6 +6,7 @@
 //   color-by     surface (the default), value, or a channel's name
 //   palette      of values
 //   pixel-error  largest deviation on the screen, pixels; 1 unless it is given
+//   frame-rate   pictures a second while the camera moves, for which the mesh may be coarser; 60 unless it is given, 0: any
 //
 // The property `token` identifies you to a server that asks for tokens; it is not an attribute, so as not to be read
 // from the page. Events: load-start, progress (detail: a Progress), load-end, load-error (detail: an Error).
@@ -19,8 +20,10 @@ import { sub } from './vec.js';
 
 const kStyle = ':host { display: block; min-height: 240px; } canvas { display: block; width: 100%; height: 100%; touch-action: none; }';
 
+const kFrameRate = 60;
+
 export class IntervaleViewElement extends HTMLElement {
-  static readonly observedAttributes = ['src', 'range', 'color-by', 'palette', 'pixel-error'];
+  static readonly observedAttributes = ['src', 'range', 'color-by', 'palette', 'pixel-error', 'frame-rate'];
   token: string | null = null; // before src is set
   options: Pick<IntervalVolumeOptions, 'wasmUrl'> = {}; // the same
   volume: IntervalVolume | null = null; // what is shown
@@ -82,6 +85,7 @@ export class IntervaleViewElement extends HTMLElement {
     if (name === 'src') return this.load();
     if (name === 'range') this.volume?.setRanges(rangesIn(now));
     else if (name === 'pixel-error') this.volume?.setPixelError(this.pixelError);
+    else if (name === 'frame-rate') this.volume?.setFrameRate(this.frameRate);
     else this.volume?.setColors(this.getAttribute('color-by') ?? 'surface', this.getAttribute('palette') ?? undefined);
     this.invalidate();
   }
@@ -89,6 +93,11 @@ export class IntervaleViewElement extends HTMLElement {
   private get pixelError(): number {
     const pixels = Number(this.getAttribute('pixel-error') ?? 1);
     return pixels > 0 ? pixels : 1;
+  }
+
+  private get frameRate(): number {
+    const rate = Number(this.getAttribute('frame-rate') ?? kFrameRate);
+    return rate >= 0 ? rate : kFrameRate;
   }
 
   private unload(): void {
@@ -108,6 +117,7 @@ export class IntervaleViewElement extends HTMLElement {
       ...(palette === null ? {} : { palette }),
       ranges: rangesIn(this.getAttribute('range')),
       pixelError: this.pixelError,
+      frameRate: this.frameRate,
       colorBy,
     });
     this.volume = volume;
@@ -159,6 +169,7 @@ export class IntervaleViewElement extends HTMLElement {
     volume.setResolutionFromRenderer(renderer);
     volume.update();
     renderer.render(this.scene, camera);
+    if (volume.isMoving) this.invalidate(); // pictures follow each other, so that their times are known
   }
 }
 

@@ -24,6 +24,7 @@ export interface Wanted {
   edges: boolean; // of pieces
   values: boolean; // of the field or a channel, at vertices
   volume: boolean; // all tetrahedra; needs values
+  standIn: number | null; // triangles of a coarser surface to draw while the camera moves; null: none
 }
 
 // A view of all of a data set, within one pixel in a picture of this size (pixels). change: what is to differ.
@@ -44,7 +45,7 @@ export function viewOf(dataset: Dataset, viewport: [number, number] = kViewport,
 }
 
 // Just the surfaces of a view.
-export const surfacesOf = (view: View): Wanted => ({ view, plane: null, tetsBox: null, edges: false, values: false, volume: false });
+export const surfacesOf = (view: View): Wanted => ({ view, plane: null, tetsBox: null, edges: false, values: false, volume: false, standIn: null });
 
 export interface LiveMeshOptions {
   worker?: Worker; // one that runs worker.js, where a bundler or a content policy does not let it be found beside this file
@@ -113,6 +114,7 @@ export class LiveMesh extends (EventTarget as new () => Target) {
     this.send({ type: 'edges', wanted: wanted.edges });
     this.send({ type: 'values', wanted: wanted.values });
     this.send({ type: 'volume', wanted: wanted.volume });
+    this.send({ type: 'standIn', triangles: wanted.standIn });
   }
 
   // What is wanted from now on, where it changes. Nothing before open().
@@ -126,6 +128,7 @@ export class LiveMesh extends (EventTarget as new () => Target) {
     if (wanted.edges !== last.edges) this.send({ type: 'edges', wanted: wanted.edges });
     if (wanted.values !== last.values) this.send({ type: 'values', wanted: wanted.values });
     if (wanted.volume !== last.volume) this.send({ type: 'volume', wanted: wanted.volume });
+    if (wanted.standIn !== last.standIn) this.send({ type: 'standIn', triangles: wanted.standIn });
   }
 
   // The same for parts of the view.

@@ -43,6 +43,9 @@ export type Request =
   | { type: 'edges'; wanted: boolean } // whether pieces have edges
   | { type: 'values'; wanted: boolean } // whether pieces, caps and tetrahedra have values: those of the view's channel, or the field's
   | { type: 'volume'; wanted: boolean } // from now on, after each change of the mesh: all tetrahedra, for which values must be wanted, too; after each 'view', their order
+  // From now on, whenever the mesh rests: a coarser surface, with at most so many triangles, to draw while the camera moves;
+  // null: none is wanted.
+  | { type: 'standIn'; triangles: number | null }
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
   | { type: 'save'; format: MeshFormat }
   | { type: 'digest' }; // answered by a report of the same type
@@ -59,7 +62,7 @@ export interface View {
   uniform: boolean; // whether the inside of the ranges is refined, too, and not only their surfaces; the data set must have it
   channel: string | null; // of the data set, whose values come along; null: none
   pixelError: number; // largest screen-space error, pixels; above 0
-  region: Box | null;
+  region: Box | null; // outside it the mesh is as coarse as conformity allows, whatever was received
   opaque: boolean; // whether surfaces hide what is behind them, and nothing is cut away: what they hide is sent last
   maxTets: number | null; // in the mesh; null: no limit
   maxUpdates: number | null; // kept in memory, about 30 bytes each on the server; null: no limit
@@ -72,6 +75,9 @@ export type Report =
   | { type: 'opened'; resumed: boolean } // resumed: the mesh is kept and the stream continues
   | { type: 'progress'; progress: Progress }
   | { type: 'surface'; change: SurfaceChange }
+  // To replace the last stand-in; its version counts stand-ins. null: that fits no more, or the mesh has no more triangles
+  // than are wanted. Without cracks, of the mesh as it was a moment ago.
+  | { type: 'standIn'; change: SurfaceChange | null }
   | { type: 'cap'; cap: Cap }
   | { type: 'tets'; tets: Tets }
   | { type: 'volume'; volume: Volume }
@@ -98,7 +104,7 @@ export interface Progress {
   bytes: number; // received, of messages
   updates: number; // received
   updatesInMesh: number; // those that change the surfaces, and their ancestors
-  updatesShown: number; // fewer than received where the budget of tetrahedra leaves some out
+  updatesShown: number; // fewer than received where the budget of tetrahedra or the region leaves some out
   tets: number; // of the mesh
   triangles: number; // of the boundary surface
   updatesToGo: number; // upper bound for this view; 0 when done

@@ -5,14 +5,17 @@
 import type { Core, Viewer } from './core/core.js';
 
 import { Connection, type ConnectionHandler, kGoingAway } from './connection.js';
-import type { Box, MeshFormat, Plane, Report, Request, Vec3, View } from './messages.js';
+import type { Box, MeshFormat, Plane, Report, Request, SurfacePiece, Vec3, View } from './messages.js';
 import { PortConnection } from './port_connection.js';
 import { PreviewPace } from './preview_pace.js';
 
 const kSurfaceIntervalMs = 40; // least time between two versions
 const kProgressIntervalMs = 100;
+const kRestMs = 200; // for which the mesh has rested before its stand-in is made again
 
 const buffersOf = ({ vertices, values }: { vertices: ArrayBuffer; values: ArrayBuffer | null }) => (values ? [vertices, values] : [vertices]);
+const buffersOfPieces = (pieces: SurfacePiece[]) =>
+  pieces.flatMap((piece) => [...buffersOf(piece), piece.indices, ...(piece.edges ? [piece.edges] : [])]);
 
 type SendReport = (report: Report, transfer?: Transferable[]) => void;
 
@@ -23,6 +26,7 @@ export interface Extras {
   plane: Plane | null;
   box: Box | null;
   volume: boolean;
+  standIn: number | null; // triangles, at most
 }
 
 export class StreamSession {
@@ -41,9 +45,13 @@ export class StreamSession {
   private previewed: [number, number][] | null = null; // to be shown once the page shows the last surface
   private pace = new PreviewPace();
   private isPreviewing = false; // since the last view
-  private ranges = ''; // of the last view
+  private shows = ''; // ranges and region of the last view
   private eye: Vec3 = [0, 0, 0]; // of the last view
   private volume: { version: number; eye: Vec3 } | null = null; // the last one sent, and the eye of its last order
+  // The last one made since the page was told that there is none: of which surface, and with how many triangles at most.
+  private standIn: { of: number; most: number } | null = null;
+  private standIns = 0; // sent
+  private standInTimer = 0;
 
   private channel: string | null = null; // of the last view
   private viewNumber = 0; // the same
@@ -76,10 +84,11 @@ export class StreamSession {
   look(view: View, number: number): void {
     this.viewNumber = number;
     this.endPreview();
-    const ranges = JSON.stringify(view.ranges);
-    const isOtherRange = ranges !== this.ranges;
-    this.ranges = ranges;
+    const shows = JSON.stringify([view.ranges, view.region]);
+    const isOther = shows !== this.shows;
+    this.shows = shows;
     if (view.channel !== this.channel) this.needsAll = true;
+    if (isOther || view.channel !== this.channel) this.dropStandIn();
     this.channel = view.channel;
     this.eye = view.camera.eye;
     const error = this.viewer.look(view);
@@ -87,7 +96,7 @@ export class StreamSession {
     this.connection.start();
     this.send();
     this.isChanged = true; // another budget or another range shows other tetrahedra
-    if (isOtherRange && this.isOpen) this.sendSurface(); // without a pause
+    if (isOther && this.isOpen) this.sendSurface(); // without a pause
     this.reportProgress(true);
     this.scheduleSurface();
   }
@@ -108,6 +117,7 @@ export class StreamSession {
   private showPreview(ranges: [number, number][]): void {
     if (!this.isPreviewing) this.pace.begin(this.viewer.progress().updatesShown);
     this.isPreviewing = true;
+    this.dropStandIn();
     const start = performance.now();
     const error = this.viewer.preview(ranges, this.pace.levels);
     if (error) return this.fail(error);
@@ -129,6 +139,7 @@ export class StreamSession {
 
   // Sends the surface again: edges or values are wanted, or not wanted any more.
   remake(): void {
+    this.dropStandIn();
     this.needsAll = true;
     this.isChanged = true;
     this.reportProgress(true);
@@ -182,6 +193,7 @@ export class StreamSession {
     this.connection.end();
     clearTimeout(this.surfaceTimer);
     clearTimeout(this.progressTimer);
+    clearTimeout(this.standInTimer);
     this.viewer.delete();
   }
 
@@ -238,6 +250,7 @@ export class StreamSession {
   private opened(): void {
     const isNewMesh = this.viewer.isNewMesh();
     if (isNewMesh) this.needsAll = true;
+    if (isNewMesh) this.dropStandIn();
     this.connection.accepted();
     this.isOpen = true;
     this.report({ type: 'connection', state: { state: 'open' } });
@@ -285,13 +298,48 @@ export class StreamSession {
     if (volume) this.sendVolume(this.version, isOther);
     else if (this.volume) this.dropVolume();
     if (isOther) {
-      const buffers = change.pieces.flatMap((piece) => [...buffersOf(piece), piece.indices, ...(piece.edges ? [piece.edges] : [])]);
-      this.report({ type: 'surface', change: { ...change, version: this.version, hasValues } }, buffers);
+      this.report({ type: 'surface', change: { ...change, version: this.version, hasValues } }, buffersOfPieces(change.pieces));
     }
     if (this.extras.plane) this.sendCap();
     if (this.extras.box) this.sendTets();
     this.surfaceEnd = performance.now();
     this.surfaceMs = this.surfaceEnd - start;
     this.reportProgress(this.viewer.done());
+    this.scheduleStandIn();
+  }
+
+  // Another number of triangles is wanted, or none.
+  wantStandIn(): void {
+    if (this.extras.standIn === null) this.dropStandIn();
+    this.scheduleStandIn();
+  }
+
+  // The page may also have one of another session.
+  private dropStandIn(): void {
+    clearTimeout(this.standInTimer);
+    this.standInTimer = 0;
+    this.standIn = null;
+    this.report({ type: 'standIn', change: null });
+  }
+
+  // The first one soon, one that is too large likewise; one of the mesh as it is now once that is complete and rests.
+  private scheduleStandIn(): void {
+    const { standIn: most } = this.extras;
+    clearTimeout(this.standInTimer);
+    this.standInTimer = 0;
+    if (most === null || this.version === 0 || this.isPreviewing) return;
+    const isUrgent = !this.standIn || this.standIn.most > most;
+    const isOld = !this.standIn || this.standIn.of !== this.version || this.standIn.most !== most;
+    if (!isUrgent && !(isOld && this.viewer.done())) return;
+    this.standInTimer = self.setTimeout(() => this.sendStandIn(most), isUrgent ? 0 : kRestMs);
+  }
+
+  private sendStandIn(most: number): void {
+    this.standInTimer = 0;
+    const { edges, values: hasValues } = this.extras;
+    this.standIn = { of: this.version, most };
+    const change = this.viewer.standIn(most, edges);
+    if (!change) return this.report({ type: 'standIn', change });
+    this.report({ type: 'standIn', change: { ...change, version: ++this.standIns, hasValues } }, buffersOfPieces(change.pieces));
   }
 }

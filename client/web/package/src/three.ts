@@ -1,18 +1,20 @@
 // An interval volume as an object of three.js, that refines for the camera that looks at it.
 import {
-  BufferAttribute, BufferGeometry, ClampToEdgeWrapping, DataTexture, DoubleSide, Group, InterleavedBuffer, InterleavedBufferAttribute, LinearFilter,
-  Matrix4, type Material, Mesh, MeshStandardMaterial, type Object3DEventMap, type PerspectiveCamera, Sphere, SRGBColorSpace, Vector2, Vector3,
-  type WebGLRenderer,
+  ClampToEdgeWrapping, DataTexture, DoubleSide, Group, LinearFilter, Matrix4, type Material, MeshStandardMaterial, type Object3DEventMap,
+  type PerspectiveCamera, SRGBColorSpace, Vector2, Vector3, type WebGLRenderer,
 } from 'three';
 import { kRangeColors, kSurfaceColors, kSurfaces } from './colors.js';
 import { type Dataset, streamUrl } from './datasets.js';
 import { type Frame, frameOf } from './frame.js';
+import { FramePace } from './frame_pace.js';
 import type { LocalDataset } from './local_dataset.js';
 import { addressOf, describe, LiveMesh, type LiveMeshOptions, surfacesOf, viewOf } from './live_mesh.js';
-import type { Palette, Progress, SurfaceChange, SurfacePiece, Vec3, View } from './messages.js';
-import { arraysOf } from './pieces.js';
+import type { Palette, Progress, SurfaceChange, Vec3, View } from './messages.js';
+import { Motion } from './motion.js';
 import { type Range, rangeOf, spanOf } from './ranges.js';
-import { applied, boxAround, center, corners, diagonal, sub } from './vec.js';
+import { SurfaceGroup } from './surface_group.js';
+
+const kAllowed = 1.3; // of the time between two pictures: how late one may be
 
 export interface IntervalVolumeOptions extends Omit<LiveMeshOptions, 'isShownLater'> {
   token?: string; // identifies you to a server that asks for tokens
@@ -21,6 +23,9 @@ export interface IntervalVolumeOptions extends Omit<LiveMeshOptions, 'isShownLat
   colorBy?: string; // 'surface', 'value', or a channel's name
   palette?: string; // of values; without it the first
   span?: Range; // of values that have colours of their own; without it the ranges', or all of a channel
+  // Pictures a second while the camera moves, for which the mesh may be coarser; without it, or 0: always all of it. Then
+  // update() must be called for each picture, and pictures follow each other while isMoving.
+  frameRate?: number;
 }
 
 export interface IntervalVolumeEvents extends Object3DEventMap {
@@ -39,14 +44,16 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
   readonly materials: Material[][]; // by range, then alpha, beta and the faces of the box
   dataset: Dataset | null = null; // null: not known yet
   version = 0; // of the surface that is drawn; 0: none yet
-  private readonly content = new Group();
-  private readonly pieces = new Map<number, Mesh>();
+  private readonly content = new Group(); // one of the next two
+  private readonly surface: SurfaceGroup;
+  private readonly standIn: SurfaceGroup; // a coarser one, while the camera moves
+  private readonly motion = new Motion(() => this.dispatchEvent({ type: 'change' }));
+  private pace = new FramePace();
   private pending: SurfaceChange[] = []; // oldest first
   private frame: Frame | null = null;
   private isOpen = false; // the session
   private palettes: Palette[] = [];
   private texture: DataTexture | null = null; // of the palette
-  private hasValues = false; // the pieces that are drawn
   private camera: PerspectiveCamera | null = null;
   private readonly viewport = new Vector2(1280, 800); // pixels
   private options: IntervalVolumeOptions;
@@ -58,9 +65,17 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
     this.options = { ...options };
     this.mesh = new LiveMesh({ ...options, isShownLater: true });
     this.materials = kRangeColors.map(() => kSurfaces.map((name) => standardMaterial(kSurfaceColors[name])));
+    this.surface = new SurfaceGroup(this.materials);
+    this.standIn = new SurfaceGroup(this.materials);
+    this.content.add(this.surface);
     this.add(this.content);
     this.mesh.addEventListener('surface', ({ detail }) => {
       this.pending.push(detail.change);
+      this.dispatchEvent({ type: 'change' });
+    });
+    this.mesh.addEventListener('standIn', ({ detail: { change } }) => {
+      if (change && this.frame) this.standIn.show(change, this.frame);
+      else this.standIn.clear();
       this.dispatchEvent({ type: 'change' });
     });
     this.mesh.addEventListener('palettes', ({ detail }) => {
@@ -93,8 +108,40 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
     const shown = this.pending.length > 0;
     for (const change of this.pending.splice(0)) this.show(change);
     if (shown) this.mesh.shown(this.version);
+    const isOther = this.chooseSurface();
     if (this.dataset) this.look(this.dataset);
-    return shown;
+    return shown || isOther;
+  }
+
+  // The camera has moved lately, as update() saw it, and there is a frame rate.
+  get isMoving(): boolean {
+    return this.motion.isMoving;
+  }
+
+  // The picture after the last update() has a coarser mesh.
+  get isCoarse(): boolean {
+    return this.standIn.parent !== null;
+  }
+
+  setFrameRate(frameRate: number): void {
+    this.options.frameRate = frameRate;
+    this.pace = new FramePace();
+  }
+
+  // Learns from the time since the last picture. Returns whether the other surface is drawn from now on.
+  private chooseSurface(): boolean {
+    const { frameRate = 0 } = this.options;
+    const { camera, motion, pace, standIn, isCoarse } = this;
+    const ms = camera && frameRate > 0 ? motion.sees(this.toData(camera).elements) : motion.rests();
+    const allowed = (kAllowed * 1000) / frameRate;
+    if (ms !== null && isCoarse) pace.drewStandIn(standIn.triangles, ms, allowed);
+    else if (ms !== null) pace.drewAll(this.surface.triangles, ms, allowed);
+    if (this.isOpen) this.mesh.update({ standIn: frameRate > 0 ? pace.budget : null });
+    const isWanted = motion.isMoving && pace.budget !== null && standIn.version > 0;
+    if (isWanted === isCoarse) return false;
+    this.content.clear();
+    this.content.add(isWanted ? standIn : this.surface);
+    return true;
   }
 
   // The closed range of values between which the volume lies.
@@ -141,7 +188,9 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
   // Ends the session, and frees what is on the graphics card.
   override dispose(): void {
     this.mesh.close();
-    for (const id of [...this.pieces.keys()]) this.removePiece(id);
+    this.motion.rests();
+    this.surface.clear();
+    this.standIn.clear();
     for (const material of this.materials.flat()) material.dispose();
     this.texture?.dispose();
     this.removeFromParent();
@@ -200,55 +249,23 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
 
   // Of the camera in the data set's world. A scale of the object that is not the same on all axes is not undone exactly.
   private pose(camera: PerspectiveCamera) {
-    camera.updateWorldMatrix(true, false);
-    this.updateWorldMatrix(true, false);
-    const toData = new Matrix4().copy(this.matrixWorld).invert().multiply(camera.matrixWorld);
+    const toData = this.toData(camera);
     const [eye, ahead] = [new Vector3(), new Vector3(0, 0, -1)].map((p) => p.applyMatrix4(toData)) as [Vector3, Vector3];
     const up = new Vector3(0, 1, 0).transformDirection(toData);
     return { eye: eye.toArray() as Vec3, lookAt: ahead.toArray() as Vec3, up: up.toArray() as Vec3, fov: camera.getEffectiveFOV() };
   }
 
+  private toData(camera: PerspectiveCamera): Matrix4 {
+    camera.updateWorldMatrix(true, false);
+    this.updateWorldMatrix(true, false);
+    return new Matrix4().copy(this.matrixWorld).invert().multiply(camera.matrixWorld);
+  }
+
   private show(change: SurfaceChange): void {
-    for (const [id, piece] of [...this.pieces]) if (change.reset.includes(piece.userData['range'])) this.removePiece(id);
-    for (const id of change.removed) this.removePiece(id);
-    for (const piece of change.pieces) {
-      this.removePiece(piece.id);
-      const made = this.meshOf(piece);
-      this.pieces.set(piece.id, made);
-      this.content.add(made);
-    }
+    const { hasValues } = this.surface;
+    this.surface.show(change, this.frame!);
     this.version = change.version;
-    if (change.hasValues === this.hasValues) return;
-    this.hasValues = change.hasValues;
-    this.paint();
-  }
-
-  private removePiece(id: number): void {
-    const piece = this.pieces.get(id);
-    if (!piece) return;
-    this.pieces.delete(id);
-    this.content.remove(piece);
-    piece.geometry.dispose();
-  }
-
-  private meshOf(piece: SurfacePiece): Mesh {
-    const { affine, center: origin } = this.frame!;
-    const arrays = arraysOf(piece, affine, origin);
-    const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new BufferAttribute(arrays.positions, 3));
-    geometry.setAttribute('normal', new InterleavedBufferAttribute(new InterleavedBuffer(arrays.normals, 4), 3, 0, true));
-    if (arrays.values) geometry.setAttribute('uv', new BufferAttribute(uvOf(arrays.values), 2)); // the map's transform makes colours of them
-    geometry.setIndex(new BufferAttribute(arrays.indices, 1));
-    let start = 0;
-    arrays.groups.forEach((count, surface) => {
-      if (count > 0) geometry.addGroup(start, 3 * count, surface);
-      start += 3 * count;
-    });
-    const box = boxAround(corners(piece).map((corner) => applied(affine, corner)));
-    geometry.boundingSphere = new Sphere(new Vector3(...sub(center(box), origin)), diagonal(box) / 2);
-    const made = new Mesh(geometry, this.materials[piece.range]!);
-    made.userData['range'] = piece.range;
-    return made;
+    if (change.hasValues !== hasValues) this.paint();
   }
 
   private applyColors(): void {
@@ -266,7 +283,7 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
 
   // Pieces that came before values were wanted have none: they have the colours of surfaces until they come again.
   private paint(): void {
-    const texture = this.hasValues ? this.texture : null;
+    const texture = this.surface.hasValues ? this.texture : null;
     const several = this.ranges.length > 1;
     this.materials.forEach((materials, range) =>
       materials.forEach((material, i) => {
@@ -281,15 +298,6 @@ export class IntervalVolume extends Group<IntervalVolumeEvents> {
 }
 
 const standardMaterial = (color: string) => new MeshStandardMaterial({ color, roughness: 0.6, metalness: 0, side: DoubleSide });
-
-function uvOf(values: Float32Array): Float32Array {
-  const uv = new Float32Array(2 * values.length);
-  values.forEach((value, i) => {
-    uv[2 * i] = value;
-    uv[2 * i + 1] = 0.5;
-  });
-  return uv;
-}
 
 function textureOf({ colours }: Palette): DataTexture {
   const rgb = new Uint8Array(colours);

@@ -9,7 +9,7 @@ const report = (message: Report, transfer: Transferable[] = []) => scope.postMes
 
 let core: Promise<Core> | null = null; // since the first request
 let session: StreamSession | null = null;
-const extras: Extras = { edges: false, values: false, plane: null, box: null, volume: false };
+const extras: Extras = { edges: false, values: false, plane: null, box: null, volume: false, standIn: null };
 
 function load(wasmUrl: string | null): Promise<Core> {
   const loading = createCore({ locateFile: () => wasmUrl ?? new URL('./core/core.wasm', import.meta.url).href });
@@ -46,6 +46,9 @@ async function handle(request: Request): Promise<void> {
       if (extras[request.type] === request.wanted) return;
       extras[request.type] = request.wanted;
       return session?.remake();
+    case 'standIn':
+      extras.standIn = request.triangles;
+      return session?.wantStandIn();
     case 'shown':
       return session?.pageShows(request.version);
     case 'save':
