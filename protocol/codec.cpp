@@ -37,13 +37,17 @@ Offset<fbs::Open> encode_body(FlatBufferBuilder& out, const Open& message) {
   return fbs::CreateOpen(out, dataset, client, message.credit, message.resume, message.payload);
 }
 
+fbs::Camera to_camera(const Camera& c) {
+  return {to_vector(c.eye), to_vector(c.look_at), to_vector(c.up), c.fov, c.viewport[0], c.viewport[1], c.pixel_error};
+}
+
 Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
   const Lod& lod = message.lod;
   fbs::Box box;
   if (lod.roi) box = fbs::Box(to_vector(lod.roi->min), to_vector(lod.roi->max));
-  fbs::Camera camera;
-  if (const auto& c = lod.camera)
-    camera = fbs::Camera(to_vector(c->eye), to_vector(c->look_at), to_vector(c->up), c->fov, c->viewport[0], c->viewport[1], c->pixel_error);
+  fbs::Camera camera, ahead;
+  if (lod.camera) camera = to_camera(*lod.camera);
+  if (message.ahead) ahead = to_camera(*message.ahead);
   const auto table = fbs::CreateLod(out, lod.error, lod.error_percent, lod.roi ? &box : nullptr, lod.max_updates, lod.camera ? &camera : nullptr);
   const auto forget = message.forget.empty() ? 0 : out.CreateVector(encode_splits(message.forget));
   const RangeRequest& shown = message.shown;
@@ -58,7 +62,7 @@ Offset<fbs::View> encode_body(FlatBufferBuilder& out, const View& message) {
       map ? fbs::CreateDepthMap(out, std::uint8_t(map->width), std::uint8_t(map->height), map->nearest, map->farthest, out.CreateVector(map->codes))
           : 0;
   return fbs::CreateView(out, message.epoch, table, message.room, forget, in_order, refine, message.early, message.coarse_error_percent, channels,
-                         depth);
+                         depth, message.ahead ? &ahead : nullptr);
 }
 
 Offset<fbs::Credit> encode_body(FlatBufferBuilder& out, const Credit& message) { return fbs::CreateCredit(out, message.bytes); }
@@ -139,18 +143,20 @@ Result<ClientMessage> decode_body(const fbs::Open& table) {
   return Open{table.dataset()->str(), flatbuffers::GetString(table.client()), table.credit(), table.resume(), table.payload()};
 }
 
+Camera to_camera(const fbs::Camera& c) {
+  return {.eye = to_array(c.eye()),
+          .look_at = to_array(c.look_at()),
+          .up = to_array(c.up()),
+          .fov = c.fov(),
+          .viewport = {c.width(), c.height()},
+          .pixel_error = c.pixel_error()};
+}
+
 Result<ClientMessage> decode_body(const fbs::View& table) {
   const fbs::Lod& wire = *table.lod();
   Lod lod{.error = wire.error(), .error_percent = wire.error_percent(), .roi = {}, .camera = {}, .max_tets = {}, .max_updates = wire.max_updates()};
   if (const auto* roi = wire.roi()) lod.roi = Box{to_array(roi->min()), to_array(roi->max())};
-  if (const auto* c = wire.camera()) {
-    lod.camera = Camera{.eye = to_array(c->eye()),
-                        .look_at = to_array(c->look_at()),
-                        .up = to_array(c->up()),
-                        .fov = c->fov(),
-                        .viewport = {c->width(), c->height()},
-                        .pixel_error = c->pixel_error()};
-  }
+  if (const auto* camera = wire.camera()) lod.camera = to_camera(*camera);
   if (auto ok = check_lod(lod); !ok) return malformed(ok.error().message);
   const auto coarse = table.coarse_error_percent();
   if (coarse && !(*coarse >= 0 && *coarse <= 100)) return malformed("the coarse error percent must be a number from 0 to 100");
@@ -176,6 +182,13 @@ Result<ClientMessage> decode_body(const fbs::View& table) {
     const DepthMap map{depth->width(), depth->height(), depth->nearest(), depth->farthest(), {depth->codes()->begin(), depth->codes()->end()}};
     if (auto ok = check_depth_map(map); !ok) return malformed(ok.error().message);
     view.depth = map;
+  }
+  if (const auto* ahead = table.ahead()) {
+    if (!lod.camera) return malformed("a camera ahead of none");
+    view.ahead = to_camera(*ahead);
+    Lod there;
+    there.camera = view.ahead;
+    if (auto ok = check_lod(there); !ok) return malformed(ok.error().message);
   }
   if (const auto* channels = table.channels()) {
     if (channels->size() > kMaxChannels) return malformed("a view of more than " + std::to_string(kMaxChannels) + " channels");

@@ -79,6 +79,8 @@ struct View {
   std::vector<std::string> channels = {};  // whose values are sent with the updates: names of the data set's
   // What the lod's camera sees of the client's mesh: updates that lie behind are sent last.
   std::optional<DepthMap> depth = {};
+  // Where the lod's camera will be soon.
+  std::optional<Camera> ahead = {};
   friend bool operator==(const View&, const View&) = default;
 };
 struct Credit {

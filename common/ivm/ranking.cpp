@@ -8,7 +8,7 @@
 
 namespace intervale {
 
-Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden)
+Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden, const Camera* ahead)
     : volume_(volume), relevant_(relevant) {
   const double threshold = error_of(lod, volume.description().max_error);
   const auto steps = volume.error_steps();
@@ -18,6 +18,7 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
   if (lod.camera) {
     screen_.emplace(*lod.camera, g);
     if (hidden != nullptr) occlusion_.emplace(*hidden, *lod.camera, g);
+    if (ahead != nullptr) ahead_.emplace(*ahead, g);
     pixel_error_ = float(lod.camera->pixel_error);
     const Vec3 spacing = g.affine.spacing();
     for (unsigned slope = 0; slope <= kMaxSlope; ++slope) removed_[slope] = removed_of(slope);
@@ -41,25 +42,33 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
     b.bound_ = Rank(step + 1);
     return b;
   }
-  b.pixels_ = pixels_per_unit(region);
+  b.pixels_ = pixels_per_unit(*screen_, region);
   b.near_ = screen_->is_near(region);
+  b.is_exact_ = !b.near_ && !(ahead_ && ahead_->is_near(region));
   const float pixels = object_error * b.pixels_;
   if (!(pixels > pixel_error_)) return b;
-  b.weight_ = weight_of(region, b.scale_, b.pixels_, !b.near_);
+  b.weight_ = weight_of(region, b.scale_, b.pixels_, b.is_exact_);
   b.is_seen_ = !is_hidden(region);
   b.bound_ = rank_of(importance_of(pixels, slope, b.weight_), b.is_seen_);
   return b;
 }
 
-float Ranking::pixels_per_unit(const ScreenError::Region& region) const {
-  return float(std::min(screen_->pixels_per_unit(region), double(kMostImportance)));
+float Ranking::pixels_per_unit(const ScreenError& screen, const ScreenError::Region& region) {
+  return float(std::min(screen.pixels_per_unit(region), double(kMostImportance)));
 }
 
 // If not exact, at most. pixels: of one world unit there.
-float Ranking::weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const {
-  const double spacing = spacing_ * double(pixels);
+double Ranking::weight_on(const ScreenError& screen, const ScreenError::Region& region, int scale, double pixels, bool is_exact) const {
+  const double spacing = spacing_ * pixels;
   const double weight = relevant_.has_slopes() ? std::ldexp(spacing * spacing * spacing, scale) : std::ldexp(spacing * spacing, 2 * scale);
-  return float(std::clamp(weight * (is_exact ? screen_->seen_share(region) : 1), 1e-30, 1e30));
+  return weight * (is_exact ? screen.seen_share(region) : 1);
+}
+
+// The same, now or soon: the greater.
+float Ranking::weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const {
+  double weight = weight_on(*screen_, region, scale, double(pixels), is_exact);
+  if (ahead_) weight = std::max(weight, weight_on(*ahead_, region, scale, double(pixels_per_unit(*ahead_, region)), is_exact));
+  return float(std::clamp(weight, 1e-30, 1e30));
 }
 
 Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, SupercubeKey key) const {
@@ -72,12 +81,10 @@ Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, Supercube
   s.weight_ = weight_;
   s.is_seen_ = is_seen_;
   const bool may_be_hidden = ranking_->occlusion_ && is_seen_;
-  if (!near_ && !may_be_hidden) return s;
+  if (is_exact_ && !may_be_hidden) return s;
   const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
-  if (near_) {
-    s.pixels_ = ranking_->pixels_per_unit(region);
-    s.weight_ = ranking_->weight_of(region, scale_, s.pixels_, true);
-  }
+  if (near_) s.pixels_ = pixels_per_unit(*ranking_->screen_, region);
+  if (!is_exact_) s.weight_ = ranking_->weight_of(region, scale_, s.pixels_, true);
   if (may_be_hidden) s.is_seen_ = !ranking_->occlusion_->hides(region);
   return s;
 }

@@ -8,9 +8,10 @@
 // all of the surface should. Once more with 2^scale: coarse updates come a little earlier than what they remove says,
 // which makes early pictures better and later ones no worse. Otherwise it is estimated: the square of the deviation in
 // pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2. Both as far as the surfaces are in
-// the picture. So what is large in the picture comes before what is far off in one place. What a depth map hides comes
-// after everything that is seen. Pixels a world unit, for the nearest visible point, and the share that is seen are
-// computed once a supercube, or once a brick that is far away.
+// the picture. So what is large in the picture comes before what is far off in one place. If the camera moves, the
+// weight of what is removed is that of now or that of soon, whichever is greater. What a depth map hides comes after
+// everything that is seen. Pixels a world unit, for the nearest visible point, and the share that is seen are computed
+// once a supercube, or once a brick that is far away.
 #pragma once
 
 #include <algorithm>
@@ -31,8 +32,10 @@ namespace intervale {
 class Ranking {
  public:
   // volume and relevant, to the range that is looked at, must outlive it; lod: one that check_lod lets pass. hidden: of
-  // its camera; what lies behind comes last.
-  Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden = nullptr);
+  // its camera; what lies behind comes last. ahead: where the camera will be soon, which changes ranks but not what is
+  // wanted; it is like lod's.
+  Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden = nullptr,
+          const Camera* ahead = nullptr);
   // The same, for the range of the data set.
   Ranking(const IntervalVolume& volume, const Lod& lod) : Ranking(volume, volume.relevant(), lod) {}
 
@@ -98,8 +101,9 @@ class Ranking {
     friend class Ranking;
     const Ranking* ranking_ = nullptr;
     int scale_ = 0;
-    bool near_ = false;    // distances from the camera to its supercubes differ much
-    bool is_seen_ = true;  // some of it, perhaps
+    bool near_ = false;     // distances from the camera to its supercubes differ much
+    bool is_exact_ = true;  // the weight is that of its supercubes, too
+    bool is_seen_ = true;   // some of it, perhaps
     float pixels_ = 0, weight_ = 0;
     Rank bound_ = 0;
   };
@@ -131,15 +135,16 @@ class Ranking {
     const int rank = int(bits_as<std::uint32_t>(importance < kMostImportance ? importance : kMostImportance) >> kRankShift) - kRankFrom;
     return Rank(std::max(rank, 1) + is_seen * kSeenFrom);
   }
-  [[nodiscard]] float pixels_per_unit(const ScreenError::Region& region) const;
+  [[nodiscard]] static float pixels_per_unit(const ScreenError& screen, const ScreenError::Region& region);
   [[nodiscard]] bool is_hidden(const ScreenError::Region& region) const { return occlusion_ && occlusion_->hides(region); }
+  [[nodiscard]] double weight_on(const ScreenError& screen, const ScreenError::Region& region, int scale, double pixels, bool is_exact) const;
   [[nodiscard]] float weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const;
 
   const IntervalVolume& volume_;
   const RelevantUpdates& relevant_;
   unsigned least_step_ = 0;  // the lowest error step that is wanted
   std::optional<SeenBox> roi_;
-  std::optional<ScreenError> screen_;
+  std::optional<ScreenError> screen_, ahead_;  // now, and soon
   std::optional<Occlusion> occlusion_;
   float pixel_error_ = 0;
   double spacing_ = 0;                          // between samples, the geometric mean over the axes

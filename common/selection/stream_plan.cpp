@@ -158,13 +158,13 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   return true;
 }
 
-void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden) {
+void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* ahead) {
   if (searched_ != lod) {
     searched_ = lod;
     budget_.reset();
     search_ = lod.max_updates ? std::make_shared<BudgetSearch>(volume_, relevant_, lod) : nullptr;
   }
-  ranking_.emplace(*volume_, *relevant_, lod, hidden);
+  ranking_.emplace(*volume_, *relevant_, lod, hidden, ahead);
   rank_bricks();
 }
 

@@ -71,8 +71,9 @@ class StreamPlan {
   bool resume(std::size_t channel, SupercubeKey key, std::uint64_t slots);
 
   // Replaces the level of detail; check_lod(lod) must hold. hidden: a depth map of its camera; what lies behind is sent
-  // last. O(bricks). The search of an equal level of detail goes on.
-  void set_lod(const Lod& lod, const DepthMap* hidden = nullptr);
+  // last. ahead: where the camera will be soon; another order of the same updates. O(bricks). The search of an equal level
+  // of detail goes on.
+  void set_lod(const Lod& lod, const DepthMap* hidden = nullptr, const Camera* ahead = nullptr);
 
   // The search for what is within max_updates, which is to be done before the next batch; nullptr: none. Another thread
   // may go on with it; otherwise next() does.

@@ -80,6 +80,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   const bool is_other_view = lod_ != view.lod || shown_ != shown;
   lod_ = view.lod;
   depth_ = view.depth;
+  ahead_ = view.ahead;
   if (shown_ != shown || !lod_.camera) measurement_.reset();
   if (shown_ != shown) estimate_.reset();
   if (is_other_view) search_.reset();  // if it is done, it would say that nothing is waited for
@@ -123,7 +124,7 @@ bool SessionState::begin_view() {
     const bool needs_measured = measurement_ && (!is_early_ || lod_.max_updates || measurement_->is_soon());
     if (needs_measured || (!is_planned && !estimate())) return false;
   }
-  if (std::exchange(is_new_, false)) plan_->set_lod(measurement_ ? coarser(lod_) : lod_, depth_ ? &*depth_ : nullptr);
+  if (std::exchange(is_new_, false)) plan_->set_lod(measurement_ ? coarser(lod_) : lod_, depth_ ? &*depth_ : nullptr, ahead_ ? &*ahead_ : nullptr);
   return true;
 }
 

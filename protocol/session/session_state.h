@@ -74,6 +74,7 @@ class SessionState {
   std::optional<StreamPlan> plan_;
   Lod lod_;                                                    // of the last view
   std::optional<DepthMap> depth_;                              // likewise
+  std::optional<Camera> ahead_;                                // likewise
   ShownRanges shown_;                                          // of the last view, as distinct() gives them
   std::uint64_t may_have_ = 0;                                 // updates, and values of channels, that Have may still name
   std::uint64_t room_ = 0;                                     // of the last view

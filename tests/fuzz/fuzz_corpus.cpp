@@ -94,6 +94,9 @@ void add_messages(const Corpus& corpus) {
   corpus.add("protocol", "view-forget", {0},
              encode(ClientMessage(View{9, {}, 1000, {{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));
   corpus.add("protocol", "view-channels", {0}, encode(ClientMessage(View{10, {}, {}, {}, {}, true, {}, {"noise", "place"}})));
+  View moving{.epoch = 11, .lod = {}, .ahead = Camera{.eye = {9, 8, 9}}};
+  moving.lod.camera = Camera{.eye = {9, 9, 9}};
+  corpus.add("protocol", "view-ahead", {0}, encode(ClientMessage(moving)));
   corpus.add("protocol", "have-channel", {0}, encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}}, 1})));
   corpus.add("protocol", "have", {0},
              encode(ClientMessage(Have{{{{}, {}, supercube_key(3, {1, 2, 0}), 5}, {{}, {}, supercube_key(2, {3, 3, 1}), 129}}})));

@@ -308,6 +308,16 @@ TEST(Codec, LevelsOfDetailWithoutMeaningAreRefused) {
                               DepthMap{1, 1, kNan, 9, {0}}, DepthMap{1, 1, 2, 1, {0}}, DepthMap{1, 1, 1, kInf, {0}}})
     EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = with_camera, .depth = map}))));
   EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = {}, .depth = seen.depth})))) << "without a camera";
+  View moving{.epoch = 1, .lod = with_camera, .ahead = Camera{.eye = {0.5, 0, 0}, .look_at = {1, 0, 0}}};
+  const auto going = decode_client_message(encode(ClientMessage(moving)));
+  ASSERT_TRUE(going) << going.error().message;
+  EXPECT_EQ(std::get<View>(*going), moving);
+  moving.lod = {};
+  EXPECT_FALSE(decode_client_message(encode(ClientMessage(moving)))) << "ahead of no camera";
+  for (const Camera& ahead :
+       {Camera{}, Camera{.eye = {kNan, 0, 0}, .look_at = {1, 0, 0}}, Camera{.look_at = {0, 1, 0}}, Camera{.look_at = {1, 0, 0}, .fov = 180},
+        Camera{.look_at = {1, 0, 0}, .viewport = {0, 1}}, Camera{.look_at = {1, 0, 0}, .pixel_error = -kInf}})
+    EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{.epoch = 1, .lod = with_camera, .ahead = ahead}))));
   for (const Lod& lod : wrong) EXPECT_FALSE(decode_client_message(encode(ClientMessage(View{1, lod})))) << &lod - wrong.data();
 }
 

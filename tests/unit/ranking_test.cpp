@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <random>
@@ -14,27 +13,15 @@
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/cameras.h"
-#include "tests/support/interval_volumes.h"
 #include "tests/support/parents.h"
-#include "tests/support/parts.h"
+#include "tests/support/ranks.h"
 
 namespace intervale {
 namespace {
 
+using testing::for_each_rank;
 using testing::NaiveCamera;
 using testing::Vector;
-
-constexpr std::array<testing::Dims, 5> kRankingBoxes{{{17, 17, 17}, {24, 17, 20}, {12, 5, 7}, {40, 9, 20}, {30, 2, 11}}};
-
-IntervalVolume ranking_volume(unsigned seed) {
-  const auto trial = testing::trial_of_seed(seed, kRankingBoxes);
-  return testing::build(seed % 3 != 0 ? testing::stretched(trial.volume) : trial.volume, trial.options);
-}
-
-using Visit = std::function<void(const Place&, Ranking::Rank)>;
-void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const Visit& visit) {
-  v.set().for_each_down([&](const Place& p) { visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot)); });
-}
 
 // Half of how far the surfaces can move in an update's diamond, from what is stored.
 double object_error(const IntervalVolume& v, const Place& p) {
@@ -104,9 +91,15 @@ std::optional<DepthMap> random_map(const Lod& lod, const Grid& g, std::mt19937& 
   return buffer.map();
 }
 
+// Where the camera goes; nowhere now and then.
+std::optional<Camera> random_ahead(const Lod& lod, const Grid& g, std::mt19937& random) {
+  if (!lod.camera || random() % 3 == 0) return {};
+  return testing::random_camera(g, random);
+}
+
 class Ranks : public ::testing::TestWithParam<unsigned> {
  protected:
-  IntervalVolume volume_ = ranking_volume(GetParam());
+  IntervalVolume volume_ = testing::ranking_volume(GetParam());
   std::mt19937 random_{GetParam()};  // the seed is the test's number
 };
 
@@ -114,7 +107,8 @@ TEST_P(Ranks, NoUpdateRanksAboveItsBrick) {
   for (int trial = 0; trial < 40; ++trial) {
     const Lod lod = testing::random_lod(volume_.description().grid, random_);
     const auto map = random_map(lod, volume_.description().grid, random_);
-    const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr);
+    const auto ahead = random_ahead(lod, volume_.description().grid, random_);
+    const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr, ahead ? &*ahead : nullptr);
     for_each_rank(volume_, ranking,
                   [&](const Place& p, Ranking::Rank rank) { ASSERT_GE(ranking.of_brick(p.brick).bound(), rank) << "trial " << trial; });
   }
@@ -124,7 +118,8 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
   for (int trial = 0; trial < 40; ++trial) {
     const Lod lod = testing::random_lod(volume_.description().grid, random_);
     const auto map = random_map(lod, volume_.description().grid, random_);
-    const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr);
+    const auto ahead = random_ahead(lod, volume_.description().grid, random_);
+    const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr, ahead ? &*ahead : nullptr);
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
       const unsigned level = volume_.relevant().supercube_error_steps()[p.supercube];
       ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, 0, volume_.relevant().supercube_slopes()[p.supercube]), rank)

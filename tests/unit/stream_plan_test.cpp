@@ -10,6 +10,7 @@
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/batches.h"
+#include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
 
 namespace intervale {
@@ -120,7 +121,9 @@ TEST_P(Plan, SendsEveryWantedUpdateOnceWhateverViewsFollow) {
       hidden = DepthMap{2, 2, 1, 100, {}};
       for (int cell = 0; cell < 4; ++cell) hidden->codes.push_back(std::uint8_t(random()));
     }
-    plan.set_lod(lod, hidden ? &*hidden : nullptr);
+    std::optional<Camera> ahead;
+    if (lod.camera && random() % 2 == 0) ahead = testing::random_camera(volume->description().grid, random);
+    plan.set_lod(lod, hidden ? &*hidden : nullptr, ahead ? &*ahead : nullptr);
     receiver.set_lod(lod);
     ASSERT_GE(plan.remaining().updates, receiver.own_left(lod).updates);
     for (int batches = view == 7 ? 100000 : int(random() % 4); batches > 0; --batches) {
