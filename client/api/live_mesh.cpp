@@ -193,7 +193,9 @@ class LiveMesh::Worker {
       request = request_;
     }
     is_changed_ = session_.mesh() != nullptr;
-    return session_.look(view_of(request, options_));
+    ViewRequest view = view_of(request, options_);
+    if (view.camera) view.ahead = motion_.next(*view.camera, Clock::now());
+    return session_.look(std::move(view));
   }
 
   // Makes the mesh if it changed, somebody asks, and there is time. True: only time is missing, until due_.
@@ -231,6 +233,7 @@ class LiveMesh::Worker {
   const ServerUrl url_;
   const LiveMeshOptions options_;
   ClientSession session_;
+  CameraMotion motion_;
   bool was_lost_ = false;
   bool is_changed_ = false;  // the mesh, since the last state
   Clock::time_point due_{};  // of the next state

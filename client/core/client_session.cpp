@@ -62,6 +62,7 @@ void ClientSession::connected(Clock::time_point now) {
 
 void ClientSession::disconnected() {
   if (state_ != State::closed) state_ = State::connecting;
+  if (view_) view_->ahead.reset();
   messages_.clear();
 }
 
@@ -114,6 +115,7 @@ Result<ClientSession::Event> ClientSession::take(const protocol::Batch& batch, C
   }
   credit_.note_batch(protocol::cost_of(batch), now);
   send_credit();
+  end_motion(now);
   return Event{.kind = Event::Kind::batch, .epoch = batch.epoch, .updates = batch.updates};
 }
 
@@ -213,6 +215,7 @@ void ClientSession::send_view(bool gives_up) {
   view.coarse_error_percent = view_->coarse_error_percent;
   view.channels = view_->channels;
   view.depth = view_->depth;
+  if (view_->ahead) view.ahead = view_->ahead->camera;
   if (shown_.empty() || shown_.back().shown != view.shown || shown_.back().channels != view.channels)
     shown_.push_back({epoch_, view.shown, view.channels});
   if (mesh_) {
@@ -224,6 +227,13 @@ void ClientSession::send_view(bool gives_up) {
   if (is_open()) state_ = State::viewing;
   stats_.is_full = false;
   send(view);
+}
+
+// A camera that rests gets what is left of its view in the order of its own.
+void ClientSession::end_motion(Clock::time_point now) {
+  if (!view_ || !view_->ahead || now < view_->ahead->until) return;
+  view_->ahead.reset();
+  if (state_ == State::viewing) send_view(false);
 }
 
 // epoch: no earlier than the last answered.

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/core/camera_motion.h"
 #include "client/core/credit_window.h"
 #include "client/core/stream_client.h"
 #include "common/util/result.h"
@@ -43,7 +44,8 @@ struct ViewRequest {
   std::vector<std::string> channels = {};  // of the data set, whose values come along
   // Surfaces hide what is behind them: see wants_depth_map(). With a camera in `lod`.
   bool is_opaque = false;
-  std::optional<DepthMap> depth = {};  // of that camera, if there is one already
+  std::optional<DepthMap> depth = {};     // of that camera, if there is one already
+  std::optional<CameraAhead> ahead = {};  // of that camera, if it moves; given up once it has rested
 };
 
 // On one thread.
@@ -150,6 +152,7 @@ class ClientSession {
   void send(const protocol::ClientMessage& message);
   void send_haves();
   void send_view(bool gives_up = true);
+  void end_motion(Clock::time_point now);
   void send_credit();
   void send_haves(std::span<const SlotGroup> splits, std::optional<std::size_t> channel);
   [[nodiscard]] bool is_open() const { return state_ == State::viewing || state_ == State::idle; }

@@ -163,7 +163,8 @@ class LoadClient {
                          .shown = shown(),  // of the data set
                          .early = drags,
                          .coarse_error_percent = coarse,
-                         .is_opaque = plan_.depth_maps});
+                         .is_opaque = plan_.depth_maps,
+                         .ahead = lod.camera ? motion_.next(*lod.camera, before) : std::nullopt});
     const std::chrono::duration<double, std::milli> took = LoadClock::now() - before;
     if (sets_range) stats_.set_range_ms.push_back(took.count());
   }
@@ -310,6 +311,7 @@ class LoadClient {
   RangePath drags_;  // in the scenario range
   LoadViews views_;
   ClientSession session_;
+  CameraMotion motion_;
   beast::flat_buffer buffer_;
   asio::steady_timer wake_;        // the writer sleeps on it
   asio::steady_timer rate_timer_;  // the reader does, where the rate is limited

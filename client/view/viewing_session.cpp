@@ -2,7 +2,7 @@
 
 namespace intervale {
 
-Result<void> ViewingSession::look(const WantedView& view, std::optional<DepthMap> depth) {
+Result<void> ViewingSession::look(const WantedView& view, std::optional<DepthMap> depth, Clock::time_point now) {
   Lod lod;
   lod.roi = view.region;
   lod.camera = view.camera;
@@ -10,6 +10,7 @@ Result<void> ViewingSession::look(const WantedView& view, std::optional<DepthMap
   if (view.budget.max_updates < kMinRoom) return fail("there must be room for at least " + std::to_string(kMinRoom) + " updates");
   if (view_ == view) return session_.preview(view.shown);  // the end of a preview
   if (view.region) lod.camera.reset();
+  const auto ahead = motion_.next(view.camera, now);
   const ViewRequest request{.lod = lod,
                             .camera = view.camera,
                             .within = view.region,
@@ -19,7 +20,8 @@ Result<void> ViewingSession::look(const WantedView& view, std::optional<DepthMap
                             .coarse_error_percent = kCoarseErrorPercent,
                             .channels = view.channels,
                             .is_opaque = view.is_opaque,
-                            .depth = view.region ? std::nullopt : std::move(depth)};
+                            .depth = view.region ? std::nullopt : std::move(depth),
+                            .ahead = view.region ? std::nullopt : ahead};
   if (auto looked = session_.look(request); !looked) return looked;
   view_ = view;
   gave_up_more_ = false;

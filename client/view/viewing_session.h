@@ -36,7 +36,8 @@ class ViewingSession {
 
   // What is wanted from now on. Fails, and changes nothing, if check_lod refuses the camera or the region, or the data
   // set has not all that is to be shown. depth: of this camera, and an opaque view's, if there is a surface already.
-  Result<void> look(const WantedView& view, std::optional<DepthMap> depth = {});
+  // now: what is soon in the picture of a camera that moves comes a little earlier.
+  Result<void> look(const WantedView& view, std::optional<DepthMap> depth = {}, Clock::time_point now = Clock::now());
 
   // See ClientSession.
   [[nodiscard]] bool wants_depth_map() const { return session_.wants_depth_map(); }
@@ -62,6 +63,7 @@ class ViewingSession {
  private:
   ClientSession session_;
   std::optional<WantedView> view_;
+  CameraMotion motion_;
   bool gave_up_more_ = false;  // for this view, because there was no room
 };
 

@@ -102,6 +102,33 @@ TEST_F(MeasuredLate, AnOpaqueViewTellsWhatItsSurfacesHide) {
   EXPECT_EQ(mesh_digest(opaque.mesh()->mesh()), mesh_digest(session.mesh()->mesh()));
 }
 
+// In another order; and once the camera has rested, in that of the view itself.
+TEST_F(MeasuredLate, WhereTheCameraGoesChangesNothingInTheEnd) {
+  may_measure.release(100);
+  ViewRequest view = view_of({-0.3, 0.2}, true);
+  view.lod.camera->pixel_error = 0.1;
+  ASSERT_TRUE(session.look(view));
+  server.run();
+  const auto digest = mesh_digest(session.mesh()->mesh());
+
+  for (const int milliseconds : {10, 1 << 20}) {  // the server's messages are one millisecond apart
+    ClientSession moving{{.dataset = "made", .client = "test"}};
+    testing::SessionServer<ClientSession> other{volume, moving};
+    Camera camera = *view.lod.camera;
+    camera.eye[1] += 10;
+    view.ahead = CameraAhead{camera, ClientSession::Clock::time_point(std::chrono::milliseconds(milliseconds))};
+    ASSERT_TRUE(moving.look(view));
+    other.run();
+    EXPECT_EQ(moving.state(), ClientSession::State::idle);
+    EXPECT_EQ(mesh_digest(moving.mesh()->mesh()), digest);
+    std::vector<bool> goes;
+    for (const auto& message : other.received()) {
+      if (const auto* sent = std::get_if<protocol::View>(&message)) goes.push_back(sent->ahead.has_value());
+    }
+    EXPECT_EQ(goes, milliseconds == 10 ? std::vector<bool>({true, false}) : std::vector<bool>({true}));
+  }
+}
+
 TEST_F(MeasuredLate, OtherViewsWait) {
   ASSERT_TRUE(session.look(view_of({-0.3, 0.2}, false)));
   run_while_it_waits();

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <memory>
 #include <random>
 
@@ -57,6 +58,25 @@ TEST_F(ViewingSessionTest, RefinesEachViewAsFarAsItIsSeen) {
   EXPECT_TRUE(session.is_done());
   EXPECT_GT(session.session().stats().updates, before);
   EXPECT_EQ(session.session().stats().updates, session.mesh()->updates());
+}
+
+TEST_F(ViewingSessionTest, TellsWhereTheCameraGoesWhileItMoves) {
+  const auto now = ViewingSession::Clock::now();
+  Camera camera = kSessionCamera;
+  ASSERT_TRUE(session.look({.camera = camera}, {}, now));
+  ViewingServer server(volume, session);
+  server.run();
+  const auto look_at_last = [&](std::chrono::milliseconds later) {
+    camera.eye[0] += 1;
+    EXPECT_TRUE(session.look({.camera = camera}, {}, now + later));
+    server.run();
+    return std::get<protocol::View>(server.received().back());
+  };
+  const protocol::View moved = look_at_last(std::chrono::milliseconds(100));
+  ASSERT_TRUE(moved.ahead);
+  EXPECT_GT(moved.ahead->eye[0], camera.eye[0] + 1);
+  EXPECT_EQ(moved.lod.camera, camera);
+  EXPECT_FALSE(look_at_last(std::chrono::seconds(10)).ahead) << "it has rested";
 }
 
 TEST_F(ViewingSessionTest, DoesNotAskForTheSameViewAgain) {
