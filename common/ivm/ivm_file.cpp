@@ -248,10 +248,10 @@ Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& v
   return save_container(path, encode_ivm(volume, parallel));
 }
 
-Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel) {
+Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel, PageFaults* faults) {
   const auto bytes = read_container(path, FileScope::one_range, parallel);
   if (!bytes) return tl::unexpected(bytes.error());
-  auto volume = decode_ivm(*bytes, path.stem().string(), parallel);
+  auto volume = decode_ivm(*bytes, path.stem().string(), parallel, kAnyRoom, faults);
   if (!volume) return fail(path.string() + ": " + volume.error().message);
   return std::make_shared<const IntervalVolume>(std::move(*volume));
 }

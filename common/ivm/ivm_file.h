@@ -31,6 +31,7 @@ namespace intervale {
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);
 
 // Reads a file of one range, then decode_ivm; the name is the file's, without folders and extension. Errors begin with the path.
-[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel = serial);
+[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel = serial,
+                                                                     PageFaults* faults = nullptr);
 
 }  // namespace intervale

@@ -152,10 +152,10 @@ Result<std::uint64_t> save_values(const std::filesystem::path& path, const Value
   return bytes.size();
 }
 
-Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel) {
+Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel, PageFaults* faults) {
   const auto bytes = read_container(path, FileScope::every_range, parallel);
   if (!bytes) return tl::unexpected(bytes.error());
-  auto volume = decode_values(*bytes, path.stem().string(), parallel);
+  auto volume = decode_values(*bytes, path.stem().string(), parallel, kAnyRoom, faults);
   if (!volume) return fail(path.string() + ": " + volume.error().message);
   return std::make_shared<const ValueVolume>(std::move(*volume));
 }

@@ -34,6 +34,7 @@ namespace intervale {
 
 // Checks the header and the length before it allocates, then decode_values; the name is the file's, without folders and extension. Errors begin with
 // the path.
-[[nodiscard]] Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel = serial);
+[[nodiscard]] Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel = serial,
+                                                                     PageFaults* faults = nullptr);
 
 }  // namespace intervale

@@ -79,18 +79,10 @@ struct Info {
   }
 };
 
-// The data set of a file. `parallel` shows progress. faults: as of decode_ivm().
+// The data set of a file. faults: as of decode_ivm().
 template <class Use>
 Result<void> with_data_set(const std::string& file, const ParallelFor& parallel, PageFaults* faults, const Use& use) {
-  const auto bytes = read_container(file, {}, parallel);
-  if (!bytes) return tl::unexpected(bytes.error());
-  const std::string name = std::filesystem::path(file).stem().string();
-  const auto with = [&](auto set) -> Result<void> {
-    if (!set) return fail(file + ": " + set.error().message);
-    return use(std::make_shared<const typename decltype(set)::value_type>(std::move(*set)));
-  };
-  return scope_of(*bytes) == FileScope::every_range ? with(decode_values(*bytes, name, parallel, kAnyRoom, faults))
-                                                    : with(decode_ivm(*bytes, name, parallel, kAnyRoom, faults));
+  return is_value_file(file) ? load_values(file, parallel, faults).and_then(use) : load_ivm(file, parallel, faults).and_then(use);
 }
 
 struct Verify {

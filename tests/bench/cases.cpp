@@ -121,6 +121,18 @@ Result<Case> sample_case(std::string_view name, int size) {
   return c;
 }
 
+BoxFrame frame_of(const Grid& grid) {
+  const Vec3 spacing = grid.affine.spacing();
+  BoxFrame frame{.middle = grid.affine.origin()};
+  Vec3 side{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    side[i] = spacing[i] * (grid.dims[i] - 1);
+    frame.middle[i] += side[i] / 2;
+  }
+  frame.diagonal = length(side);
+  return frame;
+}
+
 int run_or_report(const char* program, int (*run)(int argc, char** argv), int argc, char** argv) {
   try {
     return run(argc, argv);

@@ -7,10 +7,12 @@
 #include <string_view>
 #include <utility>
 
+#include "common/diamond/grid.h"
 #include "common/patch/description.h"
 #include "common/patch/value_format.h"
 #include "common/patch/volume.h"
 #include "common/util/result.h"
+#include "common/util/vec3.h"
 
 namespace intervale::bench {
 
@@ -31,6 +33,13 @@ inline constexpr const char* kCaseSyntax =
 
 // One of the product's own samples, with a range that suits it.
 [[nodiscard]] Result<Case> sample_case(std::string_view name, int size);
+
+// Where cameras look at, and how far away they are measured in: of an axis-parallel box.
+struct BoxFrame {
+  Vec3 middle{};
+  double diagonal = 0;
+};
+[[nodiscard]] BoxFrame frame_of(const Grid& grid);
 
 // What the measurements do about errors.
 template <class T>

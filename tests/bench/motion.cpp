@@ -70,13 +70,9 @@ Vector about_up(const Vector& v, double angle) {
 }
 
 Camera camera_at(const Motion& motion, const Options& options, const Grid& g, int time) {
-  Vector middle, side;
-  for (int i = 0; i < 3; ++i) {
-    side[i] = g.affine.spacing()[i] * (g.dims[i] - 1);
-    middle[i] = g.affine.origin()[i] + side[i] / 2;
-  }
+  const auto [middle, diagonal] = frame_of(g);
   const double seconds = std::clamp(time - options.rest, 0, options.turn) / 1e3;
-  const double angle = seconds * options.degrees_per_second * std::numbers::pi / 180, away = motion.away * testing::length(side);
+  const double angle = seconds * options.degrees_per_second * std::numbers::pi / 180, away = motion.away * diagonal;
   const Vector from = testing::unit(motion.direction);
   Camera camera;
   camera.eye = testing::along(middle, away, motion.is_orbit ? about_up(from, angle) : from);

@@ -59,15 +59,11 @@ constexpr std::array<Look, kLookNames.size()> kLooks{
     {{"all of it", 1.2, {0.5, 0.4, -0.77}}, {kLookNames[1], 0.6, {-0.8, 0.3, 0.52}}, {kLookNames[2], 0.2, {0.3, -0.9, 0.3}}}};
 
 Lod lod_of(const Look& look, const Grid& g) {
-  Vector middle, side;
-  for (int i = 0; i < 3; ++i) {
-    side[i] = g.affine.spacing()[i] * (g.dims[i] - 1);
-    middle[i] = g.affine.origin()[i] + side[i] / 2;
-  }
+  const auto [middle, diagonal] = frame_of(g);
   Lod lod;
   lod.camera.emplace();
   lod.camera->look_at = middle;
-  lod.camera->eye = testing::along(middle, look.away * testing::length(side), testing::unit(look.direction));
+  lod.camera->eye = testing::along(middle, look.away * diagonal, testing::unit(look.direction));
   lod.camera->up = {0, 1, 0};
   lod.camera->viewport = {1920, 1080};
   lod.camera->pixel_error = kPixelError;

@@ -1,18 +1,10 @@
 // How coarse a stand-in must be, from how long pictures take: no browser, no clock.
 import assert from 'node:assert/strict';
-import { after, test } from 'node:test';
-import { createServer } from 'vite';
+import { test } from 'node:test';
 
-const server = await createServer({
-  root: new URL('..', import.meta.url).pathname,
-  configFile: false,
-  logLevel: 'error',
-  optimizeDeps: { noDiscovery: true },
-  server: { middlewareMode: true, hmr: false, ws: false, watch: null },
-  appType: 'custom',
-});
-const { FramePace } = await server.ssrLoadModule('/package/src/frame_pace.ts');
-after(() => server.close());
+import { load } from './modules.mjs';
+
+const { FramePace } = await load('/package/src/frame_pace.ts');
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
 console.log(`seed ${seed} (INTERVALE_SEED)`);

@@ -1,25 +1,17 @@
 // Properties of the page's pure functions: the address, cameras, planes, regions, numbers. Needs no browser.
 import assert from 'node:assert/strict';
-import { after, test } from 'node:test';
-import { createServer } from 'vite';
+import { test } from 'node:test';
 
-const server = await createServer({
-  root: new URL('..', import.meta.url).pathname,
-  configFile: false,
-  logLevel: 'error',
-  optimizeDeps: { noDiscovery: true },
-  server: { middlewareMode: true, hmr: false, ws: false, watch: null },
-  appType: 'custom',
-});
+import { load } from './modules.mjs';
+
 const kOfPackage = ['camera', 'vec', 'frame', 'preview_pace', 'ranges', 'live_mesh', 'pieces'];
-const load = (name) => server.ssrLoadModule(kOfPackage.includes(name) ? `/package/src/${name}.ts` : `/src/${name}.ts`);
+const loadNamed = (name) => load(kOfPackage.includes(name) ? `/package/src/${name}.ts` : `/src/${name}.ts`);
 const [
   { exclusive, fromHash, toHash, kDefaults, stylesOf }, camera, plane, values, region, format, vec, frame, { PreviewPace }, palette, opacity, ranges,
   { addressOf }, { arraysOf },
 ] = await Promise.all(
-  ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette', 'opacity', 'ranges', 'live_mesh', 'pieces'].map(load),
+  ['state', 'camera', 'plane', 'range', 'region', 'format', 'vec', 'frame', 'preview_pace', 'palette', 'opacity', 'ranges', 'live_mesh', 'pieces'].map(loadNamed),
 );
-after(() => server.close());
 
 const seed = Number(process.env.INTERVALE_SEED ?? Date.now() % 1e6);
 console.log(`seed ${seed} (INTERVALE_SEED)`);
