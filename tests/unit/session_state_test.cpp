@@ -70,10 +70,11 @@ TEST_F(MeasuredLate, AnEarlyViewBeginsWithEstimatesAndEndsWhenAllIsKnown) {
   EXPECT_EQ(session.state(), ClientSession::State::idle) << "it is known by now";
 }
 
-// What is seen comes first; the mesh at the end is the same.
+// What is seen comes first; the mesh at the end is the same. (Not for an early view: how much its estimates send too much
+// depends on how long the measuring takes.)
 TEST_F(MeasuredLate, AnOpaqueViewTellsWhatItsSurfacesHide) {
   may_measure.release(100);
-  ViewRequest view = view_of({-0.3, 0.2}, true);
+  ViewRequest view = view_of({-0.3, 0.2}, false);
   view.lod.camera->pixel_error = 0.1;
   ASSERT_TRUE(session.look(view));
   server.run();
@@ -105,7 +106,7 @@ TEST_F(MeasuredLate, AnOpaqueViewTellsWhatItsSurfacesHide) {
 // In another order; and once the camera has rested, in that of the view itself.
 TEST_F(MeasuredLate, WhereTheCameraGoesChangesNothingInTheEnd) {
   may_measure.release(100);
-  ViewRequest view = view_of({-0.3, 0.2}, true);
+  ViewRequest view = view_of({-0.3, 0.2}, false);
   view.lod.camera->pixel_error = 0.1;
   ASSERT_TRUE(session.look(view));
   server.run();
