@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <charconv>
@@ -21,6 +22,7 @@
 #include "server/builder/build_data_set.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
+#include "server/scratch/scratch_memory.h"
 #include "server/volume/read_volume.h"
 #include "server/volume/volume_header.h"
 
@@ -42,6 +44,8 @@ struct BuildCommand {
   std::optional<std::uint64_t> time_point;
   std::optional<std::string> part;
   std::vector<std::int64_t> crop;  // first and last on x, on y and on z
+  std::optional<std::uint64_t> memory;
+  std::optional<std::string> scratch;
 };
 
 // A channel to be built.
@@ -232,6 +236,23 @@ Result<nlohmann::ordered_json> write_every_range(const BuildCommand& options, co
   return stats_of(made, options.output);
 }
 
+// Where large arrays lie from now on, if there is a budget.
+Result<std::unique_ptr<ScratchMemory>> limit_memory(const BuildCommand& options, const std::filesystem::path& folder, unsigned threads) {
+  if (!options.memory) {
+    if (options.scratch) return misuse("--scratch belongs to a limit of memory: give --memory too");
+    return nullptr;
+  }
+  auto memory = ScratchMemory::open(options.scratch ? *options.scratch : folder.string(), *options.memory, threads);
+  if (memory) ScratchMemory::install(**memory);
+  return memory;
+}
+
+std::uint64_t most_resident_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return std::uint64_t(usage.ru_maxrss) * 1024;
+}
+
 Result<void> run(const BuildCommand& options) {
   const auto start = std::chrono::steady_clock::now();
   const auto range = parse_range(options.range);
@@ -253,6 +274,10 @@ Result<void> run(const BuildCommand& options) {
     if (auto output = check_output(named_volume(channel.file.string()).path, options.output); !output) return output;
   }
 
+  const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  const auto memory = limit_memory(options, folder, threads);
+  if (!memory) return tl::unexpected(memory.error());
   auto volume = read_volume(input.path, *layout, options.time_point, input.part, crop_of(options));
   if (!volume) return tl::unexpected(volume.error());
   if (volume->components != 1)
@@ -262,16 +287,20 @@ Result<void> run(const BuildCommand& options) {
   if (auto set = set_labels(options, volume->labels); !set) return set;
   volume->name = std::filesystem::path(options.output).stem().string();
 
-  const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   std::string text;
   auto stats = *range ? write_range(options, *channels, *volume, **range, text) : write_every_range(options, *channels, *volume, text);
   if (!stats) return tl::unexpected(stats.error());
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (options.json) {
     (*stats)["seconds"] = seconds;
+    if (*memory) {
+      (*stats)["resident_bytes"] = most_resident_bytes();
+      (*stats)["scratch_bytes"] = (*memory)->most_bytes();
+    }
     return print_json(*stats);
   }
+  if (*memory)
+    text += fmt::format("{} resident at most, {} in the scratch file\n", human_bytes(most_resident_bytes()), human_bytes((*memory)->most_bytes()));
   return print(text + fmt::format("wrote {} in {:.2f} s\n", options.output, seconds));
 }
 
@@ -279,8 +308,13 @@ Result<void> run(const BuildCommand& options) {
 
 void add_build_command(Program& program) {
   const auto o = std::make_shared<BuildCommand>();
-  CLI::App& command =
-      program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] { return run(*o); });
+  CLI::App& command = program.add_command("build", "Build an interval volume from a volume, for a range of values or for every range", [o] {
+    try {
+      return run(*o);
+    } catch (const ScratchFull& full) {
+      return Result<void>(fail(full.what()));
+    }
+  });
   command
       .add_option(
           "INPUT", o->input,
@@ -324,6 +358,10 @@ void add_build_command(Program& program) {
       ->expected(6)
       ->type_name("I0 I1 J0 J1 K0 K1");
   command.add_option("--threads", o->threads, "Number of threads; 0: one for each core")->capture_default_str();
+  command.add_option("--memory", o->memory, "Most resident memory, such as 2GiB or 500MB; what does not fit is in a scratch file. Default: no limit")
+      ->transform(CLI::AsSizeValue(true))
+      ->type_name("BYTES");
+  command.add_option("--scratch", o->scratch, "Folder of the scratch file, on a disk; default: that of the output")->type_name("FOLDER");
   command.add_option("--dims", o->dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");
   command.add_option("--type", o->type, "Raw input: type of a sample: u8, i8, u16, i16, u32, i32, f32 or f64")->type_name("TYPE");
   command.add_flag("--big-endian", o->big_endian, "Raw input: samples are big-endian; default: little-endian");

@@ -1,0 +1,28 @@
+// The program's `operator new`: large arrays lie in a scratch file while one is installed (build --memory).
+//
+// Whoever allocates them: so no array of a build, of today or of later, exceeds the budget by being forgotten. [new.delete]
+// of the C++ standard lets a program replace these; all other forms but those for extended alignment call them.
+#include <cstddef>
+#include <cstdlib>
+#include <new>
+
+#include "server/scratch/scratch_memory.h"
+
+void* operator new(std::size_t bytes) {
+  using intervale::ScratchMemory;
+  if (bytes >= ScratchMemory::kLeastBytes) {
+    if (ScratchMemory* const scratch = ScratchMemory::installed()) return scratch->allocate(bytes);
+  }
+  if (bytes == 0) bytes = 1;
+  for (;;) {
+    if (void* const memory = std::malloc(bytes)) return memory;
+    const std::new_handler handler = std::get_new_handler();
+    if (handler == nullptr) throw std::bad_alloc();
+    handler();
+  }
+}
+
+void operator delete(void* memory) noexcept {
+  if (!intervale::ScratchMemory::free_installed(memory)) std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept { operator delete(memory); }

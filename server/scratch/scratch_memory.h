@@ -1,0 +1,84 @@
+// Memory in a scratch file: how the build of a large volume stays within a budget of resident memory.
+//
+// Arrays lie in a mapping of the file. A thread watches how much of the process is resident, and takes pages of the
+// mapping out of memory before that exceeds the budget (madvise(2), MADV_DONTNEED: of a shared mapping, contents stay in
+// the file). The system keeps them in its page cache as long as that has room, and reads them from the disk otherwise. So
+// whatever computes with arrays computes the same, only slower.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <string>
+#include <thread>
+#include <unordered_map>
+
+#include "common/util/result.h"
+
+namespace intervale {
+
+// Thrown where the scratch file cannot grow: what() is one line that names its folder, and says why.
+class ScratchFull : public std::bad_alloc {
+ public:
+  explicit ScratchFull(std::string text) : text_(std::make_shared<const std::string>(std::move(text))) {}
+  [[nodiscard]] const char* what() const noexcept override { return text_->c_str(); }
+
+ private:
+  std::shared_ptr<const std::string> text_;
+};
+
+// Any thread.
+class ScratchMemory {
+ public:
+  static constexpr std::size_t kLeastBytes = 64 << 10;  // of an array that is worth a place in the file
+
+  // A file without a name in `folder`, so that nothing is left of it however the process ends. budget: of the resident
+  // bytes of the whole process, at most. threads: that compute, each of which has some memory of its own. Fails if the
+  // budget is too small, and tells what it must be at least; or if the folder takes no such file.
+  static Result<std::unique_ptr<ScratchMemory>> open(const std::filesystem::path& folder, std::uint64_t budget, unsigned threads);
+  ScratchMemory(const ScratchMemory&) = delete;
+  ScratchMemory& operator=(const ScratchMemory&) = delete;
+  // Unmaps the file, unless arrays are left in it.
+  ~ScratchMemory();
+
+  // bytes > 0. Its contents are undefined. Throws ScratchFull.
+  [[nodiscard]] void* allocate(std::size_t bytes);
+  void free(void* array) noexcept;
+  [[nodiscard]] bool owns(const void* address) const { return address >= base_ && address < base_ + kRegionBytes; }
+
+  [[nodiscard]] std::uint64_t most_bytes() const { return end_.load(std::memory_order_relaxed); }  // that the file had
+
+  // The one that the program's `operator new` takes large arrays from (server/cli/scratch_new.cpp); nullptr: none. Its
+  // destructor ends that.
+  static void install(ScratchMemory& memory);
+  [[nodiscard]] static ScratchMemory* installed() { return installed_.load(std::memory_order_acquire); }
+  // False if the address is in no scratch file. One that is left over from a file that is no longer installed is ignored.
+  static bool free_installed(void* array) noexcept;
+
+ private:
+  static constexpr std::size_t kRegionBytes = std::size_t(1) << 40;  // of addresses, and of the file, which is sparse
+  ScratchMemory(std::filesystem::path folder, int file, std::byte* base, std::uint64_t budget);
+  std::size_t take(std::size_t bytes);
+  void give_back(std::size_t offset, std::size_t bytes) noexcept;
+  void keep_within_budget(const std::stop_token& stop) const;
+
+  static std::atomic<ScratchMemory*> installed_;
+  static std::atomic<const std::byte*> last_base_;  // of the last one installed
+
+  std::filesystem::path folder_;
+  int file_;
+  std::byte* base_;
+  std::uint64_t budget_;
+  std::mutex mutex_;                                   // of what follows
+  std::map<std::size_t, std::size_t> unused_;          // offsets and bytes, no two of which touch
+  std::unordered_map<std::size_t, std::size_t> used_;  // the same, of arrays
+  std::atomic<std::size_t> end_{0};                    // of all that was ever used
+  std::jthread keeper_;
+};
+
+}  // namespace intervale

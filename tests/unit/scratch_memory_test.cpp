@@ -1,0 +1,113 @@
+#include "server/scratch/scratch_memory.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "tests/support/temp_dir.h"
+
+namespace intervale {
+namespace {
+
+constexpr std::uint64_t kBudget = std::uint64_t(1) << 30;
+
+std::unique_ptr<ScratchMemory> open_scratch(const TempDir& folder) {
+  auto memory = ScratchMemory::open(folder.path(), kBudget, 1);
+  EXPECT_TRUE(memory) << memory.error().message;
+  return std::move(*memory);
+}
+
+// An array, and what it was filled with.
+struct Filled {
+  std::byte* at;
+  std::size_t bytes;
+  std::byte value;
+};
+
+bool is_kept(const Filled& array) {
+  return std::all_of(array.at, array.at + array.bytes, [&](std::byte b) { return b == array.value; });
+}
+
+TEST(ScratchMemory, ArraysDoNotOverlapAndKeepWhatIsInThem) {
+  const TempDir folder;
+  const auto memory = open_scratch(folder);
+  std::mt19937 random(20);
+  std::vector<Filled> arrays;
+  std::size_t held = 0, most = 0;
+  for (int step = 0; step < 300; ++step) {
+    if (arrays.size() > 8 || (!arrays.empty() && random() % 3 == 0)) {
+      std::swap(arrays[random() % arrays.size()], arrays.back());
+      EXPECT_TRUE(is_kept(arrays.back()));
+      memory->free(arrays.back().at);
+      held -= arrays.back().bytes;
+      arrays.pop_back();
+      continue;
+    }
+    const std::size_t bytes = random() % 8 == 0 ? (16 << 20) + random() % 1000 : 1 + random() % 300'000;
+    const Filled array{static_cast<std::byte*>(memory->allocate(bytes)), bytes, std::byte(random())};
+    EXPECT_TRUE(memory->owns(array.at));
+    std::fill_n(array.at, bytes, array.value);
+    arrays.push_back(array);
+    held += bytes;
+    most = std::max(most, held);
+  }
+  for (const Filled& array : arrays) EXPECT_TRUE(is_kept(array));
+  EXPECT_GE(memory->most_bytes(), most);
+  for (const Filled& array : arrays) memory->free(array.at);
+}
+
+// One hole that everything is given back to, whatever the order.
+TEST(ScratchMemory, WhatIsFreedIsUsedAgain) {
+  const TempDir folder;
+  const auto memory = open_scratch(folder);
+  std::vector<void*> arrays;
+  for (int i = 0; i < 16; ++i) arrays.push_back(memory->allocate(1 << 20));
+  const std::uint64_t all = memory->most_bytes();
+  std::shuffle(arrays.begin(), arrays.end(), std::mt19937(20));
+  for (void* const array : arrays) memory->free(array);
+  void* const whole = memory->allocate(16 << 20);
+  EXPECT_EQ(memory->most_bytes(), all);
+  memory->free(whole);
+}
+
+TEST(ScratchMemory, LeavesNothingInTheFolder) {
+  const TempDir folder;
+  {
+    const auto memory = open_scratch(folder);
+    memory->free(memory->allocate(1 << 20));
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(ScratchMemory, TellsWhyItCannotBe) {
+  const TempDir folder;
+  const auto small = ScratchMemory::open(folder.path(), 1 << 20, 3);
+  ASSERT_FALSE(small);
+  EXPECT_THAT(small.error().message, ::testing::HasSubstr("at least 168 MB"));
+  const auto nowhere = ScratchMemory::open(folder / "none", kBudget, 1);
+  ASSERT_FALSE(nowhere);
+  EXPECT_THAT(nowhere.error().message, ::testing::HasSubstr("No such file or directory"));
+}
+
+TEST(ScratchMemory, FreesOnlyWhatItOwns) {
+  const TempDir folder;
+  const auto memory = open_scratch(folder);
+  std::byte elsewhere{};
+  EXPECT_FALSE(ScratchMemory::free_installed(&elsewhere));
+  ScratchMemory::install(*memory);
+  void* const array = memory->allocate(1 << 20);
+  EXPECT_FALSE(ScratchMemory::free_installed(&elsewhere));
+  EXPECT_TRUE(ScratchMemory::free_installed(array));
+  EXPECT_EQ(memory->allocate(1 << 20), array);
+  EXPECT_TRUE(ScratchMemory::free_installed(array));
+}
+
+}  // namespace
+}  // namespace intervale
