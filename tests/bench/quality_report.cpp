@@ -67,8 +67,8 @@ void print_bytes(const std::vector<Row>& rows) {
     }
   }
   fmt::print(
-      "\nkB until 99 % of {} points are off by at most that many pixels on the screen. The points lie on the surface of the full\n"
-      "mesh, within the picture of 1920 x 1080. Values between measurements are interpolated. Ideal: one update at a time,\n"
+      "\nkB until 99 % of {} points are off by at most that many pixels on the screen. The points lie on the surface of the\n"
+      "full mesh, within the picture of 1920 x 1080. Values between measurements are interpolated. Ideal: one update at a time,\n"
       "first that which removes most squared deviation from the picture, each with the ancestors that it lacks; its bytes are\n"
       "what the updates so far would take in one batch, the fewest possible. By level: coarse before fine, as a\n"
       "level-of-detail pyramid is sent. By field error: the same order whatever the view. When done: the bytes sent for a\n"
@@ -96,8 +96,9 @@ void print_pictures(const std::vector<Row>& rows) {
     }
   }
   fmt::print(
-      "\nPeak signal-to-noise ratio of the picture, {} x {} pixels as the programs draw them, against that of the full mesh. With\n"
-      "depth maps: the client sends one whenever it has twice as many updates as at the last, and what they hide is sent last.\n",
+      "\nPeak signal-to-noise ratio of the picture, {} x {} pixels as the programs draw them, against that of the full mesh.\n"
+      "With depth maps: the client sends one whenever it has twice as many updates as at the last, and what they hide is sent\n"
+      "last.\n",
       kDrawn[0], kDrawn[1]);
 }
 
@@ -117,8 +118,8 @@ void print_deviations(const std::vector<Row>& rows) {
     }
   }
   fmt::print(
-      "\nPixels on the screen that so many points are off at most. Missing: points of the full mesh's surface from the mesh so far.\n"
-      "Too much: the other way round. Wrong: a colour is off by more than 16 of 255.\n");
+      "\nPixels on the screen that so many points are off at most. Missing: points of the full mesh's surface from the mesh so\n"
+      "far. Too much: the other way round. Wrong: a colour is off by more than 16 of 255.\n");
 }
 
 void draw_curves(const std::vector<Row>& rows, const std::string& path) {
