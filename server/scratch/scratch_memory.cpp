@@ -21,7 +21,7 @@ constexpr std::size_t kSweep = 4 << 20;           // bytes that are taken out of
 constexpr std::size_t kReleased = 16 << 20;       // so many bytes that are no longer used go back to the disk; fewer are used again
 constexpr std::uint64_t kProgram = 64 << 20;      // resident, of code and small objects
 constexpr std::uint64_t kThread = 32 << 20;       // for each thread
-constexpr std::uint64_t kMostMargin = 128 << 20;  // becomes resident before the keeper runs again
+constexpr std::uint64_t kMostMargin = 256 << 20;  // becomes resident before the keeper runs again
 constexpr auto kPeriod = std::chrono::milliseconds(1);
 
 // Resident bytes of the process. statm: /proc/self/statm.
@@ -59,21 +59,28 @@ Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open(const std::filesystem
   if (budget < least)
     return fail("a budget of " + megabytes(budget) + " is too small: with " + std::to_string(threads) + " threads at least " + megabytes(least));
   const auto cannot = [&folder](int error) { return fail("cannot make a scratch file in '" + folder.string() + "': " + reason(error)); };
+  const int statm = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+  if (statm < 0) return fail("cannot tell how much memory is resident: /proc/self/statm: " + reason(errno));
   const int file = open_unnamed(folder);
-  if (file < 0) return cannot(errno);
+  if (file < 0) {
+    const int error = errno;
+    ::close(statm);
+    return cannot(error);
+  }
   void* const base = ::ftruncate(file, off_t(kRegionBytes)) == 0
                          ? ::mmap(nullptr, kRegionBytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_NORESERVE, file, 0)
                          : MAP_FAILED;
   if (base == MAP_FAILED) {
     const int error = errno;
     ::close(file);
+    ::close(statm);
     return cannot(error);
   }
-  return std::unique_ptr<ScratchMemory>(new ScratchMemory(folder, file, static_cast<std::byte*>(base), budget));
+  return std::unique_ptr<ScratchMemory>(new ScratchMemory(folder, file, statm, static_cast<std::byte*>(base), budget));
 }
 
-ScratchMemory::ScratchMemory(std::filesystem::path folder, int file, std::byte* base, std::uint64_t budget)
-    : folder_(std::move(folder)), file_(file), base_(base), budget_(budget) {
+ScratchMemory::ScratchMemory(std::filesystem::path folder, int file, int statm, std::byte* base, std::uint64_t budget)
+    : folder_(std::move(folder)), file_(file), statm_(statm), base_(base), budget_(budget) {
   ::madvise(base_, kRegionBytes, MADV_RANDOM);  // or one access makes up to two megabytes resident
   unused_.emplace(0, kRegionBytes);
   keeper_ = std::jthread([this](const std::stop_token& stop) { keep_within_budget(stop); });
@@ -90,6 +97,7 @@ ScratchMemory::~ScratchMemory() {
     last_base_.compare_exchange_strong(base, nullptr);
   }
   ::close(file_);
+  ::close(statm_);
 }
 
 void ScratchMemory::install(ScratchMemory& memory) {
@@ -155,23 +163,21 @@ void ScratchMemory::free(void* array) noexcept {
 
 // Takes pages out of memory in the order of their addresses, round and round. Those in use come back at once.
 void ScratchMemory::keep_within_budget(const std::stop_token& stop) const {
-  const int statm = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
   const std::uint64_t most = budget_ - std::min(budget_ / 2, kMostMargin), enough = most - most / 4;
   std::size_t next = 0;
   while (!stop.stop_requested()) {
-    std::uint64_t resident = resident_bytes(statm);
+    std::uint64_t resident = resident_bytes(statm_);
     if (resident > most) {
       const std::size_t end = most_bytes();
       for (std::size_t swept = 0; swept < end && resident > enough; swept += kSweep) {
         if (next >= end) next = 0;
         ::madvise(base_ + next, std::min(kSweep, end - next), MADV_DONTNEED);
         next += kSweep;
-        if (swept / kSweep % 4 == 3) resident = resident_bytes(statm);
+        if (swept / kSweep % 4 == 3) resident = resident_bytes(statm_);
       }
     }
     std::this_thread::sleep_for(kPeriod);
   }
-  ::close(statm);
 }
 
 }  // namespace intervale

@@ -62,7 +62,7 @@ class ScratchMemory {
 
  private:
   static constexpr std::size_t kRegionBytes = std::size_t(1) << 40;  // of addresses, and of the file, which is sparse
-  ScratchMemory(std::filesystem::path folder, int file, std::byte* base, std::uint64_t budget);
+  ScratchMemory(std::filesystem::path folder, int file, int statm, std::byte* base, std::uint64_t budget);
   std::size_t take(std::size_t bytes);
   void give_back(std::size_t offset, std::size_t bytes) noexcept;
   void keep_within_budget(const std::stop_token& stop) const;
@@ -71,7 +71,7 @@ class ScratchMemory {
   static std::atomic<const std::byte*> last_base_;  // of the last one installed
 
   std::filesystem::path folder_;
-  int file_;
+  int file_, statm_;  // statm: /proc/self/statm
   std::byte* base_;
   std::uint64_t budget_;
   std::mutex mutex_;                                   // of what follows
