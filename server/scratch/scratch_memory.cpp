@@ -1,14 +1,17 @@
 #include "server/scratch/scratch_memory.h"
 
 #include <fcntl.h>
+#include <oneapi/tbb/task_scheduler_observer.h>
+#include <sched.h>
 #include <sys/mman.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
-#include <chrono>
+#include <csignal>
 #include <cstring>
 #include <iterator>
 #include <utility>
@@ -21,8 +24,8 @@ constexpr std::size_t kSweep = 4 << 20;           // bytes that are taken out of
 constexpr std::size_t kReleased = 16 << 20;       // so many bytes that are no longer used go back to the disk; fewer are used again
 constexpr std::uint64_t kProgram = 64 << 20;      // resident, of code and small objects
 constexpr std::uint64_t kThread = 32 << 20;       // for each thread
-constexpr std::uint64_t kMostMargin = 256 << 20;  // becomes resident before the keeper runs again
-constexpr auto kPeriod = std::chrono::milliseconds(1);
+constexpr std::uint64_t kMostMargin = 64 << 20;  // may become resident from one tick to the next
+constexpr long kPeriod = 1'000'000;               // nanoseconds between two looks of a thread
 
 // Resident bytes of the process. statm: /proc/self/statm.
 std::uint64_t resident_bytes(int statm) {
@@ -49,7 +52,44 @@ int open_unnamed(const std::filesystem::path& folder) {
   return named;
 }
 
+// Threads that are looking, or about to.
+std::atomic<int> looking{0};
+
 }  // namespace
+
+// A timer for each thread that computes.
+class ScratchMemory::Timers : public tbb::task_scheduler_observer {
+ public:
+  Timers() {
+    add_this_thread();
+    observe(true);
+  }
+  Timers(const Timers&) = delete;
+  Timers& operator=(const Timers&) = delete;
+  ~Timers() override {
+    observe(false);
+    for (const auto& [thread, timer] : timers_) ::timer_delete(timer);
+  }
+  void on_scheduler_entry(bool /*is_worker*/) override { add_this_thread(); }
+
+ private:
+  void add_this_thread() {
+    const pid_t thread = ::gettid();
+    const std::lock_guard lock(mutex_);
+    if (timers_.contains(thread)) return;
+    sigevent event{};
+    event.sigev_notify = SIGEV_THREAD_ID;
+    event.sigev_signo = SIGPROF;
+    event._sigev_un._tid = thread;
+    timer_t timer{};
+    if (::timer_create(CLOCK_MONOTONIC, &event, &timer) != 0) return;
+    const itimerspec period{{0, kPeriod}, {0, kPeriod}};
+    ::timer_settime(timer, 0, &period, nullptr);
+    timers_.emplace(thread, timer);
+  }
+  std::mutex mutex_;
+  std::unordered_map<pid_t, timer_t> timers_;
+};
 
 std::atomic<ScratchMemory*> ScratchMemory::installed_{nullptr};
 std::atomic<const std::byte*> ScratchMemory::last_base_{nullptr};
@@ -83,13 +123,13 @@ ScratchMemory::ScratchMemory(std::filesystem::path folder, int file, int statm, 
     : folder_(std::move(folder)), file_(file), statm_(statm), base_(base), budget_(budget) {
   ::madvise(base_, kRegionBytes, MADV_RANDOM);  // or one access makes up to two megabytes resident
   unused_.emplace(0, kRegionBytes);
-  keeper_ = std::jthread([this](const std::stop_token& stop) { keep_within_budget(stop); });
 }
 
 ScratchMemory::~ScratchMemory() {
+  timers_.reset();
   ScratchMemory* self = this;
   installed_.compare_exchange_strong(self, nullptr);
-  keeper_ = {};
+  while (looking.load() != 0) ::sched_yield();
   const std::lock_guard lock(mutex_);
   if (used_.empty()) {
     ::munmap(base_, kRegionBytes);
@@ -103,6 +143,11 @@ ScratchMemory::~ScratchMemory() {
 void ScratchMemory::install(ScratchMemory& memory) {
   last_base_.store(memory.base_, std::memory_order_release);
   installed_.store(&memory, std::memory_order_release);
+  struct sigaction action {};
+  action.sa_handler = &ScratchMemory::on_tick;
+  action.sa_flags = SA_RESTART;
+  ::sigaction(SIGPROF, &action, nullptr);
+  memory.timers_ = std::make_unique<Timers>();
 }
 
 bool ScratchMemory::free_installed(void* array) noexcept {
@@ -161,23 +206,32 @@ void ScratchMemory::free(void* array) noexcept {
   give_back(offset, bytes);
 }
 
-// Takes pages out of memory in the order of their addresses, round and round. Those in use come back at once.
-void ScratchMemory::keep_within_budget(const std::stop_token& stop) const {
-  const std::uint64_t most = budget_ - std::min(budget_ / 2, kMostMargin), enough = most - most / 4;
-  std::size_t next = 0;
-  while (!stop.stop_requested()) {
-    std::uint64_t resident = resident_bytes(statm_);
-    if (resident > most) {
-      const std::size_t end = most_bytes();
-      for (std::size_t swept = 0; swept < end && resident > enough; swept += kSweep) {
-        if (next >= end) next = 0;
-        ::madvise(base_ + next, std::min(kSweep, end - next), MADV_DONTNEED);
-        next += kSweep;
-        if (swept / kSweep % 4 == 3) resident = resident_bytes(statm_);
-      }
-    }
-    std::this_thread::sleep_for(kPeriod);
+void ScratchMemory::on_tick(int /*signal*/) noexcept {
+  const int error = errno;
+  ++looking;
+  if (ScratchMemory* const memory = installed()) memory->keep_within_budget();
+  --looking;
+  errno = error;
+}
+
+// Calls only what a signal's handler may call. Takes pages out of memory in the order of their addresses, round and round;
+// those in use come back at once. Other threads wait for that.
+void ScratchMemory::keep_within_budget() noexcept {
+  const std::uint64_t most = budget_ - std::min(budget_ / 4, kMostMargin);
+  std::uint64_t resident = resident_bytes(statm_);
+  if (resident <= most) return;
+  if (is_sweeping_.exchange(true, std::memory_order_acquire)) {
+    while (is_sweeping_.load(std::memory_order_acquire)) ::sched_yield();
+    return;
   }
+  const std::size_t end = most_bytes();
+  for (std::size_t swept = 0; swept < end && resident > most - most / 4; swept += kSweep) {
+    if (next_sweep_ >= end) next_sweep_ = 0;
+    ::madvise(base_ + next_sweep_, std::min(kSweep, end - next_sweep_), MADV_DONTNEED);
+    next_sweep_ += kSweep;
+    if (swept / kSweep % 4 == 3) resident = resident_bytes(statm_);
+  }
+  is_sweeping_.store(false, std::memory_order_release);
 }
 
 }  // namespace intervale

@@ -1,9 +1,10 @@
 // Memory in a scratch file: how the build of a large volume stays within a budget of resident memory.
 //
-// Arrays lie in a mapping of the file. A thread watches how much of the process is resident, and takes pages of the
-// mapping out of memory before that exceeds the budget (madvise(2), MADV_DONTNEED: of a shared mapping, contents stay in
-// the file). The system keeps them in its page cache as long as that has room, and reads them from the disk otherwise. So
-// whatever computes with arrays computes the same, only slower.
+// Arrays lie in a mapping of the file. Every millisecond a timer interrupts each thread that computes; it looks how much of
+// the process is resident, and before that exceeds the budget, it takes pages of the mapping out of memory (madvise(2),
+// MADV_DONTNEED: of a shared mapping, contents stay in the file). So the threads that fill memory empty it, however busy
+// the machine is. The system keeps the pages in its page cache as long as that has room, and reads them from the disk
+// otherwise: whatever computes with arrays computes the same, only slower.
 #pragma once
 
 #include <atomic>
@@ -15,7 +16,6 @@
 #include <mutex>
 #include <new>
 #include <string>
-#include <thread>
 #include <unordered_map>
 
 #include "common/util/result.h"
@@ -53,9 +53,11 @@ class ScratchMemory {
 
   [[nodiscard]] std::uint64_t most_bytes() const { return end_.load(std::memory_order_relaxed); }  // that the file had
 
-  // The one that the program's `operator new` takes large arrays from (server/cli/scratch_new.cpp); nullptr: none. Its
-  // destructor ends that.
+  // From now on the program's `operator new` takes large arrays from it (server/cli/scratch_new.cpp), and the budget is
+  // kept, by SIGPROF to the calling thread and to those of oneTBB that work for it. Its destructor ends both. One in a
+  // process.
   static void install(ScratchMemory& memory);
+  // nullptr: none.
   [[nodiscard]] static ScratchMemory* installed() { return installed_.load(std::memory_order_acquire); }
   // False if the address is in no scratch file. One that is left over from a file that is no longer installed is ignored.
   static bool free_installed(void* array) noexcept;
@@ -65,7 +67,9 @@ class ScratchMemory {
   ScratchMemory(std::filesystem::path folder, int file, int statm, std::byte* base, std::uint64_t budget);
   std::size_t take(std::size_t bytes);
   void give_back(std::size_t offset, std::size_t bytes) noexcept;
-  void keep_within_budget(const std::stop_token& stop) const;
+  class Timers;
+  static void on_tick(int signal) noexcept;
+  void keep_within_budget() noexcept;
 
   static std::atomic<ScratchMemory*> installed_;
   static std::atomic<const std::byte*> last_base_;  // of the last one installed
@@ -78,7 +82,9 @@ class ScratchMemory {
   std::map<std::size_t, std::size_t> unused_;          // offsets and bytes, no two of which touch
   std::unordered_map<std::size_t, std::size_t> used_;  // the same, of arrays
   std::atomic<std::size_t> end_{0};                    // of all that was ever used
-  std::jthread keeper_;
+  std::unique_ptr<Timers> timers_;                     // once it is installed
+  std::atomic<bool> is_sweeping_{false};
+  std::size_t next_sweep_ = 0;  // offset; of the thread that sweeps
 };
 
 }  // namespace intervale

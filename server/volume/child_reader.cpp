@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <memory>
@@ -26,7 +27,7 @@ namespace intervale {
 namespace {
 
 constexpr std::size_t kMaxMessage = 1000;
-constexpr int kPatience = 60'000;  // milliseconds without a byte
+constexpr auto kPatience = std::chrono::seconds(60);  // without a byte
 
 // The folder of the shared library that this is part of; of the program, if of none.
 std::filesystem::path folder_of_library() {
@@ -104,9 +105,11 @@ class Child {
   // Fewer bytes only where it writes no more.
   std::size_t read(std::span<std::byte> out) {
     std::size_t done = 0;
+    auto until = std::chrono::steady_clock::now() + kPatience;
     while (done < out.size()) {
       pollfd wanted{output_.get(), POLLIN, 0};
-      const int ready = ::poll(&wanted, 1, kPatience);
+      const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+      const int ready = ::poll(&wanted, 1, int(std::max(left.count(), std::chrono::milliseconds::rep(0))));
       if (ready < 0 && errno == EINTR) continue;
       if (ready <= 0) {
         is_stuck_ = true;
@@ -116,6 +119,7 @@ class Child {
       if (got < 0 && errno == EINTR) continue;
       if (got <= 0) break;
       done += std::size_t(got);
+      until = std::chrono::steady_clock::now() + kPatience;
     }
     return done;
   }

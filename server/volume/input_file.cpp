@@ -41,10 +41,13 @@ Result<InputFile> InputFile::open(const std::filesystem::path& path) {
   return file;
 }
 
+// Signals wait for the system's calls, and those that keep a build within its memory should not wait long.
+constexpr std::size_t kMostAtOnce = 1 << 20;
+
 Result<std::size_t> InputFile::read_some(std::uint64_t offset, std::span<std::byte> out) const {
   std::size_t done = 0;
   while (done < out.size() && offset + done < size_) {
-    const auto got = ::pread(descriptor_, out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
+    const auto got = ::pread(descriptor_, out.data() + done, std::min(out.size() - done, kMostAtOnce), static_cast<off_t>(offset + done));
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return fail(because("read", path_, errno));
     if (got == 0) break;  // the file has shrunk since
