@@ -7,9 +7,11 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/local/fetch_local.h"
 #include "client/net/fetch.h"
 #include "client/program/access_options.h"
 #include "client/program/all_threads.h"
@@ -22,6 +24,8 @@
 #include "common/program/mesh_figures.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
+#include "common/remote/load_remote.h"
+#include "common/remote/remote_options.h"
 #include "common/util/printable.h"
 
 namespace intervale {
@@ -30,6 +34,7 @@ namespace {
 struct FetchCommand {
   std::string url;
   Access access;
+  RemoteOptions remote;
   FetchOptions fetch;
   std::vector<std::string> range;
   std::optional<std::string> refine;
@@ -57,8 +62,18 @@ class RecentVolume {
   Clock::time_point next_{};
 };
 
-Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& options) {
-  Progress progress("receiving " + printable(url.name));
+// A data set of a server, or a file on a web server.
+using Source = std::variant<ServerUrl, RemoteUrl>;
+
+Result<Source> parse_source(const FetchCommand& options) {
+  if (is_remote_url(options.url)) return parse_remote_url(options.url).map([](RemoteUrl url) { return Source(std::move(url)); });
+  auto url = parse_url(options.url, options.access);
+  if (!url) return tl::unexpected(url.error());
+  if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
+  return Source(std::move(*url));
+}
+
+FetchEvents events_of(Progress& progress) {
   FetchEvents events;
   events.on_notice = [&progress](const std::string& notice) { progress.note(notice); };
   events.on_batch = [&progress, volume = RecentVolume()](const StreamClient& client, const FetchStats& stats) mutable {
@@ -69,7 +84,30 @@ Result<Fetched> fetch_with_progress(const ServerUrl& url, const FetchOptions& op
     progress.text(fmt::format("{} updates, at most {} to go, {} tetrahedra, volume {:.6g}, {}, {}", client.updates(), session.updates_to_go,
                               client.tet_count(), volume.of(client), human_bytes(session.bytes), left));
   };
-  return fetch(url, options, events);
+  return events;
+}
+
+Result<Fetched> fetch_from(const ServerUrl& url, const FetchCommand& /*options*/, const FetchOptions& fetch) {
+  Progress progress("receiving " + printable(url.name));
+  auto fetched = intervale::fetch(url, fetch, events_of(progress));
+  if (!fetched) return tl::unexpected(with_access_hint(fetched.error(), url));
+  return fetched;
+}
+
+// Reads the whole file, and chooses what the view needs. The token is not for web servers: it is not sent.
+Result<Fetched> fetch_from(const RemoteUrl& url, const FetchCommand& options, const FetchOptions& fetch) {
+  RemoteOptions remote = options.remote;
+  remote.authorities = options.access.authorities;
+  const auto access = read_access(remote);
+  if (!access) return tl::unexpected(access.error());
+  fmt::print(stderr, "intervale-client: no server: reads all of {}, and chooses what the view needs\n", url.shown);
+  Progress progress("reading " + url.shown);
+  auto read = load_remote_volume(url, *access, on_all_threads);
+  if (!read) {
+    const bool is_file = url.shown.ends_with(".ivm");
+    return fail(read.error().message + (is_file ? "" : "; data sets of intervale servers begin with ws:// or wss://"));
+  }
+  return fetch_local(*read, fetch, events_of(progress));
 }
 
 // The meshes of all ranges as one, and the figures of each if there are several.
@@ -122,9 +160,8 @@ Result<bool> draw(const PictureOptions& picture, const PictureSubject& subject, 
 }
 
 Result<void> run(const FetchCommand& options) {
-  const auto url = parse_url(options.url, options.access);
-  if (!url) return tl::unexpected(url.error());
-  if (url->name.empty()) return misuse("the URL names no data set: expected " + url->server() + "/NAME; see intervale-client list " + url->server());
+  const auto source = parse_source(options);
+  if (!source) return tl::unexpected(source.error());
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
@@ -141,8 +178,8 @@ Result<void> run(const FetchCommand& options) {
   const auto& picture = options.picture;
   const bool has_budget = fetch.max_bytes || fetch.lod.max_tets;
   fetch.is_opaque = has_budget && picture && !options.output && picture->render == Render::surface && !picture->clip && !picture->edges;
-  const auto fetched = fetch_with_progress(*url, fetch);
-  if (!fetched) return tl::unexpected(with_access_hint(fetched.error(), *url));
+  const auto fetched = std::visit([&](const auto& url) { return fetch_from(url, options, fetch); }, *source);
+  if (!fetched) return tl::unexpected(fetched.error());
   const FetchedMesh all = mesh_of(fetched->client, options.digest);
   if (options.output) {
     if (auto written = write_mesh(*options.output, all.mesh); !written) return written;
@@ -162,7 +199,11 @@ Result<void> run(const FetchCommand& options) {
 void add_fetch_command(Program& program) {
   const auto options = std::make_shared<FetchCommand>();
   CLI::App& command = program.add_command("fetch", "Receive a mesh, and write or draw it", [options] { return run(*options); });
-  command.add_option("URL", options->url, "ws://host:port/NAME, or wss://")->required();
+  command
+      .add_option(
+          "URL", options->url,
+          "ws://HOST:PORT/NAME (or wss://) of a server; or https://HOST/FILE.ivm (or http://), a file on a web server, which is read as a whole")
+      ->required();
   command.add_option("-o,--output", options->output, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")->type_name("MESH");
   add_ranges_option(command, options->range, kShownRangeHelp);
   add_refine_option(command, options->refine, kShownRefineHelp);
@@ -177,6 +218,7 @@ void add_fetch_command(Program& program) {
       ->type_name("SECONDS");
   add_digest_flag(command, options->digest);
   add_access_options(command, options->access);
+  add_remote_options(command, options->remote);
   add_json_flag(command, options->json);
 }
 

@@ -35,7 +35,7 @@ struct Entry {
 };
 static_assert(sizeof(Header) == 40 && sizeof(Entry) == 32, "no padding");
 constexpr std::uint64_t kReadBytes = 4 << 20;  // at a time
-constexpr std::size_t kMostHeadBytes = sizeof(Header) + kMaxStreams * sizeof(Entry);
+static_assert(kMostHeadBytes == sizeof(Header) + kMaxStreams * sizeof(Entry));
 
 constexpr std::uint32_t bit_of(StreamType type) { return std::uint32_t(1) << std::uint32_t(type); }
 
@@ -231,6 +231,18 @@ Result<std::span<const std::byte>> Container::stream(StreamType type, std::size_
   const auto found = (*this)[type];
   if (found.size() == bytes) return found;
   return fail(name_of(std::uint32_t(type)) + " has " + std::to_string(found.size()) + " bytes, " + std::to_string(bytes) + " expected");
+}
+
+Result<std::uint64_t> check_container_start(std::span<const std::byte> start, std::optional<std::uint64_t> file_bytes) {
+  std::uint64_t bytes = start.size();
+  if (file_bytes) {
+    bytes = *file_bytes;
+  } else if (start.size() >= sizeof(Header)) {
+    std::memcpy(&bytes, start.data() + offsetof(Header, file_bytes), sizeof bytes);
+  }
+  const auto head = read_head(start, bytes);
+  if (!head) return tl::unexpected(head.error());
+  return bytes;
 }
 
 bool begins_as_ivm(const std::filesystem::path& path) {

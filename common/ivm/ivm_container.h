@@ -104,6 +104,14 @@ class Container {
   std::array<std::span<const std::byte>, kStreamTypes> streams_;
 };
 
+// The most bytes that a header and its table take.
+inline constexpr std::size_t kMostHeadBytes = 2088;
+
+// Checks the header and the table that a file begins with, before the rest of it is there. start: its first
+// kMostHeadBytes, or more, or all of a shorter file. file_bytes: how long the file is; off: it is not known, and as long
+// as its header says. Returns that length. Fails, in one line, if this is not the beginning of an .ivm file of this version.
+[[nodiscard]] Result<std::uint64_t> check_container_start(std::span<const std::byte> start, std::optional<std::uint64_t> file_bytes);
+
 // Whether a file begins as an .ivm file of any version, whole or not.
 [[nodiscard]] bool begins_as_ivm(const std::filesystem::path& path);
 

@@ -22,6 +22,8 @@
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/ranges/extract_meshes.h"
+#include "common/remote/load_remote.h"
+#include "common/remote/remote_options.h"
 #include "common/util/printable.h"
 #include "server/cli/commands.h"
 
@@ -35,6 +37,7 @@ struct ExtractCommand {
   std::vector<std::string> range;
   std::optional<std::string> refine;
   std::vector<std::string> channels;
+  RemoteOptions remote;
   Lod lod;
   unsigned threads = 0;
   bool tolerates_damage = false;
@@ -48,7 +51,7 @@ using Clock = std::chrono::steady_clock;
 Result<ShownRanges> shown_of(const ExtractCommand& options, const Description& d) {
   const auto ranges = parse_ranges(options.range);
   if (!ranges) return tl::unexpected(ranges.error());
-  if (d.has_every_range && ranges->empty()) return misuse("'" + options.file + "' has every range: say which with --range LO HI");
+  if (d.has_every_range && ranges->empty()) return misuse("'" + shown_url(options.file) + "' has every range: say which with --range LO HI");
   auto refine = parse_refine(options.refine);
   if (options.picture && options.picture->render == Render::volume && !refine && d.refine == Refine::uniform) refine = Refine::uniform;
   ShownRanges shown = resolve(d, {*ranges, refine});
@@ -101,6 +104,15 @@ Result<bool> draw(const PictureOptions& picture, const PictureSubject& subject, 
   return write_picture(picture, subject, camera, with_progress(progress, on_all_cores));
 }
 
+Result<std::shared_ptr<const IntervalVolume>> load(const ExtractCommand& options, PageFaults* faults) {
+  if (!is_remote_url(options.file)) return load_volume(options.file, on_all_cores, faults);
+  const auto url = parse_remote_url(options.file);
+  if (!url) return tl::unexpected(url.error());
+  const auto access = read_access(options.remote);
+  if (!access) return tl::unexpected(access.error());
+  return load_remote_volume(*url, *access, on_all_cores, faults);
+}
+
 Result<void> run(const ExtractCommand& options) {
   if (const auto ranges = parse_ranges(options.range); !ranges) return tl::unexpected(ranges.error());
   if (options.output) {
@@ -112,11 +124,11 @@ Result<void> run(const ExtractCommand& options) {
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   PageFaults faults;
-  const auto volume = load_volume(options.file, on_all_cores, options.tolerates_damage ? &faults : nullptr);
+  const auto volume = load(options, options.tolerates_damage ? &faults : nullptr);
   if (!volume) return tl::unexpected(volume.error());
   if (faults.any()) {
-    fmt::print(stderr, "intervale: warning: {}: {}; {} of {} updates are left out\n", printable(options.file), to_text(faults), faults.lost_updates,
-               (*volume)->size());
+    fmt::print(stderr, "intervale: warning: {}: {}; {} of {} updates are left out\n", printable(shown_url(options.file)), to_text(faults),
+               faults.lost_updates, (*volume)->size());
   }
   const Description& description = (*volume)->description();
   const auto shown = shown_of(options, description);
@@ -141,7 +153,7 @@ Result<void> run(const ExtractCommand& options) {
 void add_extract_command(Program& program) {
   const auto options = std::make_shared<ExtractCommand>();
   CLI::App& command = program.add_command("extract", "Extract a mesh from an interval volume, without a server", [options] { return run(*options); });
-  command.add_option("FILE", options->file, "Interval volume (.ivm)")->required();
+  command.add_option("FILE", options->file, "Interval volume (.ivm), or its URL (https://, http://)")->required();
   command.add_option("-o,--output", options->output, "Mesh to write: .vtu (tetrahedra), .vtp, .ply, .stl, .obj or .glb (boundary triangles)")
       ->type_name("MESH");
   add_ranges_option(command, options->range, kShownRangeHelp);
@@ -151,6 +163,8 @@ void add_extract_command(Program& program) {
   add_picture_options(command, options->picture);
   command.add_option("--threads", options->threads, "Number of threads; 0: one for each core")->capture_default_str();
   command.add_flag("--tolerate-damage", options->tolerates_damage, "Leave out what damaged pages of the file hold, instead of failing");
+  add_remote_options(command, options->remote);
+  add_remote_authorities_option(command, options->remote);
   add_digest_flag(command, options->digest);
   add_json_flag(command, options->json);
 }

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "common/remote/remote_options.h"
+#include "common/remote/remote_url.h"
 #include "server/cli/commands.h"
 #include "server/serve/serve.h"
 
@@ -18,6 +20,8 @@ struct ServeCommand {
   LogOptions log;
   TlsFiles tls;
   std::vector<std::string> inputs;
+  RemoteOptions remote;
+  std::chrono::milliseconds remote_poll_time = RemoteInputs().poll_time;
 };
 
 // The parser ignores empty variables. One that was meant to protect the server must not leave it open.
@@ -32,7 +36,26 @@ Result<void> run(const ServeCommand& options) {
         std::pair("INTERVALE_TLS_KEY", options.serve.tls.has_value())}) {
     if (!given && is_empty_in_environment(name)) return misuse(std::string(name) + " is set but empty: set it to a file, or unset it");
   }
-  return serve(options.serve, options.log, std::vector<std::filesystem::path>(options.inputs.begin(), options.inputs.end()));
+  std::vector<std::filesystem::path> paths;
+  RemoteInputs remote;
+  for (const std::string& input : options.inputs) {
+    if (!is_remote_url(input)) {
+      paths.emplace_back(input);
+      continue;
+    }
+    auto url = parse_remote_url(input);
+    if (!url) return tl::unexpected(url.error());
+    remote.urls.push_back(std::move(*url));
+  }
+  auto access = read_access(options.remote);
+  if (!access) return tl::unexpected(access.error());
+  const bool has_credentials = !access->headers.empty() || access->aws;
+  for (const RemoteUrl& url : remote.urls) {
+    if (has_credentials && url.origin != remote.urls.front().origin) return misuse("--header-file and --aws-sign are for the files of one host");
+  }
+  remote.access = std::move(*access);
+  remote.poll_time = options.remote_poll_time;
+  return serve(options.serve, options.log, paths, std::move(remote));
 }
 
 // The log level in a configuration file; nullopt if it has none, or cannot be read.
@@ -80,8 +103,9 @@ std::string check_at_least_one(const std::string& text) {
   return CLI::detail::lexical_cast(text, value) && value >= 1 && value <= 1e15 ? "" : "must be 1 or more";
 }
 
-void add_milliseconds(CLI::App& command, const std::string& name, std::chrono::milliseconds& time, double least, const std::string& description) {
-  command
+CLI::Option* add_milliseconds(CLI::App& command, const std::string& name, std::chrono::milliseconds& time, double least,
+                              const std::string& description) {
+  return command
       .add_option_function<double>(
           name,
           [&time, name](double seconds) {
@@ -185,7 +209,9 @@ void add_serve_command(Program& program) {
   const auto options = std::make_shared<ServeCommand>();
   CLI::App& command =
       program.add_command("serve", "Stream interval volumes to clients, until SIGTERM or Ctrl-C", [options] { return run(*options); });
-  command.add_option("INPUTS", options->inputs, "Interval volumes (.ivm), or folders with them")->required()->type_name("FILE.ivm|FOLDER ...");
+  command.add_option("INPUTS", options->inputs, "Interval volumes (.ivm), folders with them, or their URLs (https://, http://)")
+      ->required()
+      ->type_name("FILE.ivm|FOLDER|URL ...");
   command.add_option("--listen", options->serve.listen, "Address and port to listen on; IPv6: [::1]:8080; port 0: any free port")
       ->capture_default_str();
   command
@@ -203,6 +229,11 @@ void add_serve_command(Program& program) {
       ->type_name("ADDRESS:PORT")
       ->group("Logs and metrics");
   add_log_options(command, options->log);
+  add_remote_options(command, options->remote);
+  add_remote_authorities_option(command, options->remote);
+  add_milliseconds(command, "--remote-poll-time", options->remote_poll_time, 0.1,
+                   "How often files at URLs are asked whether they have changed. Default: 60")
+      ->group(kRemoteGroup);
   add_access_options(command, options->serve, options->tls);
   add_limits(command, options->serve);
 }

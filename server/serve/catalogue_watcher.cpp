@@ -82,6 +82,7 @@ Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
     log_faults(input, faults, **volume);
     files_.emplace_back(input, counted(memory_, Memory::Holder::datasets, std::move(*volume)));
   }
+  if (auto loaded = remote_.load(parallel); !loaded) return tl::unexpected(loaded.error());
   return catalogue(true);
 }
 
@@ -134,7 +135,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
 
 std::optional<Catalogue> CatalogueWatcher::poll(std::stop_token stop) {
   const ParallelFor parallel = serial_until(std::move(stop));
-  bool changed = false;
+  bool changed = remote_.poll(parallel);
   std::map<fs::path, File> found;
   for (const fs::path& input : inputs_) {
     const bool is_file = std::any_of(files_.begin(), files_.end(), [&input](const auto& named) { return named.first == input; });
@@ -175,6 +176,7 @@ std::optional<Catalogue> CatalogueWatcher::poll(std::stop_token stop) {
 Result<Catalogue> CatalogueWatcher::catalogue(bool is_start) const {
   auto volumes = files_;
   for (const auto& [path, file] : folder_files_) volumes.emplace_back(path, file.volume);
+  for (const auto& set : remote_.all()) volumes.emplace_back(set.url.shown, set.volume);
   Catalogue catalogue;
   for (const auto& [path, volume] : volumes) {
     if (!volume) continue;

@@ -16,6 +16,7 @@
 #include "server/serve/catalogue.h"
 #include "server/serve/file_stamp.h"
 #include "server/serve/memory.h"
+#include "server/serve/remote_data_sets.h"
 
 namespace intervale {
 
@@ -25,12 +26,12 @@ class CatalogueWatcher {
  public:
   // inputs: files, and folders of *.ivm files (without their subfolders). memory: counts the data sets, and must outlive
   // them; files of folders that would take more than its room are not read until there is more. tolerates_damage: files
-  // with damaged pages are served without what these hold (page_faults.h), which is logged.
-  CatalogueWatcher(std::vector<std::filesystem::path> inputs, Memory& memory, bool tolerates_damage = false)
-      : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage) {}
+  // with damaged pages are served without what these hold (page_faults.h), which is logged. remote: files on web servers.
+  CatalogueWatcher(std::vector<std::filesystem::path> inputs, Memory& memory, bool tolerates_damage = false, RemoteInputs remote = {})
+      : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage), remote_(std::move(remote), memory, tolerates_damage) {}
 
   // The catalogue at the start. A file in a folder that is damaged, or whose name is invalid, is logged and skipped.
-  // A named file with such a fault is an error; so are two data sets of one name, and a folder that cannot be read.
+  // A named file or URL with such a fault is an error; so are two data sets of one name, and a folder that cannot be read.
   // Once stop is requested, load() and poll() give up what they read within milliseconds, and throw Stopped.
   Result<Catalogue> load(std::stop_token stop = {});
 
@@ -38,7 +39,7 @@ class CatalogueWatcher {
   // loaded once it is the same in two consecutive polls, so that no file is read while it is written. If a file is
   // damaged or cannot be read, which is logged once, its last good contents stay; a file that cannot be read is tried
   // again in every poll. A file that was removed leaves the catalogue. Of two data sets of one name, the one whose
-  // file comes first counts.
+  // file comes first counts, and URLs come last.
   std::optional<Catalogue> poll(std::stop_token stop = {});
 
  private:
@@ -59,6 +60,7 @@ class CatalogueWatcher {
   std::vector<std::pair<std::filesystem::path, Catalogue::Volume>> files_;  // named as inputs
   std::map<std::filesystem::path, File> folder_files_;                      // in folders
   std::set<std::filesystem::path> unreadable_folders_;                      // that were logged
+  RemoteDataSets remote_;
 };
 
 }  // namespace intervale

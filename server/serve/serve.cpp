@@ -79,9 +79,9 @@ class LevelSwitch {
 class Loading {
  public:
   // where: the end of the line that tells what is served. failed: called on that thread if nothing can be served.
-  Loading(const std::vector<std::filesystem::path>& inputs, bool tolerates_damage, Server& server, std::string where,
+  Loading(const std::vector<std::filesystem::path>& inputs, RemoteInputs remote, bool tolerates_damage, Server& server, std::string where,
           std::function<void(const Error&)> failed)
-      : watcher_(inputs, server.memory(), tolerates_damage),
+      : watcher_(inputs, server.memory(), tolerates_damage, std::move(remote)),
         server_(server),
         where_(std::move(where)),
         failed_(std::move(failed)),
@@ -145,7 +145,7 @@ void repeat(boost::asio::steady_timer& timer, const std::function<void()>& act) 
 
 }  // namespace
 
-Result<void> serve(const ServeOptions& requested, const LogOptions& log, const std::vector<std::filesystem::path>& inputs) {
+Result<void> serve(const ServeOptions& requested, const LogOptions& log, const std::vector<std::filesystem::path>& inputs, RemoteInputs remote) {
   start_log(log);
   std::signal(SIGPIPE, SIG_IGN);  // writing to a closed connection is an error code, not a signal
 
@@ -164,7 +164,7 @@ Result<void> serve(const ServeOptions& requested, const LogOptions& log, const s
   auto server = Server::start(options);
   if (!server) return tl::unexpected(server.error());
   Result<void> loaded;
-  Loading loading(inputs, options.tolerates_damage, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(),
+  Loading loading(inputs, std::move(remote), options.tolerates_damage, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(),
                   [&](const Error& error) {
                     boost::asio::post(signals, [&, error] {
                       loaded = tl::unexpected(error);

@@ -26,6 +26,7 @@ INSTALLS = "installs packages"
 BUILDS = "builds the whole project"
 RUNS_TESTS = "runs the tests, of which this is one"
 NEEDS_DOCKER = "needs a docker engine and takes minutes; deploy/image tests the image, deploy/check this configuration"
+NO_SUCH_HOST = "there is no such host; tests/e2e/remote_test.cpp reads files of one"
 NOT_RUN = {
     "deploy/demo": "installs packages and builds; .ci/run runs it",
     "deploy/test": "installs packages and builds; this test is part of it",
@@ -53,6 +54,10 @@ NOT_RUN = {
     "docker compose -f deploy/compose.yaml build": NEEDS_DOCKER,
     "docker compose -f deploy/compose.yaml up -d --no-deps server-a": NEEDS_DOCKER,
     "docker compose -f deploy/compose.yaml up -d --no-deps server-b": NEEDS_DOCKER,
+    "intervale serve https://data.example.org/scans/scan.ivm": NO_SUCH_HOST,
+    "intervale extract https://data.example.org/scans/scan.ivm --error-percent 5 -o coarse.vtu": NO_SUCH_HOST,
+    "intervale serve https://scans.s3.eu-west-1.amazonaws.com/scan.ivm --aws-sign --aws-region eu-west-1": NO_SUCH_HOST,
+    "intervale-client fetch https://data.example.org/scans/scan.ivm --error-percent 5 -o coarse.vtu": NO_SUCH_HOST,
     "kubectl apply -k deploy/k8s": "needs a cluster; deploy/check reads the configuration with kubectl",
 }
 

@@ -117,7 +117,8 @@ TEST(Programs, BudgetsAreNeverPassed) {
 TEST(Programs, WrongUsageIsStatus2) {
   expect_complaint(run({client()}), 2, "subcommand");
   expect_complaint(run({client(), "fetch"}), 2, "URL");
-  expect_complaint(run({client(), "fetch", "http://127.0.0.1:1/x"}), 2, "ws://");
+  expect_complaint(run({client(), "fetch", "ftp://127.0.0.1:1/x"}), 2, "ws://");
+  expect_complaint(run({client(), "list", "http://127.0.0.1:1"}), 2, "ws://");
   expect_complaint(run({client(), "fetch", "ws://127.0.0.1:1"}), 2, "NAME");
   expect_complaint(run({client(), "list", "ws://127.0.0.1:1/x"}), 2, "without");
   expect_complaint(run({client(), "fetch", "ws://127.0.0.1:1/x", "-o", "mesh.xyz"}), 2, ".vtu");

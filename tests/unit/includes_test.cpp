@@ -13,15 +13,15 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::map<std::string, int> kLayers{
-    {"common/util", 1},    {"common/diamond", 2},     {"common/parallel", 2},                                                                      //
-    {"common/patch", 3},   {"common/view", 3},        {"common/mesh", 3},       {"common/mesh/io", 4},                                             //
-    {"common/codec", 5},   {"common/picture", 5},     {"common/program", 5},                                                                       //
-    {"common/front", 6},   {"common/ivm", 7},         {"common/selection", 8},  {"common/ranges", 8},     {"common/api", 9},                       //
-    {"protocol", 9},       {"protocol/transport", 9}, {"protocol/session", 10},                                                                    //
-    {"client/core", 10},   {"client/net", 11},        {"client/view", 11},      {"client/program", 12},                                            //
-    {"client/cli", 13},    {"client/load", 13},       {"client/web/core", 13},  {"client/web/local", 13}, {"client/api", 12},                      //
-    {"server/volume", 10}, {"server/readers", 11},    {"server/builder", 11},   {"server/serve", 12},     {"server/cli", 13}, {"server/api", 12},  //
-    {"server/scratch", 2},                                                                                                                         //
+    {"common/util", 1},    {"common/diamond", 2},     {"common/parallel", 2},                                                    //
+    {"common/patch", 3},   {"common/view", 3},        {"common/mesh", 3},       {"common/mesh/io", 4},                           //
+    {"common/codec", 5},   {"common/picture", 5},     {"common/program", 5},    {"common/remote", 8},                            //
+    {"common/front", 6},   {"common/ivm", 7},         {"common/selection", 8},  {"common/ranges", 8},     {"common/api", 9},     //
+    {"protocol", 9},       {"protocol/transport", 9}, {"protocol/session", 10},                                                  //
+    {"client/core", 10},   {"client/net", 11},        {"client/view", 11},      {"client/program", 12},   {"client/local", 11},  //
+    {"client/cli", 13},    {"client/load", 13},       {"client/web/core", 13},  {"client/web/local", 13}, {"client/api", 12},    //
+    {"server/volume", 10}, {"server/readers", 11},    {"server/builder", 11},   {"server/serve", 12},     {"server/cli", 13},
+    {"server/api", 12},    {"server/scratch", 2},  //
 };
 
 // The folder of the table that a file lies in: the longest that is a prefix of its path. Empty if there is none.

@@ -1,0 +1,58 @@
+// The data sets of a server that are files on web servers.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/remote/read_remote.h"
+#include "common/util/parallel.h"
+#include "common/util/result.h"
+#include "server/serve/catalogue.h"
+#include "server/serve/memory.h"
+
+namespace intervale {
+
+struct RemoteInputs {
+  std::vector<RemoteUrl> urls;
+  RemoteAccess access;
+  RemoteLimits limits = {};                     // most_bytes: the memory's room counts, too
+  std::chrono::milliseconds poll_time{60'000};  // between questions whether a file has changed
+};
+
+// One thread at a time. Files lie in memory as a whole: what becomes of them on their servers does not affect sessions.
+class RemoteDataSets {
+ public:
+  struct DataSet {
+    RemoteUrl url;
+    Catalogue::Volume volume;  // the last good contents; nullptr: not read yet
+    RemoteStamp stamp;         // of what was read last
+    std::string last_warning;  // logged since then, not to be repeated
+  };
+
+  // memory: counts the data sets, and must outlive them. tolerates_damage: as of CatalogueWatcher.
+  RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage);
+
+  // Reads all of them. Fails if one cannot be read. Throws what `parallel` throws.
+  Result<void> load(const ParallelFor& parallel);
+
+  // Once poll_time is over, asks for each whether it has changed, and reads those that have. True if contents are new.
+  // What fails is logged, and tried again the next time; the last good contents stay. A server that sends neither ETag
+  // nor Last-Modified is not asked.
+  bool poll(const ParallelFor& parallel);
+
+  [[nodiscard]] const std::vector<DataSet>& all() const { return sets_; }
+
+ private:
+  bool poll_one(DataSet& set, const ParallelFor& parallel);
+  Result<bool> read(DataSet& set, const RemoteLimits& limits, const ParallelFor& parallel);
+
+  RemoteInputs inputs_;
+  Memory& memory_;
+  bool tolerates_damage_;
+  std::vector<DataSet> sets_;
+  std::chrono::steady_clock::time_point next_poll_{};
+};
+
+}  // namespace intervale

@@ -1,0 +1,110 @@
+// Data sets that are files on web servers: the programs do with them what they do with files.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/support/complaints.h"
+#include "tests/support/file_server.h"
+#include "tests/support/programs.h"
+#include "tests/support/serving.h"
+#include "tests/support/temp_dir.h"
+
+namespace intervale::remote_files {
+namespace {
+
+using ::testing::AllOf;
+using testing::FileAnswer, testing::FileRequest, testing::FileServer;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const std::vector<std::vector<std::string>>& views() {
+  static const std::vector<std::vector<std::string>> all{
+      {}, {"--error-percent", "5"}, {"--eye", "0", "0.5", "3", "--look-at", "0", "0", "0", "--pixel-error", "2"}};
+  return all;
+}
+
+std::string digest_of(const Arguments& command, const Arguments& view) {
+  return json_of(run(command + view + Arguments{"--digest", "--json"})).value("digest", "");
+}
+
+TEST(Remote, AFileOnAWebServerIsServedAndFetchedAsALocalOne) {
+  const FileServer web(contents_of(buckyball()));
+  const ServerProgram local, remote(web.url("/scans/buckyball.ivm"));
+  for (const auto& view : views()) {
+    const std::string wanted = digest_of({program("intervale-client"), "fetch", local.url("buckyball")}, view);
+    EXPECT_NE(wanted, "");
+    EXPECT_EQ(digest_of({program("intervale-client"), "fetch", remote.url("buckyball")}, view), wanted);
+    EXPECT_EQ(digest_of({program("intervale-client"), "fetch", web.url("/buckyball.ivm")}, view), wanted);
+  }
+  EXPECT_EQ(digest_of({program("intervale"), "extract", web.url()}, {}), digest_of({program("intervale"), "extract", buckyball()}, {}));
+}
+
+TEST(Remote, FetchSaysThatThereIsNoServer) {
+  const FileServer web(contents_of(buckyball()));
+  const TempDir folder;
+  const Finished fetched =
+      run({program("intervale-client"), "fetch", web.url("/scan.ivm?signature=secret"), "--error-percent", "20", "-o", folder / "mesh.ply"});
+  EXPECT_EQ(fetched.status, 0) << fetched.err;
+  EXPECT_THAT(fetched.err, AllOf(HasSubstr("no server: "), Not(HasSubstr("secret"))));
+  EXPECT_THAT(fetched.out, AllOf(HasSubstr("scan: "), Not(HasSubstr("secret"))));
+  EXPECT_TRUE(std::filesystem::exists(folder / "mesh.ply"));
+}
+
+TEST(Remote, WebServersGetHeadersOfTheFileAndNoTokens) {
+  FileServer web(contents_of(buckyball()));
+  web.misbehave([](const FileRequest& request, std::size_t, FileAnswer& answer) {
+    if (request.header("authorization") != "Bearer of-the-file") answer = {.status = 401};
+  });
+  const TempDir folder;
+  const std::string headers = folder.file("headers", "Authorization: Bearer of-the-file\n").string();
+  const Arguments fetch{"/usr/bin/env", "INTERVALE_TOKEN=the-token", program("intervale-client"), "fetch", web.url(), "--error-percent", "20",
+                        "--json"};
+  EXPECT_THAT(run(fetch).err, AllOf(HasSubstr("401"), Not(HasSubstr("the-token"))));
+  json_of(run(fetch + Arguments{"--header-file", headers}));
+  const ServerProgram server(web.url(), {"--header-file", headers}, {"INTERVALE_TOKEN=the-token"});
+  json_of(run({program("intervale-client"), "fetch", server.url("scan"), "--json"}));
+  for (const FileRequest& request : web.requests()) {
+    for (const auto& [name, value] : request.headers) EXPECT_THAT(value, Not(HasSubstr("the-token"))) << name;
+  }
+  // Keys are asked for only where they are to be used.
+  expect_complaint(run({"/usr/bin/env", "-u", "AWS_ACCESS_KEY_ID", program("intervale"), "serve", web.url(), "--aws-sign"}), 2, "AWS_ACCESS_KEY_ID",
+                   "intervale: ");
+}
+
+TEST(Remote, WhatCannotBeReadIsOneLine) {
+  FileServer web("<!doctype html>" + std::string(1000, ' '));
+  expect_complaint(run({program("intervale"), "serve", web.url(), "--listen", "127.0.0.1:0", "--log-level", "off"}), 1, "not an interval volume",
+                   "intervale: ");
+  const TempDir folder;
+  const std::string headers = folder.file("headers", "X-Key: secret\n").string();
+  expect_complaint(run({program("intervale"), "serve", web.url(), "http://localhost:1/y.ivm", "--header-file", headers}), 2, "one host",
+                   "intervale: ");
+  expect_complaint(run({program("intervale"), "serve", "https://user:secret@localhost/x.ivm"}), 2, "header-file", "intervale: ");
+  expect_complaint(run({program("intervale"), "extract", web.url()}), 1, "not an interval volume", "intervale: ");
+  const Finished fetched = run({program("intervale-client"), "fetch", web.url("/api")});
+  EXPECT_EQ(fetched.status, 1);
+  EXPECT_THAT(fetched.err, AllOf(HasSubstr("not an interval volume"), HasSubstr("ws://")));
+}
+
+TEST(Remote, AServerFollowsAFileThatChanges) {
+  FileServer web(contents_of(buckyball()));
+  const TempDir folder;
+  const std::string volume = folder / "small.nrrd", other = folder / "small.ivm";
+  ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "33", "-o", volume}).status, 0);
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", other, "--range", "128", "188"}).status, 0);
+  ServerProgram server(web.url(), {"--remote-poll-time", "0.1"});
+  web.set(contents_of(other), "\"two\"");
+  EXPECT_TRUE(server.process().wait_for("was reloaded"));
+  const std::string wanted = digest_of({program("intervale"), "extract", other}, {});
+  EXPECT_TRUE(eventually([&] { return digest_of({program("intervale-client"), "fetch", server.url("scan")}, {}) == wanted; }));
+  web.misbehave([](const FileRequest&, std::size_t, FileAnswer& answer) { answer = {.status = 404}; });
+  EXPECT_TRUE(server.process().wait_for("stays in use"));
+  EXPECT_NE(digest_of({program("intervale-client"), "fetch", server.url("scan")}, {}), "");
+}
+
+}  // namespace
+}  // namespace intervale::remote_files
