@@ -10,6 +10,7 @@
 #include "common/remote/remote_options.h"
 #include "common/remote/remote_url.h"
 #include "server/cli/commands.h"
+#include "server/serve/http_routes.h"
 #include "server/serve/serve.h"
 
 namespace intervale {
@@ -186,6 +187,15 @@ void add_access_options(CLI::App& command, ServeOptions& serve, TlsFiles& tls) {
                   "Default: the host of the request")
       ->check([](const std::string& origin) {
         return std::string(may_be_origin(origin) ? "" : "must be like https://example.org:8443, without a path, or *");
+      })
+      ->type_name("ORIGIN")
+      ->group(group);
+  command
+      .add_option(
+          "--connect-origin", serve.connect_origins,
+          "Origins, such as https://cdn.example.org, whose files the viewer's page may show (?file=URL); separated by commas in the environment")
+      ->check([](const std::string& origin) {
+        return std::string(is_connect_origin(origin) ? "" : "must be like https://cdn.example.org or http://127.0.0.1:8000, without a path");
       })
       ->type_name("ORIGIN")
       ->group(group);

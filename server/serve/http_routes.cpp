@@ -4,6 +4,8 @@
 #include <array>
 #include <boost/algorithm/string/replace.hpp>
 #include <cctype>
+#include <charconv>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 
 #include "common/program/describe.h"
@@ -60,16 +62,17 @@ std::string websocket_sources(std::string_view host) {
   return "ws://" + std::string(host) + " wss://" + std::string(host);
 }
 
-std::string viewer_policy(std::string_view host) {
-  return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self' " +
-         websocket_sources(host) +
+std::string viewer_policy(std::string_view host, std::span<const std::string> origins) {
+  std::string sources = websocket_sources(host);
+  for (const std::string& origin : origins) sources += " " + origin;
+  return "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self' " + sources +
          "; worker-src 'self'; manifest-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 }
 
-HttpResponse file_response(const HttpRequest& request, const StaticFile& file) {
+HttpResponse file_response(const HttpRequest& request, const StaticFile& file, std::span<const std::string> origins) {
   const bool use_gzip = file.gzip && accepts_gzip(request.accept_encoding);
   const StaticContent& content = use_gzip ? *file.gzip : file.plain;
-  HttpResponse response{.content_type = file.content_type, .body = content.bytes, .content_security_policy = viewer_policy(request.host)};
+  HttpResponse response{.content_type = file.content_type, .body = content.bytes, .content_security_policy = viewer_policy(request.host, origins)};
   response.cache_control = file.immutable ? "public, max-age=31536000, immutable" : "no-cache";
   response.headers = {{"ETag", content.etag}};
   if (file.gzip) response.headers.emplace_back("Vary", "Accept-Encoding");
@@ -119,6 +122,18 @@ bool is_known(std::string_view path, const HttpState& state) {
 
 }  // namespace
 
+bool is_connect_origin(std::string_view text) {
+  const std::size_t scheme = text.starts_with("https://") ? 8 : text.starts_with("http://") ? 7 : 0;
+  if (scheme == 0) return false;
+  const std::size_t colon = std::min(text.find(':', scheme), text.size());
+  const std::string_view host = text.substr(scheme, colon - scheme), port = text.substr(std::min(colon + 1, text.size()));
+  const auto is_of_host = [](unsigned char c) { return c < 0x80 && (std::isalnum(c) != 0 || c == '.' || c == '-'); };
+  if (host.empty() || !std::all_of(host.begin(), host.end(), is_of_host)) return false;
+  std::uint16_t number = 0;
+  const auto [stop, failure] = std::from_chars(port.data(), port.data() + port.size(), number);
+  return colon == text.size() || (failure == std::errc() && stop == port.data() + port.size() && number != 0);
+}
+
 HttpResponse text_response(unsigned status, std::string line) {
   return {.status = status, .body = std::make_shared<const std::string>(std::move(line) + "\n")};
 }
@@ -157,7 +172,7 @@ HttpResponse respond(const HttpRequest& request, const HttpState& state) {
   }
   if (*path == "/healthz") return text_response(200, "ok");
   if (*path == "/readyz") return text_response(state.server_status == ServerStatus::ready ? 200 : 503, text_of(state.server_status));
-  if (file != nullptr) return file_response(request, *file);
+  if (file != nullptr) return file_response(request, *file, state.connect_origins);
   return ok(kHtml, front_page(state.catalogue, request.scope));
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -63,7 +64,12 @@ struct HttpState {
   bool has_metrics_port = false;  // then the main port does not serve /metrics
   std::optional<std::chrono::system_clock::time_point> certificate_expires = {};
   ServerStatus server_status = ServerStatus::ready;
+  std::span<const std::string> connect_origins = {};  // of ServeOptions
 };
+
+// Whether a text is an origin that a policy of a page can name: http:// or https://, a host (a name, or an IPv4 address)
+// and, if need be, a port; nothing else.
+[[nodiscard]] bool is_connect_origin(std::string_view text);
 
 // Serves GET and HEAD of /api/datasets, /healthz, /readyz, /metrics, and the viewer's files; / is the viewer's
 // index.html, or without a viewer a page that lists the data sets. The query is ignored. HEAD has the body of GET;

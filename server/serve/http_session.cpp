@@ -271,7 +271,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
                             .role = role_,
                             .has_metrics_port = context_.options.metrics_listen.has_value(),
                             .certificate_expires = tls ? std::optional(tls->expires()) : std::nullopt,
-                            .server_status = server_status()});
+                            .server_status = server_status(),
+                            .connect_origins = context_.options.connect_origins});
   }
 
   // The response that refuses the upgrade; nullopt if a session may be opened. has_more: a body, or bytes that did not

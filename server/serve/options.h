@@ -27,6 +27,7 @@ struct ServeOptions {
   unsigned threads = 0;                                    // 0: one for each core
   std::optional<std::filesystem::path> tokens;             // file, see Tokens; nullopt: no token is required
   std::vector<std::string> allowed_origins;                // that may open sessions; empty: the request's host
+  std::vector<std::string> connect_origins;                // besides the server, that its page may read files of: is_connect_origin()
   TrustedProxies proxies;                                  // whose X-Forwarded-For is believed
   std::optional<TlsFiles> tls;                             // nullopt: plain HTTP and WebSocket
   std::size_t max_connections = 4096;                      // further ones take the place of those that wait for their client

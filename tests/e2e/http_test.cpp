@@ -40,13 +40,14 @@ TEST(Http, ServesTheViewerFromMemory) {
     folder.file("app.js.gz", "packed");
     ServeOptions options;
     options.viewer = folder.path();
+    options.connect_origins = {"https://cdn.example"};
     server = start(options);
   }
   const std::string page = ask("GET / HTTP/1.1");
-  EXPECT_THAT(page, ::testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("<html>viewer"),
-                                     HasSubstr("Content-Security-Policy: default-src 'none'; script-src"), HasSubstr("ws://a:1 wss://a:1"),
-                                     HasSubstr("Cross-Origin-Opener-Policy: same-origin"), HasSubstr("Referrer-Policy: no-referrer"),
-                                     HasSubstr("X-Content-Type-Options: nosniff")));
+  EXPECT_THAT(page, ::testing::AllOf(
+                        StartsWith("HTTP/1.1 200"), HasSubstr("<html>viewer"), HasSubstr("Content-Security-Policy: default-src 'none'; script-src"),
+                        HasSubstr("ws://a:1 wss://a:1 https://cdn.example; worker-src"), HasSubstr("Cross-Origin-Opener-Policy: same-origin"),
+                        HasSubstr("Referrer-Policy: no-referrer"), HasSubstr("X-Content-Type-Options: nosniff")));
   const std::string packed = ask("GET /app.js HTTP/1.1\r\nAccept-Encoding: gzip");
   EXPECT_THAT(packed, ::testing::AllOf(HasSubstr("Content-Encoding: gzip"), HasSubstr("Content-Length: 6"), HasSubstr("\r\n\r\npacked")));
   EXPECT_THAT(ask("HEAD /app.js HTTP/1.1"), ::testing::AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("Content-Length: 6"), Not(HasSubstr("let"))));

@@ -84,6 +84,8 @@ TEST(Remote, WhatCannotBeReadIsOneLine) {
   expect_complaint(run({program("intervale"), "serve", web.url(), "http://localhost:1/y.ivm", "--header-file", headers}), 2, "one host",
                    "intervale: ");
   expect_complaint(run({program("intervale"), "serve", "https://user:secret@localhost/x.ivm"}), 2, "header-file", "intervale: ");
+  expect_complaint(run({program("intervale"), "serve", buckyball(), "--connect-origin", "https://cdn.example/x"}), 2, "without a path",
+                   "intervale: ");
   expect_complaint(run({program("intervale"), "extract", web.url()}), 1, "not an interval volume", "intervale: ");
   const Finished fetched = run({program("intervale-client"), "fetch", web.url("/api")});
   EXPECT_EQ(fetched.status, 1);

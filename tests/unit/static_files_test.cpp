@@ -140,6 +140,32 @@ TEST(StaticFiles, PagesMayReachTheirOwnHostOnly) {
   EXPECT_EQ(get(files, {.target = "/api/datasets"}).content_security_policy, "default-src 'none'");
 }
 
+TEST(StaticFiles, PagesMayReachTheOriginsThatTheServerNames) {
+  for (const char* origin : {"https://cdn.example", "http://127.0.0.1:8000", "https://a-b.c:65535"}) EXPECT_TRUE(is_connect_origin(origin)) << origin;
+  for (const char* origin : {"",
+                             "*",
+                             "https://",
+                             "cdn.example",
+                             "ws://a",
+                             "https://*",
+                             "https://a/",
+                             "https://a/x",
+                             "https://a b",
+                             "https://a;script-src",
+                             "https://a'",
+                             "https://u@a",
+                             "https://a:",
+                             "https://a:0",
+                             "https://a:65536",
+                             "https://a:8x",
+                             "https://[::1]",
+                             "https://a?b",
+                             "https://:80",
+                             "https://\xc3\xa4"}) {
+    EXPECT_FALSE(is_connect_origin(origin)) << origin;
+  }
+}
+
 TEST(StaticFiles, WithoutAViewerThePlainPageRemains) {
   const HttpResponse page = get({}, {.target = "/"});
   EXPECT_THAT(body_of(page), HasSubstr("no viewer"));
