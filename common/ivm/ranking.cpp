@@ -7,6 +7,12 @@
 #include "common/ivm/refinement.h"
 
 namespace intervale {
+namespace {
+
+// h, in pixels, of a diamond that is large on the screen; and how much larger counts.
+constexpr double kLargePixels = 12, kLargest = 16;
+
+}  // namespace
 
 Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden, const Camera* ahead)
     : volume_(volume), relevant_(relevant) {
@@ -61,7 +67,8 @@ float Ranking::pixels_per_unit(const ScreenError& screen, const ScreenError::Reg
 double Ranking::weight_on(const ScreenError& screen, const ScreenError::Region& region, int scale, double pixels, bool is_exact) const {
   const double spacing = spacing_ * pixels;
   const double weight = relevant_.has_slopes() ? std::ldexp(spacing * spacing * spacing, scale) : std::ldexp(spacing * spacing, 2 * scale);
-  return weight * (is_exact ? screen.seen_share(region) : 1);
+  const double large = std::clamp(std::ldexp(spacing, scale) / kLargePixels, 1.0, kLargest);
+  return weight * large * large * large * (is_exact ? screen.seen_share(region) : 1);
 }
 
 // The same, now or soon: the greater.

@@ -7,11 +7,12 @@
 // its square, as deviations are seen so large; and its square once more, if all pixels should count alike, but not, if
 // all of the surface should. Once more with 2^scale: coarse updates come a little earlier than what they remove says,
 // which makes early pictures better and later ones no worse. Otherwise it is estimated: the square of the deviation in
-// pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2. Both as far as the surfaces are in
-// the picture. So what is large in the picture comes before what is far off in one place. If the camera moves, the
-// weight of what is removed is that of now or that of soon, whichever is greater. What a depth map hides comes after
-// everything that is seen. Pixels a world unit, for the nearest visible point, and the share that is seen are computed
-// once a supercube, or once a brick that is far away.
+// pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2. Diamonds that are large on the screen
+// come earlier still, by the cube of their size: one part that is left coarse spoils a first picture more than others that
+// are refined improve it. All of that as far as the surfaces are in the picture. So what is large in the picture comes
+// before what is far off in one place. If the camera moves, the weight of what is removed is that of now or that of
+// soon, whichever is greater. What a depth map hides comes after everything that is seen. Pixels a world unit, for the
+// nearest visible point, and the share that is seen are computed once a supercube, or once a brick that is far away.
 #pragma once
 
 #include <algorithm>

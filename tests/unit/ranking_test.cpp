@@ -262,7 +262,8 @@ TEST_P(Ranks, GrowWithTheSquaredDeviationInThePicture) {
       const double removed = volume.relevant().has_slopes()
                                  ? removed_of(volume.relevant().slope(p.index)) * std::pow(a_step, 3) * std::exp2(scale_of_key(p.key))
                                  : pixels * pixels * h * h;
-      all.emplace_back(rank, removed * view.seen_share(region_around(volume_, view, p)));
+      const double large = std::clamp(h / 12, 1.0, 16.0);
+      all.emplace_back(rank, removed * large * large * large * view.seen_share(region_around(volume_, view, p)));
     });
     std::sort(all.begin(), all.end());
     for (std::size_t i = 1; i < all.size(); ++i) {
