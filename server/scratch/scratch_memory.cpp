@@ -19,13 +19,13 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kGranule = 64 << 10;        // arrays lie at multiples of it
-constexpr std::size_t kSweep = 4 << 20;           // bytes that are taken out of memory at a time
-constexpr std::size_t kReleased = 16 << 20;       // so many bytes that are no longer used go back to the disk; fewer are used again
-constexpr std::uint64_t kProgram = 64 << 20;      // resident, of code and small objects
-constexpr std::uint64_t kThread = 32 << 20;       // for each thread
+constexpr std::size_t kGranule = 64 << 10;       // arrays lie at multiples of it
+constexpr std::size_t kSweep = 4 << 20;          // bytes that are taken out of memory at a time
+constexpr std::size_t kReleased = 16 << 20;      // so many bytes that are no longer used go back to the disk; fewer are used again
+constexpr std::uint64_t kProgram = 64 << 20;     // resident, of code and small objects
+constexpr std::uint64_t kThread = 32 << 20;      // for each thread
 constexpr std::uint64_t kMostMargin = 64 << 20;  // may become resident from one tick to the next
-constexpr long kPeriod = 1'000'000;               // nanoseconds between two looks of a thread
+constexpr long kPeriod = 1'000'000;              // nanoseconds between two looks of a thread
 
 // Resident bytes of the process. statm: /proc/self/statm.
 std::uint64_t resident_bytes(int statm) {
