@@ -55,6 +55,9 @@ int open_unnamed(const std::filesystem::path& folder) {
 // Threads that are looking, or about to.
 std::atomic<int> looking{0};
 
+std::atomic<ScratchMemory*> installed_memory{nullptr};
+std::atomic<const std::byte*> last_base{nullptr};  // of the last one installed
+
 }  // namespace
 
 // A timer for each thread that computes.
@@ -91,8 +94,7 @@ class ScratchMemory::Timers : public tbb::task_scheduler_observer {
   std::unordered_map<pid_t, timer_t> timers_;
 };
 
-std::atomic<ScratchMemory*> ScratchMemory::installed_{nullptr};
-std::atomic<const std::byte*> ScratchMemory::last_base_{nullptr};
+ScratchMemory* ScratchMemory::installed() { return installed_memory.load(std::memory_order_acquire); }
 
 Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open(const std::filesystem::path& folder, std::uint64_t budget, unsigned threads) {
   const std::uint64_t least = kProgram + threads * kThread;
@@ -128,21 +130,21 @@ ScratchMemory::ScratchMemory(std::filesystem::path folder, int file, int statm, 
 ScratchMemory::~ScratchMemory() {
   timers_.reset();
   ScratchMemory* self = this;
-  installed_.compare_exchange_strong(self, nullptr);
+  installed_memory.compare_exchange_strong(self, nullptr);
   while (looking.load() != 0) ::sched_yield();
   const std::lock_guard lock(mutex_);
   if (used_.empty()) {
     ::munmap(base_, kRegionBytes);
     const std::byte* base = base_;
-    last_base_.compare_exchange_strong(base, nullptr);
+    last_base.compare_exchange_strong(base, nullptr);
   }
   ::close(file_);
   ::close(statm_);
 }
 
 void ScratchMemory::install(ScratchMemory& memory) {
-  last_base_.store(memory.base_, std::memory_order_release);
-  installed_.store(&memory, std::memory_order_release);
+  last_base.store(memory.base_, std::memory_order_release);
+  installed_memory.store(&memory, std::memory_order_release);
   struct sigaction action {};
   action.sa_handler = &ScratchMemory::on_tick;
   action.sa_flags = SA_RESTART;
@@ -151,7 +153,7 @@ void ScratchMemory::install(ScratchMemory& memory) {
 }
 
 bool ScratchMemory::free_installed(void* array) noexcept {
-  const std::byte* const base = last_base_.load(std::memory_order_relaxed);
+  const std::byte* const base = last_base.load(std::memory_order_relaxed);
   if (base == nullptr || array < base || array >= base + kRegionBytes) return false;
   if (ScratchMemory* const memory = installed(); memory != nullptr && memory->owns(array)) memory->free(array);
   return true;

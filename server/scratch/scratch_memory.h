@@ -58,7 +58,7 @@ class ScratchMemory {
   // process.
   static void install(ScratchMemory& memory);
   // nullptr: none.
-  [[nodiscard]] static ScratchMemory* installed() { return installed_.load(std::memory_order_acquire); }
+  [[nodiscard]] static ScratchMemory* installed();
   // False if the address is in no scratch file. One that is left over from a file that is no longer installed is ignored.
   static bool free_installed(void* array) noexcept;
 
@@ -70,9 +70,6 @@ class ScratchMemory {
   class Timers;
   static void on_tick(int signal) noexcept;
   void keep_within_budget() noexcept;
-
-  static std::atomic<ScratchMemory*> installed_;
-  static std::atomic<const std::byte*> last_base_;  // of the last one installed
 
   std::filesystem::path folder_;
   int file_, statm_;  // statm: /proc/self/statm
