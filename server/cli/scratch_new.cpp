@@ -1,7 +1,7 @@
 // The program's `operator new`: large arrays lie in a scratch file while one is installed (build --memory).
 //
 // Whoever allocates them: so no array of a build, of today or of later, exceeds the budget by being forgotten. [new.delete]
-// of the C++ standard lets a program replace these; all other forms but those for extended alignment call them.
+// of the C++ standard lets a program replace these. Those for extended alignment are left as they are.
 #include <cstddef>
 #include <cstdlib>
 #include <new>
@@ -25,4 +25,19 @@ void* operator new(std::size_t bytes) {
 void operator delete(void* memory) noexcept {
   if (!intervale::ScratchMemory::free_installed(memory)) std::free(memory);
 }
-void operator delete(void* memory, std::size_t) noexcept { operator delete(memory); }
+
+// The others, as the standard library has them. A sanitizer has its own, which would allocate what the above frees.
+void* operator new(std::size_t bytes, const std::nothrow_t& /*unused*/) noexcept {
+  try {
+    return operator new(bytes);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
+void* operator new[](std::size_t bytes) { return operator new(bytes); }
+void* operator new[](std::size_t bytes, const std::nothrow_t& nothrow) noexcept { return operator new(bytes, nothrow); }
+void operator delete(void* memory, std::size_t /*bytes*/) noexcept { operator delete(memory); }
+void operator delete(void* memory, const std::nothrow_t& /*unused*/) noexcept { operator delete(memory); }
+void operator delete[](void* memory) noexcept { operator delete(memory); }
+void operator delete[](void* memory, std::size_t /*bytes*/) noexcept { operator delete(memory); }
+void operator delete[](void* memory, const std::nothrow_t& /*unused*/) noexcept { operator delete(memory); }
