@@ -1,29 +1,31 @@
 #include "common/remote/remote_url.h"
 
-#include <curl/curl.h>
-
 #include <algorithm>
 #include <cctype>
 #include <memory>
 #include <optional>
 #include <utility>
 
+#include "common/remote/libcurl.h"
 #include "common/util/printable.h"
 
 namespace intervale {
 namespace {
 
 // The parser of the library that makes the requests: no other could see another host in the same text.
-using Parsed = std::unique_ptr<CURLU, decltype(&curl_url_cleanup)>;
+struct UrlCleanup {
+  void operator()(CURLU* url) const { libcurl().curl_url_cleanup(url); }
+};
+using Parsed = std::unique_ptr<CURLU, UrlCleanup>;
 
 struct CurlFree {
-  void operator()(char* text) const { curl_free(text); }
+  void operator()(char* text) const { libcurl().curl_free(text); }
 };
 
 // nullopt: the URL has no such part, or an empty one.
 std::optional<std::string> part(const Parsed& url, CURLUPart which, unsigned flags = 0) {
   char* text = nullptr;
-  if (curl_url_get(url.get(), which, &text, flags) != CURLUE_OK || text == nullptr) return {};
+  if (libcurl().curl_url_get(url.get(), which, &text, flags) != CURLUE_OK || text == nullptr) return {};
   const std::unique_ptr<char, CurlFree> owner(text);
   return *text == '\0' ? std::nullopt : std::optional<std::string>(text);
 }
@@ -36,7 +38,7 @@ std::string lower(std::string_view text) {
 
 std::string unescaped(const std::string& text) {
   int size = 0;
-  const std::unique_ptr<char, CurlFree> plain(curl_easy_unescape(nullptr, text.c_str(), int(text.size()), &size));
+  const std::unique_ptr<char, CurlFree> plain(libcurl().curl_easy_unescape(nullptr, text.c_str(), int(text.size()), &size));
   return plain ? std::string(plain.get(), std::size_t(size)) : text;
 }
 
@@ -51,7 +53,7 @@ Result<RemoteUrl> read_parts(const Parsed& url, std::string_view given) {
   if (scheme != "http" && scheme != "https") return wrong("expected http:// or https://");
   const auto host = part(url, CURLUPART_HOST), port = part(url, CURLUPART_PORT, CURLU_DEFAULT_PORT), path = part(url, CURLUPART_PATH);
   if (!host || !port || !path) return wrong("it names no host");
-  curl_url_set(url.get(), CURLUPART_FRAGMENT, nullptr, 0);
+  libcurl().curl_url_set(url.get(), CURLUPART_FRAGMENT, nullptr, 0);
   const auto text = part(url, CURLUPART_URL);
   if (!text) return wrong("it cannot be requested");
   std::string name = unescaped(path->substr(path->rfind('/') + 1));
@@ -69,9 +71,9 @@ bool is_remote_url(std::string_view text) {
 std::string shown_url(std::string_view text) { return is_remote_url(text) ? without_query(text) : std::string(text); }
 
 Result<RemoteUrl> parse_remote_url(std::string_view text) {
-  const Parsed url(curl_url(), &curl_url_cleanup);
+  const Parsed url(libcurl().curl_url());
   if (!is_remote_url(text) || text.find('\0') != std::string_view::npos ||
-      curl_url_set(url.get(), CURLUPART_URL, std::string(text).c_str(), 0) != CURLUE_OK) {
+      libcurl().curl_url_set(url.get(), CURLUPART_URL, std::string(text).c_str(), 0) != CURLUE_OK) {
     // What stands before an @ may be a password.
     if (text.find('@') != std::string_view::npos) return misuse("invalid URL: expected http://HOST/FILE.ivm or https://HOST/FILE.ivm");
     return misuse("invalid URL '" + without_query(text) + "': expected http://HOST/FILE.ivm or https://HOST/FILE.ivm");
@@ -82,11 +84,11 @@ Result<RemoteUrl> parse_remote_url(std::string_view text) {
 }
 
 Result<RemoteUrl> redirected(const RemoteUrl& url, const std::string& location) {
-  const Parsed parsed(curl_url(), &curl_url_cleanup);
+  const Parsed parsed(libcurl().curl_url());
   const auto fails = [&url](const char* what) { return fail(url.shown + ": " + what); };
-  if (curl_url_set(parsed.get(), CURLUPART_URL, url.text.c_str(), 0) != CURLUE_OK) return fails("cannot be requested");
+  if (libcurl().curl_url_set(parsed.get(), CURLUPART_URL, url.text.c_str(), 0) != CURLUE_OK) return fails("cannot be requested");
   if (location.empty()) return fails("the server redirects to nowhere");
-  if (curl_url_set(parsed.get(), CURLUPART_URL, location.c_str(), 0) != CURLUE_OK) return fails("the server redirects to an invalid URL");
+  if (libcurl().curl_url_set(parsed.get(), CURLUPART_URL, location.c_str(), 0) != CURLUE_OK) return fails("the server redirects to an invalid URL");
   auto target = read_parts(parsed, location);
   if (!target) return fails("the server redirects to an invalid URL");
   if (url.secure && !target->secure) return fails("the server redirects from https to http");

@@ -1,14 +1,12 @@
 #include "common/remote/transfers.h"
 
-#include <curl/curl.h>
-#include <curl/header.h>
-
 #include <exception>
 #include <map>
 #include <new>
 #include <stdexcept>
 #include <utility>
 
+#include "common/remote/libcurl.h"
 #include "common/util/printable.h"
 
 namespace intervale {
@@ -21,12 +19,12 @@ constexpr long kLeastBytesPerSecond = 1000;
 constexpr const char* kHashOfNothing = "x-amz-content-sha256: e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
 
 struct ListFree {
-  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+  void operator()(curl_slist* list) const { libcurl().curl_slist_free_all(list); }
 };
 using HeaderList = std::unique_ptr<curl_slist, ListFree>;
 
 void append_header(HeaderList& list, const std::string& line) {
-  curl_slist* const longer = curl_slist_append(list.get(), line.c_str());
+  curl_slist* const longer = libcurl().curl_slist_append(list.get(), line.c_str());
   if (longer == nullptr) throw std::bad_alloc();
   (void)list.release();
   list.reset(longer);
@@ -34,14 +32,14 @@ void append_header(HeaderList& list, const std::string& line) {
 
 std::string header_of(CURL* easy, const char* name) {
   curl_header* header = nullptr;
-  if (curl_easy_header(easy, name, 0, CURLH_HEADER, -1, &header) != CURLHE_OK || header->amount != 1) return {};
+  if (libcurl().curl_easy_header(easy, name, 0, CURLH_HEADER, -1, &header) != CURLHE_OK || header->amount != 1) return {};
   const std::string value(header->value);
   return value.size() > kMostHeaderValue ? std::string() : value;
 }
 
 RemoteAnswer answer_of(CURL* easy) {
   RemoteAnswer answer;
-  curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &answer.status);
+  libcurl().curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &answer.status);
   if (answer.status == 0) return answer;
   answer.content_range = header_of(easy, "Content-Range");
   answer.content_encoding = header_of(easy, "Content-Encoding");
@@ -49,9 +47,9 @@ RemoteAnswer answer_of(CURL* easy) {
   answer.last_modified = header_of(easy, "Last-Modified");
   answer.location = header_of(easy, "Location");
   curl_off_t number = -1;
-  if (curl_easy_getinfo(easy, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &number) == CURLE_OK && number >= 0) answer.content_length = number;
+  if (libcurl().curl_easy_getinfo(easy, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &number) == CURLE_OK && number >= 0) answer.content_length = number;
   number = 0;
-  if (curl_easy_getinfo(easy, CURLINFO_RETRY_AFTER, &number) == CURLE_OK && number > 0) answer.retry_after = std::chrono::seconds(number);
+  if (libcurl().curl_easy_getinfo(easy, CURLINFO_RETRY_AFTER, &number) == CURLE_OK && number > 0) answer.retry_after = std::chrono::seconds(number);
   return answer;
 }
 
@@ -74,11 +72,6 @@ bool is_temporary_failure(CURLcode code) {
 
 bool is_taken(long status) { return status >= 200 && status < 300; }
 
-void start_libcurl() {
-  static const CURLcode kStarted = curl_global_init(CURL_GLOBAL_DEFAULT);  // once, whatever the threads
-  if (kStarted != CURLE_OK) throw std::runtime_error("libcurl cannot be started");
-}
-
 }  // namespace
 
 struct Transfers::Running {
@@ -97,8 +90,8 @@ struct Transfers::Running {
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
   ~Running() {
-    if (multi != nullptr) curl_multi_remove_handle(multi, easy);
-    curl_easy_cleanup(easy);
+    if (multi != nullptr) libcurl().curl_multi_remove_handle(multi, easy);
+    libcurl().curl_easy_cleanup(easy);
   }
 
   // For libcurl: anything but `size` ends the transfer.
@@ -126,14 +119,15 @@ struct Transfers::Shared {
   std::optional<std::filesystem::path> authorities;
   std::map<CURL*, std::unique_ptr<Running>> running;
 
-  Shared(const Times& of, std::optional<std::filesystem::path> trusted) : multi(curl_multi_init()), times(of), authorities(std::move(trusted)) {
+  Shared(const Times& of, std::optional<std::filesystem::path> trusted)
+      : multi(libcurl().curl_multi_init()), times(of), authorities(std::move(trusted)) {
     if (multi == nullptr) throw std::bad_alloc();
   }
   Shared(const Shared&) = delete;
   Shared& operator=(const Shared&) = delete;
   ~Shared() {
     running.clear();
-    curl_multi_cleanup(multi);
+    libcurl().curl_multi_cleanup(multi);
   }
 
   EndedTransfer end_of(const CURLMsg& message) {
@@ -149,16 +143,15 @@ struct Transfers::Shared {
     // An answer that is not taken counts, however its body ends.
     const bool is_answered = end.answer.status != 0 && !is_taken(end.answer.status);
     if (code == CURLE_OK || end.refusal || is_answered) return end;
-    end.failure = printable(ended->failure[0] != '\0' ? ended->failure : curl_easy_strerror(code));
+    end.failure = printable(ended->failure[0] != '\0' ? ended->failure : libcurl().curl_easy_strerror(code));
     end.is_temporary = is_temporary_failure(code);
     return end;
   }
 };
 
 Transfers::Transfers(std::size_t connections, const Times& times, std::optional<std::filesystem::path> authorities) {
-  start_libcurl();
   shared_ = std::make_unique<Shared>(times, std::move(authorities));
-  curl_multi_setopt(shared_->multi, CURLMOPT_MAX_TOTAL_CONNECTIONS, long(connections));
+  libcurl().curl_multi_setopt(shared_->multi, CURLMOPT_MAX_TOTAL_CONNECTIONS, long(connections));
 }
 
 Transfers::~Transfers() = default;
@@ -169,7 +162,7 @@ void Transfers::start(std::size_t id, const RemoteRequest& request, Take take) {
   auto running = std::make_unique<Running>();
   running->id = id;
   running->take = std::move(take);
-  CURL* const easy = running->easy = curl_easy_init();
+  CURL* const easy = running->easy = libcurl().curl_easy_init();
   if (easy == nullptr) throw std::bad_alloc();
   append_header(running->headers, "Accept-Encoding: identity");
   for (const std::string& line : request.headers) append_header(running->headers, line);
@@ -178,27 +171,27 @@ void Transfers::start(std::size_t id, const RemoteRequest& request, Take take) {
     if (access->aws) {
       append_header(running->headers, kHashOfNothing);
       if (!access->aws->session_token.empty()) append_header(running->headers, "x-amz-security-token: " + access->aws->session_token);
-      curl_easy_setopt(easy, CURLOPT_AWS_SIGV4, ("aws:amz:" + access->aws->region + ":s3").c_str());
-      curl_easy_setopt(easy, CURLOPT_USERNAME, access->aws->key_id.c_str());
-      curl_easy_setopt(easy, CURLOPT_PASSWORD, access->aws->secret.c_str());
+      libcurl().curl_easy_setopt(easy, CURLOPT_AWS_SIGV4, ("aws:amz:" + access->aws->region + ":s3").c_str());
+      libcurl().curl_easy_setopt(easy, CURLOPT_USERNAME, access->aws->key_id.c_str());
+      libcurl().curl_easy_setopt(easy, CURLOPT_PASSWORD, access->aws->secret.c_str());
     }
   }
-  curl_easy_setopt(easy, CURLOPT_URL, request.url.text.c_str());
-  curl_easy_setopt(easy, CURLOPT_RANGE, (std::to_string(request.first) + "-" + std::to_string(request.last)).c_str());
-  curl_easy_setopt(easy, CURLOPT_HTTPHEADER, running->headers.get());
-  curl_easy_setopt(easy, CURLOPT_USERAGENT, "intervale/" INTERVALE_VERSION);
-  curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, request.url.secure ? "https" : "http");
-  curl_easy_setopt(easy, CURLOPT_HTTP_VERSION, long(CURL_HTTP_VERSION_1_1));  // a connection for each range: they run beside each other
-  curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 0L);                         // libcurl would send our headers to other hosts
-  curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
-  curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, long(shared_->times.connect.count()));
-  curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, kLeastBytesPerSecond);
-  curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME, long(shared_->times.idle.count()));
-  if (shared_->authorities) curl_easy_setopt(easy, CURLOPT_CAINFO, shared_->authorities->c_str());
-  curl_easy_setopt(easy, CURLOPT_ERRORBUFFER, running->failure);
-  curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, &Running::on_body);
-  curl_easy_setopt(easy, CURLOPT_WRITEDATA, running.get());
-  if (curl_multi_add_handle(shared_->multi, easy) != CURLM_OK) throw std::bad_alloc();
+  libcurl().curl_easy_setopt(easy, CURLOPT_URL, request.url.text.c_str());
+  libcurl().curl_easy_setopt(easy, CURLOPT_RANGE, (std::to_string(request.first) + "-" + std::to_string(request.last)).c_str());
+  libcurl().curl_easy_setopt(easy, CURLOPT_HTTPHEADER, running->headers.get());
+  libcurl().curl_easy_setopt(easy, CURLOPT_USERAGENT, "intervale/" INTERVALE_VERSION);
+  libcurl().curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, request.url.secure ? "https" : "http");
+  libcurl().curl_easy_setopt(easy, CURLOPT_HTTP_VERSION, long(CURL_HTTP_VERSION_1_1));  // a connection for each range: they run beside each other
+  libcurl().curl_easy_setopt(easy, CURLOPT_FOLLOWLOCATION, 0L);                         // libcurl would send our headers to other hosts
+  libcurl().curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
+  libcurl().curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, long(shared_->times.connect.count()));
+  libcurl().curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, kLeastBytesPerSecond);
+  libcurl().curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME, long(shared_->times.idle.count()));
+  if (shared_->authorities) libcurl().curl_easy_setopt(easy, CURLOPT_CAINFO, shared_->authorities->c_str());
+  libcurl().curl_easy_setopt(easy, CURLOPT_ERRORBUFFER, running->failure);
+  libcurl().curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, &Running::on_body);
+  libcurl().curl_easy_setopt(easy, CURLOPT_WRITEDATA, running.get());
+  if (libcurl().curl_multi_add_handle(shared_->multi, easy) != CURLM_OK) throw std::bad_alloc();
   running->multi = shared_->multi;
   shared_->running.emplace(easy, std::move(running));
 }
@@ -207,12 +200,12 @@ std::vector<EndedTransfer> Transfers::wait(std::chrono::milliseconds time) {
   std::vector<EndedTransfer> ended;
   for (int turn = 0; turn < 2; ++turn) {
     int left = 0;
-    curl_multi_perform(shared_->multi, &left);
-    while (const CURLMsg* const message = curl_multi_info_read(shared_->multi, &left)) {
+    libcurl().curl_multi_perform(shared_->multi, &left);
+    while (const CURLMsg* const message = libcurl().curl_multi_info_read(shared_->multi, &left)) {
       if (message->msg == CURLMSG_DONE) ended.push_back(shared_->end_of(*message));
     }
     if (!ended.empty() || turn == 1) break;
-    curl_multi_poll(shared_->multi, nullptr, 0, int(time.count()), nullptr);
+    libcurl().curl_multi_poll(shared_->multi, nullptr, 0, int(time.count()), nullptr);
   }
   return ended;
 }
