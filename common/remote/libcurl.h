@@ -15,7 +15,7 @@ struct Libcurl {
           call(curl_multi_info_read) call(curl_multi_init) call(curl_multi_perform) call(curl_multi_poll) call(curl_multi_remove_handle)         \
               call(curl_multi_setopt) call(curl_slist_append) call(curl_slist_free_all) call(curl_url) call(curl_url_cleanup) call(curl_url_get) \
                   call(curl_url_set)
-#define INTERVALE_MEMBER(name) decltype(&::name) name = nullptr;
+#define INTERVALE_MEMBER(name) decltype(&::name) name = nullptr;  // NOLINT(bugprone-macro-parentheses)
   INTERVALE_LIBCURL(INTERVALE_MEMBER)
 #undef INTERVALE_MEMBER
 };
