@@ -2,10 +2,25 @@
 
 #include <zstd.h>
 
+#include <memory>
+#include <new>
+
 namespace intervale {
 
 namespace {
 constexpr std::uint64_t kMostPerByte = 1 << 15;  // a block of 128 KiB that repeats one byte takes 4 bytes (RFC 8878, 3.1.1.2)
+
+#ifndef INTERVALE_STORED_PLANES
+// To make one takes as long as to compress a small plane.
+ZSTD_CCtx& compressor_of_thread() {
+  struct Free {
+    void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+  };
+  thread_local const std::unique_ptr<ZSTD_CCtx, Free> kContext(ZSTD_createCCtx());
+  if (!kContext) throw std::bad_alloc();
+  return *kContext;
+}
+#endif
 }  // namespace
 
 void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> plane, int compression) {
@@ -18,7 +33,7 @@ void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> 
   out.insert(out.end(), plane.begin(), plane.end());
 #else
   std::vector<std::uint8_t> stored(ZSTD_compressBound(plane.size()));
-  const std::size_t n = ZSTD_compress(stored.data(), stored.size(), plane.data(), plane.size(), compression);
+  const std::size_t n = ZSTD_compressCCtx(&compressor_of_thread(), stored.data(), stored.size(), plane.data(), plane.size(), compression);
   if (ZSTD_isError(n) || n >= plane.size()) {
     append_varint(out, plane.size());
     out.insert(out.end(), plane.begin(), plane.end());
