@@ -17,6 +17,17 @@ struct IntervalVolume::LazyBounds {
   std::atomic<std::size_t> bytes = 0;  // of what was found
 };
 
+namespace {
+
+std::vector<ScreenError::Region> regions_of_bricks(const Domain& domain, const SupercubeSet& set) {
+  std::vector<ScreenError::Region> regions;
+  regions.reserve(set.bricks().size());
+  for (const SupercubeSet::Brick& brick : set.bricks()) regions.push_back(region_of(domain, brick.key, 4));
+  return regions;
+}
+
+}  // namespace
+
 IntervalVolume::IntervalVolume(Parts parts)
     : description_(std::move(parts.description)),
       domain_(description_.grid.dims),
@@ -25,6 +36,7 @@ IntervalVolume::IntervalVolume(Parts parts)
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
       relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, std::move(parts.left), std::move(parts.surface)),
+      brick_regions_(description_.grid, regions_of_bricks(domain_, set_)),
       bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
 
@@ -93,7 +105,8 @@ std::size_t IntervalVolume::memory_bytes() const {
     for (const ValueKeys& keys : channel) of_channels += keys.memory_bytes();
   }
   return of_channels + sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
-         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + bounds_->bytes + (statistics_ ? statistics_->memory_bytes() : 0);
+         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + brick_regions_.memory_bytes() + bounds_->bytes +
+         (statistics_ ? statistics_->memory_bytes() : 0);
 }
 
 }  // namespace intervale

@@ -23,6 +23,7 @@
 #include "common/patch/range.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
+#include "common/view/screen_error.h"
 
 namespace intervale {
 
@@ -60,6 +61,8 @@ class IntervalVolume {
   [[nodiscard]] const ValueKeys& keys() const { return keys_; }
   // What the range of the description needs: all updates, but for those that a damaged file has lost (page_faults.h).
   [[nodiscard]] const RelevantUpdates& relevant() const { return relevant_; }
+  // By brick: where its diamonds are.
+  [[nodiscard]] const ScreenError::Regions& brick_regions() const { return brick_regions_; }
   // How many updates relevant() lacks for that reason. O(bricks).
   [[nodiscard]] std::uint64_t lost_updates() const;
   // For other ranges than its own; it must have been refined uniformly. The first call finds them, in O(updates);
@@ -84,6 +87,7 @@ class IntervalVolume {
   std::vector<std::uint8_t> steps_;
   std::vector<float> error_steps_;
   RelevantUpdates relevant_;
+  ScreenError::Regions brick_regions_;
   std::shared_ptr<LazyBounds> bounds_;  // not null; of all copies
   std::shared_ptr<const FieldStatistics> statistics_;
   std::vector<ChannelKeys> channel_keys_;

@@ -12,6 +12,8 @@ namespace {
 // h, in pixels, of a diamond that is large on the screen; and how much larger counts.
 constexpr double kLargePixels = 12, kLargest = 16;
 
+float clamp_weight(double weight) { return float(std::clamp(weight, 1e-30, 1e30)); }
+
 }  // namespace
 
 Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod, const DepthMap* hidden, const Camera* ahead)
@@ -32,11 +34,12 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
   }
 }
 
-Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_error, unsigned slope) const {
+Ranking::Brick Ranking::of_brick(BrickIndex brick) const {
   Brick b;
   b.ranking_ = this;
   const SupercubeKey key = volume_.set().bricks()[brick].key;
   b.scale_ = scale_of_key(key);
+  const unsigned step = relevant_.brick_error_step(brick);
   if (step < least_step_) return b;
   if (!roi_ && !screen_) {
     b.bound_ = Rank(step + 1);
@@ -51,31 +54,60 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick, unsigned step, float object_e
   b.pixels_ = pixels_per_unit(*screen_, region);
   b.near_ = screen_->is_near(region);
   b.is_exact_ = !b.near_ && !(ahead_ && ahead_->is_near(region));
-  const float pixels = object_error * b.pixels_;
-  if (!(pixels > pixel_error_)) return b;
+  const float object_error = relevant_.brick_object_error(brick);
+  if (!(object_error * b.pixels_ > pixel_error_)) return b;
   b.weight_ = weight_of(region, b.scale_, b.pixels_, b.is_exact_);
   b.is_seen_ = !is_hidden(region);
-  b.bound_ = rank_of(importance_of(pixels, slope, b.weight_), b.is_seen_);
+  b.bound_ = 1;
+  b.bound_ = b.bound(step, object_error, relevant_.brick_slope(brick));
   return b;
+}
+
+Ranking::Rank Ranking::Brick::bound(unsigned step, float object_error, unsigned slope) const {
+  if (bound_ == 0 || step < ranking_->least_step_) return 0;
+  if (!ranking_->screen_) return Rank(step + 1);
+  const float pixels = object_error * pixels_;
+  return pixels > ranking_->pixel_error_ ? rank_of(ranking_->importance_of(pixels, slope, weight_), is_seen_) : Rank(0);
+}
+
+Ranking::BrickBounds::Bound Ranking::BrickBounds::operator()(BrickIndex brick, unsigned step, float object_error, unsigned slope) {
+  const Ranking& r = ranking_;
+  if (!r.screen_ || r.roi_) {
+    const Brick b = r.of_brick(brick);
+    return {b.bound(step, object_error, slope), r.screen_ ? b.pixels(object_error) : 0, true};
+  }
+  constexpr std::size_t kBlock = ScreenError::Regions::kBlock;
+  const std::size_t i = brick % kBlock;
+  if (brick / kBlock != block_) {
+    block_ = brick / kBlock;
+    now_ = r.screen_->bounds(r.volume_.brick_regions(), block_);
+    if (r.ahead_) soon_ = r.ahead_->bounds(r.volume_.brick_regions(), block_);
+  }
+  const float pixels = std::clamp(object_error * now_.pixels[i], kLeastImportance, kMostImportance);
+  if (step < r.least_step_ || !(pixels > r.pixel_error_)) return {0, pixels, true};
+  const int scale = scale_of_key(r.volume_.set().bricks()[brick].key);
+  double weight = r.whole_weight(scale, double(now_.pixels[i])) * double(now_.share[i]);
+  if (r.ahead_) weight = std::max(weight, r.whole_weight(scale, double(soon_.pixels[i])) * double(soon_.share[i]));
+  return {rank_of(r.importance_of(pixels, slope, clamp_weight(weight)), true), pixels, false};
 }
 
 float Ranking::pixels_per_unit(const ScreenError& screen, const ScreenError::Region& region) {
   return float(std::min(screen.pixels_per_unit(region), double(kMostImportance)));
 }
 
-// If not exact, at most. pixels: of one world unit there.
-double Ranking::weight_on(const ScreenError& screen, const ScreenError::Region& region, int scale, double pixels, bool is_exact) const {
-  const double spacing = spacing_ * pixels;
-  const double weight = relevant_.has_slopes() ? std::ldexp(spacing * spacing * spacing, scale) : std::ldexp(spacing * spacing, 2 * scale);
-  const double large = std::clamp(std::ldexp(spacing, scale) / kLargePixels, 1.0, kLargest);
-  return weight * large * large * large * (is_exact ? screen.seen_share(region) : 1);
+double Ranking::whole_weight(int scale, double pixels) const {
+  const double spacing = spacing_ * pixels, h = spacing * double(std::uint64_t(1) << scale);
+  const double large = std::clamp(h / kLargePixels, 1.0, kLargest);
+  return (relevant_.has_slopes() ? spacing * spacing * h : h * h) * (large * large * large);
 }
 
-// The same, now or soon: the greater.
+// Now or soon, the greater. If not exact, at most. pixels: of one world unit there, now.
 float Ranking::weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const {
-  double weight = weight_on(*screen_, region, scale, double(pixels), is_exact);
-  if (ahead_) weight = std::max(weight, weight_on(*ahead_, region, scale, double(pixels_per_unit(*ahead_, region)), is_exact));
-  return float(std::clamp(weight, 1e-30, 1e30));
+  const auto on = [&](const ScreenError& screen, float pixels_there) {
+    return whole_weight(scale, double(pixels_there)) * (is_exact ? screen.seen_share(region) : 1);
+  };
+  const double weight = on(*screen_, pixels);
+  return clamp_weight(ahead_ ? std::max(weight, on(*ahead_, pixels_per_unit(*ahead_, region))) : weight);
 }
 
 Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, SupercubeKey key) const {

@@ -91,8 +91,10 @@ class Ranking {
   // Ranks the supercubes of one brick.
   class Brick {
    public:
-    // No lower than the rank of any update here.
+    // No lower than the rank of any update here; the same, if only updates with no higher error step or slope and no larger
+    // object error remain.
     [[nodiscard]] Rank bound() const { return bound_; }
+    [[nodiscard]] Rank bound(unsigned step, float object_error, unsigned slope) const;
     [[nodiscard]] Supercube supercube(SupercubeIndex supercube, SupercubeKey key) const;
     // With a camera: no less than the deviation in pixels of any update here whose object error is no larger, or 2^100.
     // Above 0.
@@ -108,11 +110,27 @@ class Ranking {
     float pixels_ = 0, weight_ = 0;
     Rank bound_ = 0;
   };
-  [[nodiscard]] Brick of_brick(BrickIndex brick) const {
-    return of_brick(brick, relevant_.brick_error_step(brick), relevant_.brick_object_error(brick), relevant_.brick_slope(brick));
-  }
-  // The same, if only updates with no higher error step or slope and no larger object error remain.
-  [[nodiscard]] Brick of_brick(BrickIndex brick, unsigned step, float object_error, unsigned slope) const;
+  [[nodiscard]] Brick of_brick(BrickIndex brick) const;
+
+  // Bounds of bricks in order of their numbers: no lower than those that of_brick() tells, in a fraction of the time. What
+  // is inside the picture and far away is taken for as near as its nearest point; what is hidden, for seen.
+  class BrickBounds {
+   public:
+    // ranking: must outlive it.
+    explicit BrickBounds(const Ranking& ranking) : ranking_(ranking) {}
+    // Of its updates with no higher error step or slope and no larger object error.
+    struct Bound {
+      Rank rank = 0;
+      float pixels = 0;       // as Brick::pixels(); 0 without a camera
+      bool is_exact = false;  // Brick::bound() is the same
+    };
+    [[nodiscard]] Bound operator()(BrickIndex brick, unsigned step, float object_error, unsigned slope);
+
+   private:
+    const Ranking& ranking_;
+    std::size_t block_ = ~std::size_t(0);
+    ScreenError::Bounds now_, soon_;  // of the regions of that block
+  };
 
   // Without a camera: the largest field error that remains once all updates of higher ranks are applied.
   [[nodiscard]] double error(Rank rank) const;
@@ -138,7 +156,8 @@ class Ranking {
   }
   [[nodiscard]] static float pixels_per_unit(const ScreenError& screen, const ScreenError::Region& region);
   [[nodiscard]] bool is_hidden(const ScreenError::Region& region) const { return occlusion_ && occlusion_->hides(region); }
-  [[nodiscard]] double weight_on(const ScreenError& screen, const ScreenError::Region& region, int scale, double pixels, bool is_exact) const;
+  // Of diamonds of this scale where a world unit has so many pixels, as if all of it were seen from there.
+  [[nodiscard]] double whole_weight(int scale, double pixels) const;
   [[nodiscard]] float weight_of(const ScreenError::Region& region, int scale, float pixels, bool is_exact) const;
 
   const IntervalVolume& volume_;

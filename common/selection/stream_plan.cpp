@@ -66,6 +66,7 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   shown_ = std::move(shown);
   const SupercubeSet& set = volume_->set();
   pending_.assign(set.bricks().size(), {});
+  is_loose_.assign(pending_.size(), false);
   wanted_count_ = pending_bricks_ = 0;
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     Pending& pending = pending_[b];
@@ -168,15 +169,25 @@ void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* a
   rank_bricks();
 }
 
+// Bricks are ranked by bounds that are found fast. Those that come first are ranked again, as well as can be.
 void StreamPlan::rank_bricks() {
+  Ranking::BrickBounds bounds(*ranking_);
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
-    const Pending& w = pending_[b];
+    Pending& w = pending_[b];
     if (w.unsent == 0) continue;
-    const Ranking::Brick ranking = ranking_->of_brick(b, w.error_step, float(w.object_error), w.slope);
-    pending_[b].pixels = Up16(ranking_->has_camera() ? ranking.pixels(float(w.object_error)) : 0);
-    set_pending(b, std::max(ranking.bound(), budget_ ? Rank(1) : Rank(0)), w.unsent);
+    const auto bound = bounds(b, w.error_step, float(w.object_error), w.slope);
+    w.pixels = Up16(bound.pixels);
+    is_loose_[b] = !bound.is_exact;
+    set_pending(b, std::max(bound.rank, budget_ ? Rank(1) : Rank(0)), w.unsent);
   }
   begin_band();
+}
+
+void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
+  const Pending& w = pending_[brick];
+  is_loose_[brick] = false;
+  const Rank exact = ranking.bound(w.error_step, float(w.object_error), w.slope);
+  set_pending(brick, std::min(w.rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), w.wanted);
 }
 
 void StreamPlan::set_pending(BrickIndex brick, Rank rank, unsigned wanted) {
@@ -192,7 +203,11 @@ void StreamPlan::set_pending(BrickIndex brick, Rank rank, unsigned wanted) {
 void StreamPlan::begin_band() {
   next_brick_ = std::uint32_t(pending_.size());
   Rank top = 0;
-  for (const Pending& w : pending_) top = std::max(top, w.rank);
+  for (std::uint32_t next = next_brick_; next != 0; --next) {  // coarse ones have high ranks, so that few others are refined
+    const BrickIndex b(next - 1);
+    if (pending_[b].rank > top && is_loose_[b]) refine(b, ranking_->of_brick(b));
+    top = std::max(top, pending_[b].rank);
+  }
   band_ = top == 0 ? Rank(0) : ranking_->band_below(top);
 }
 
@@ -278,6 +293,8 @@ bool StreamPlan::has_room(const BatchBuilder& builder, std::size_t updates) cons
 bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   const SupercubeSet& set = volume_->set();
   const Ranking::Brick ranking = ranking_->of_brick(brick);
+  if (is_loose_[brick]) refine(brick, ranking);
+  if (pending_[brick].rank < band_) return true;
   Unsent rest;
   float object_error = 0;
   bool full = false;

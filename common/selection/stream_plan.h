@@ -144,6 +144,8 @@ class StreamPlan {
   [[nodiscard]] Highest highest(SupercubeIndex s) const;
   void set_highest(SupercubeIndex s, Highest to);
   void rank_bricks();
+  // Lowers a loose rank to that which Ranking::of_brick() tells.
+  void refine(BrickIndex brick, const Ranking::Brick& ranking);
   void begin_band();
   // Upper bounds over updates that were visited and not sent.
   struct Unsent {
@@ -165,6 +167,7 @@ class StreamPlan {
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
   std::vector<Pending> pending_;  // by brick
+  std::vector<bool> is_loose_;    // by brick: its rank may be much too high; see refine()
   // By supercube: bounds on its unsent updates, in pages of 64 supercubes. Page 0: as if none were sent.
   static constexpr std::uint32_t kStepsPage = 64;
   std::vector<std::uint32_t> steps_page_;

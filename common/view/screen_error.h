@@ -6,6 +6,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
 
 #include "common/diamond/domain.h"
 #include "common/diamond/grid.h"
@@ -27,6 +30,31 @@ class ScreenError {
   // The pixels of a deviation of one world unit within the region, at most; fewer the further the region is outside the
   // picture. Finite, above 0, and no less than for any region inside this one.
   [[nodiscard]] double pixels_per_unit(const Region& region) const;
+
+  // Many regions, in an order for looking at a block of them at once.
+  class Regions {
+   public:
+    static constexpr std::size_t kBlock = 16;
+    // regions: as many as there may be; all within the samples of the grid.
+    Regions(const Grid& grid, std::span<const Region> regions);
+    [[nodiscard]] std::size_t memory_bytes() const { return blocks_.capacity() * sizeof(Block); }
+
+   private:
+    friend class ScreenError;
+    // In units of the diagonal of the grid's box, from its middle, along the axes of TurnedAffine.
+    struct Block {
+      std::array<std::array<float, kBlock>, 3> middle{}, reach{};
+    };
+    std::vector<Block> blocks_;
+    Vec3 middle_{};
+    double unit_ = 1;
+  };
+  // Upper bounds on pixels_per_unit() and seen_share() of the regions of a block, little above them for regions that are
+  // in the picture and far away. In floats: at most 2^100.
+  struct Bounds {
+    std::array<float, Regions::kBlock> pixels{}, share{};
+  };
+  [[nodiscard]] Bounds bounds(const Regions& regions, std::size_t block) const;
 
   // Whether the region is so near that the pixels a unit of its parts differ by more than a third.
   [[nodiscard]] bool is_near(const Region& region) const;

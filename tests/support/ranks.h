@@ -3,8 +3,12 @@
 
 #include <array>
 #include <functional>
+#include <optional>
+#include <random>
 
 #include "common/ivm/ranking.h"
+#include "common/view/depth_map.h"
+#include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/parts.h"
 
@@ -15,6 +19,27 @@ inline constexpr std::array<Dims, 5> kRankingBoxes{{{17, 17, 17}, {24, 17, 20}, 
 inline IntervalVolume ranking_volume(unsigned seed) {
   const auto trial = trial_of_seed(seed, kRankingBoxes);
   return build(seed % 3 != 0 ? stretched(trial.volume) : trial.volume, trial.options);
+}
+
+// What a camera sees of some triangles in the box; none without a camera, and now and then.
+inline std::optional<DepthMap> random_map(const Lod& lod, const Grid& g, std::mt19937& random) {
+  if (!lod.camera || random() % 3 == 0) return {};
+  DepthBuffer buffer(*lod.camera);
+  for (int i = 0; i < 20; ++i) {
+    std::array<Vec3, 3> triangle;
+    for (Vec3& corner : triangle) {
+      for (std::size_t k = 0; k < 3; ++k) corner[k] = uniform(random, -0.5, 1.5) * g.dims[k];
+      corner = g.affine.point(corner);
+    }
+    buffer.draw(triangle);
+  }
+  return buffer.map();
+}
+
+// Where the camera goes; nowhere now and then.
+inline std::optional<Camera> random_ahead(const Lod& lod, const Grid& g, std::mt19937& random) {
+  if (!lod.camera || random() % 3 == 0) return {};
+  return random_camera(g, random);
 }
 
 using VisitRank = std::function<void(const Place&, Ranking::Rank)>;

@@ -15,10 +15,10 @@ namespace intervale::fetch_locals {
 namespace {
 
 using ::testing::HasSubstr;
-using Volume = std::shared_ptr<const IntervalVolume>;
+using SharedVolume = std::shared_ptr<const IntervalVolume>;
 
-const Volume& gyroid() {
-  static const Volume volume = testing::build_shared(testing::gyroid({33, 30, 25}), {.range = {-0.3, 0.2}, .refine = Refine::uniform});
+const SharedVolume& gyroid() {
+  static const SharedVolume volume = testing::build_shared(testing::gyroid({33, 30, 25}), {.range = {-0.3, 0.2}, .refine = Refine::uniform});
   return volume;
 }
 

@@ -17,7 +17,7 @@
 namespace intervale {
 namespace {
 
-using Volume = std::shared_ptr<const IntervalVolume>;
+using SharedVolume = std::shared_ptr<const IntervalVolume>;
 
 // Until neither side has anything to send, or it waits for the worker, if that may not work. Returns how often it did.
 int run(ClientSession& client, SessionState& state, LocalWorker& worker, bool may_work = true) {
@@ -42,8 +42,8 @@ int run(ClientSession& client, SessionState& state, LocalWorker& worker, bool ma
   return pieces;
 }
 
-SessionState::Find always(const Volume& volume) {
-  return [volume](const std::string&) -> tl::expected<Volume, protocol::Fault> { return volume; };
+SessionState::Find always(const SharedVolume& volume) {
+  return [volume](const std::string&) -> tl::expected<SharedVolume, protocol::Fault> { return volume; };
 }
 
 ViewRequest through_camera(const Range& range, std::optional<std::uint64_t> most, bool early) {
@@ -56,7 +56,7 @@ ViewRequest through_camera(const Range& range, std::optional<std::uint64_t> most
 }
 
 TEST(LocalWorker, EndsWithTheMeshThatAServerSends) {
-  const Volume volume = testing::build_shared(testing::gyroid({33, 30, 25}), {.range = {-1, 1}, .refine = Refine::uniform});
+  const SharedVolume volume = testing::build_shared(testing::gyroid({33, 30, 25}), {.range = {-1, 1}, .refine = Refine::uniform});
   std::minstd_rand random(20);
   const auto value = [&] { return -1 + 2 * double(random() % 1000) / 999; };
   LocalWorker worker;
@@ -80,7 +80,7 @@ TEST(LocalWorker, EndsWithTheMeshThatAServerSends) {
 }
 
 TEST(LocalWorker, MeasuresPieceByPieceAndRemembersWhatItMeasured) {
-  const Volume volume = testing::build_shared(testing::gyroid({33, 33, 33}), {.range = {-1, 1}, .refine = Refine::uniform});
+  const SharedVolume volume = testing::build_shared(testing::gyroid({33, 33, 33}), {.range = {-1, 1}, .refine = Refine::uniform});
   LocalWorker worker;
   SessionState state(always(volume), worker);
   ClientSession client({.dataset = "made", .client = "test"});
@@ -100,7 +100,7 @@ TEST(LocalWorker, MeasuresPieceByPieceAndRemembersWhatItMeasured) {
 
 // Its own part only, as if that were all that there is room for.
 TEST(LocalWorker, FinishesARangeThatIsLargerThanWhatItKeeps) {
-  const Volume volume = testing::build_shared(testing::gyroid({17, 17, 17}), {.range = {-1, 1}, .refine = Refine::uniform});
+  const SharedVolume volume = testing::build_shared(testing::gyroid({17, 17, 17}), {.range = {-1, 1}, .refine = Refine::uniform});
   LocalWorker worker(1);
   SessionState state(always(volume), worker);
   ClientSession client({.dataset = "made", .client = "test"});

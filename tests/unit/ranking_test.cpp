@@ -21,6 +21,8 @@ namespace {
 
 using testing::for_each_rank;
 using testing::NaiveCamera;
+using testing::random_ahead;
+using testing::random_map;
 using testing::Vector;
 
 // Half of how far the surfaces can move in an update's diamond, from what is stored.
@@ -74,27 +76,6 @@ bool meets(const IntervalVolume& v, const Diamond& d, const Box& roi) {
     if (low > high || c[i] - d.h > high || c[i] + d.h < low) return false;
   }
   return true;
-}
-
-// What a camera sees of some triangles in the box; none without a camera, and now and then.
-std::optional<DepthMap> random_map(const Lod& lod, const Grid& g, std::mt19937& random) {
-  if (!lod.camera || random() % 3 == 0) return {};
-  DepthBuffer buffer(*lod.camera);
-  for (int i = 0; i < 20; ++i) {
-    std::array<Vec3, 3> triangle;
-    for (Vec3& corner : triangle) {
-      for (std::size_t k = 0; k < 3; ++k) corner[k] = testing::uniform(random, -0.5, 1.5) * g.dims[k];
-      corner = g.affine.point(corner);
-    }
-    buffer.draw(triangle);
-  }
-  return buffer.map();
-}
-
-// Where the camera goes; nowhere now and then.
-std::optional<Camera> random_ahead(const Lod& lod, const Grid& g, std::mt19937& random) {
-  if (!lod.camera || random() % 3 == 0) return {};
-  return testing::random_camera(g, random);
 }
 
 class Ranks : public ::testing::TestWithParam<unsigned> {

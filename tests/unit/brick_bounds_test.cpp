@@ -1,0 +1,108 @@
+// Bounds that are found for many bricks at once: never too low, and seldom much too high.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "common/ivm/ranking.h"
+#include "common/view/screen_error.h"
+#include "tests/support/cameras.h"
+#include "tests/support/ranks.h"
+
+namespace intervale {
+namespace {
+
+class BrickBounds : public ::testing::TestWithParam<unsigned> {
+ protected:
+  void expect_bounds(const Ranking& ranking) {
+    Ranking::BrickBounds bounds(ranking);
+    const RelevantUpdates& relevant = volume_.relevant();
+    std::vector<Ranking::Rank> ranks;
+    for (BrickIndex b{0}; b < volume_.set().bricks().size(); ++b) {
+      const float object_error = relevant.brick_object_error(b);
+      const auto all = bounds(b, relevant.brick_error_step(b), object_error, relevant.brick_slope(b));
+      ranks.push_back(all.rank);
+      const Ranking::Brick brick = ranking.of_brick(b);
+      if (ranking.has_camera()) {
+        ASSERT_GE(all.pixels, brick.pixels(object_error));
+      }
+      // Of what remains
+      const unsigned step = unsigned(random_()) % (relevant.brick_error_step(b) + 1), slope = unsigned(random_()) % (relevant.brick_slope(b) + 1);
+      const auto some = bounds(b, step, object_error / 2, slope);
+      ASSERT_LE(some.rank, all.rank);
+      if (some.is_exact) {
+        ASSERT_EQ(some.rank, brick.bound(step, object_error / 2, slope));
+      }
+    }
+    testing::for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ASSERT_LE(rank, ranks[p.brick]); });
+  }
+  IntervalVolume volume_ = testing::ranking_volume(GetParam());
+  std::mt19937 random_{GetParam()};  // the seed is the test's number
+};
+
+TEST_P(BrickBounds, AreNeverTooLow) {
+  for (int trial = 0; trial < 60; ++trial) {
+    const Grid& g = volume_.description().grid;
+    const Lod lod = testing::random_lod(g, random_);
+    const auto map = testing::random_map(lod, g, random_);
+    const auto ahead = testing::random_ahead(lod, g, random_);
+    expect_bounds(Ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr, ahead ? &*ahead : nullptr));
+  }
+}
+
+TEST_P(BrickBounds, AreNeverTooLowWhateverTheCamera) {
+  Lod lod;
+  lod.camera = testing::random_camera(volume_.description().grid, random_);
+  for (const double away : {1.0, 1e6, 1e20, 1e100}) {
+    for (double& x : lod.camera->eye) x *= away;
+    for (const double fov : {1e-306, 1e-100, 1e-37, 1e-30, 30.0, 179.999999}) {
+      lod.camera->fov = fov;
+      if (check_lod(lod)) expect_bounds(Ranking(volume_, lod));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Random, BrickBounds, ::testing::Range(0u, 10u));
+
+// Regions of grids of any unit, turned and sheared.
+TEST(RegionBounds, AreThoseOfEachRegion) {
+  std::mt19937 random(1);
+  std::size_t seen = 0, beside = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    Grid grid{{40, 30, 20}, Affine::of({0.5, 1, 3}, {-4, 100, 7})};
+    const double unit = std::pow(10.0, testing::uniform(random, -25, 25));
+    for (double& number : grid.affine.rows) number = unit * (number + testing::uniform(random, -0.2, 0.2) * (trial % 2));
+    const Camera camera = testing::random_camera(grid, random);
+    const ScreenError view(camera, grid);
+    std::vector<ScreenError::Region> each(37);
+    for (ScreenError::Region& region : each) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double a = testing::uniform(random, 0, grid.dims[k] - 1), b = a + testing::uniform(random, -2, 2);
+        const double low = std::max(0.0, std::min(a, b)), high = std::min(grid.dims[k] - 1.0, std::max(a, b));
+        region.middle[k] = (low + high) / 2;
+        region.reach[k] = (high - low) / 2;
+      }
+    }
+    const ScreenError::Regions regions(grid, each);
+    constexpr std::size_t kBlock = ScreenError::Regions::kBlock;
+    for (std::size_t i = 0; i < each.size(); ++i) {
+      const auto bounds = view.bounds(regions, i / kBlock);
+      const double pixels = std::min(view.pixels_per_unit(each[i]), 0x1p100), share = view.seen_share(each[i]);
+      const auto bound = double(bounds.pixels[i % kBlock]);
+      ASSERT_GE(bound, pixels * (1 - 1e-7)) << "trial " << trial;
+      ASSERT_GE(double(bounds.share[i % kBlock]), share * (1 - 1e-6)) << "trial " << trial;
+      if (view.is_near(each[i])) continue;
+      if (share > 1e-5) {
+        ++seen;
+        EXPECT_LE(bound, pixels * 1.001) << "trial " << trial;
+      }
+      beside += share <= 1e-6 && bounds.share[i % kBlock] < 1;
+    }
+  }
+  EXPECT_GT(seen, 500u);
+  EXPECT_GT(beside, 500u);
+}
+
+}  // namespace
+}  // namespace intervale
