@@ -216,8 +216,8 @@ Result<nlohmann::ordered_json> write_range(const BuildCommand& options, const st
   if (made->description().full.tets == 0 && made->description().full.vertices == 0) {
     fmt::print(stderr, "intervale: warning: no part of the volume lies in the range; its values are {}\n", values);
   }
-  text = text_of(*made, options.output) + "values " + values + "\n";
-  return stats_of(*made, options.output);
+  text = text_of(*made, file_size_of(options.output)) + "values " + values + "\n";
+  return stats_of(*made, file_size_of(options.output));
 }
 
 // Of every range.
@@ -232,8 +232,8 @@ Result<nlohmann::ordered_json> write_every_range(const BuildCommand& options, co
   parts->channel_keys = std::move(built->keys);
   const ValueVolume made(std::move(*parts));
   if (auto saved = save_values(options.output, made, on_all_cores); !saved) return tl::unexpected(saved.error());
-  text = text_of(made, options.output);
-  return stats_of(made, options.output);
+  text = text_of(made, file_size_of(options.output));
+  return stats_of(made, file_size_of(options.output));
 }
 
 // Where large arrays lie from now on, if there is a budget.

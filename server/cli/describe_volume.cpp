@@ -15,12 +15,6 @@
 namespace intervale {
 namespace {
 
-std::uint64_t size_of(const std::filesystem::path& file) {
-  std::error_code code;
-  const auto size = std::filesystem::file_size(file, code);
-  return code ? 0 : size;
-}
-
 // The histogram as bars: some bins a line.
 std::string bars_of(const ValueHistogram& histogram) {
   constexpr std::size_t kLines = 32, kWidth = 60;
@@ -69,18 +63,23 @@ std::string text_of(const std::vector<Channel>& channels) {
 
 }  // namespace
 
-nlohmann::ordered_json stats_of(const IntervalVolume& volume, const std::filesystem::path& file) {
+std::uint64_t file_size_of(const std::filesystem::path& file) {
+  std::error_code code;
+  const auto size = std::filesystem::file_size(file, code);
+  return code ? 0 : size;
+}
+
+nlohmann::ordered_json stats_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
   nlohmann::ordered_json stats = to_json(volume.description());
   stats["scope"] = "one";
   stats["supercubes"] = volume.set().supercubes();
   stats["memory_bytes"] = volume.memory_bytes();
-  stats["file_bytes"] = size_of(file);
+  stats["file_bytes"] = file_bytes;
   return stats;
 }
 
-std::string text_of(const IntervalVolume& volume, const std::filesystem::path& file) {
+std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
   const Description& d = volume.description();
-  const std::uint64_t file_bytes = size_of(file);
   const auto times = [&d](std::uint64_t bytes) { return bytes == 0 ? 0.0 : double(d.full.indexed_bytes()) / double(bytes); };
   std::string text = fmt::format("{}: {} x {} x {} samples, range [{:g}, {:g}], refined: {}\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
                                  d.grid.dims[2], d.range.alpha, d.range.beta, d.refine == Refine::boundary ? "boundary" : "boundary and inside");
@@ -94,7 +93,7 @@ std::string text_of(const IntervalVolume& volume, const std::filesystem::path& f
                             human_bytes(volume.memory_bytes()), times(volume.memory_bytes()), human_bytes(file_bytes), times(file_bytes));
 }
 
-nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem::path& file) {
+nlohmann::ordered_json stats_of(const ValueVolume& volume, std::uint64_t file_bytes) {
   const FieldDescription& d = volume.description();
   nlohmann::ordered_json stats{{"name", d.name}, {"scope", "every"}};
   add_grid(stats, d.grid, d.labels);
@@ -107,16 +106,16 @@ nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem
       {"updates", volume.set().size()},
       {"supercubes", volume.set().supercubes()},
       {"memory_bytes", volume.memory_bytes()},
-      {"file_bytes", size_of(file)},
+      {"file_bytes", file_bytes},
       {"histogram", d.statistics.histogram.count},
       {"histogram_width", d.statistics.histogram.width},
   });
   return stats;
 }
 
-std::string text_of(const ValueVolume& volume, const std::filesystem::path& file) {
+std::string text_of(const ValueVolume& volume, std::uint64_t file_bytes) {
   const FieldDescription& d = volume.description();
-  const std::uint64_t file_bytes = size_of(file), raw = d.grid.sample_count() * size_of(d.format.type);
+  const std::uint64_t raw = d.grid.sample_count() * size_of(d.format.type);
   std::string text = fmt::format("{}: {} x {} x {} samples of type {}, every range\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
                                  d.grid.dims[2], name_of(d.format.type));
   text += place_of(d.grid, d.labels);

@@ -1,6 +1,7 @@
 // The statistics of a data set in a file, which build and info print, as JSON and as text.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -10,11 +11,14 @@
 
 namespace intervale {
 
-[[nodiscard]] nlohmann::ordered_json stats_of(const IntervalVolume& volume, const std::filesystem::path& file);
-[[nodiscard]] std::string text_of(const IntervalVolume& volume, const std::filesystem::path& file);
+[[nodiscard]] nlohmann::ordered_json stats_of(const IntervalVolume& volume, std::uint64_t file_bytes);
+[[nodiscard]] std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes);
+
+// For them; 0: it cannot be told.
+[[nodiscard]] std::uint64_t file_size_of(const std::filesystem::path& file);
 
 // Of a data set of every range. The text has the histogram as bars.
-[[nodiscard]] nlohmann::ordered_json stats_of(const ValueVolume& volume, const std::filesystem::path& file);
-[[nodiscard]] std::string text_of(const ValueVolume& volume, const std::filesystem::path& file);
+[[nodiscard]] nlohmann::ordered_json stats_of(const ValueVolume& volume, std::uint64_t file_bytes);
+[[nodiscard]] std::string text_of(const ValueVolume& volume, std::uint64_t file_bytes);
 
 }  // namespace intervale

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <type_traits>
+#include <utility>
 
 #include "common/ivm/extraction.h"
 #include "common/ivm/ivm_container.h"
@@ -16,6 +16,8 @@
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/ranges/find_relevant_updates.h"
+#include "common/remote/read_remote.h"
+#include "common/remote/remote_options.h"
 #include "common/util/printable.h"
 #include "common/view/lod.h"
 #include "server/cli/commands.h"
@@ -30,6 +32,7 @@ struct InfoCommand {
   std::string file;
   std::vector<std::string> range;   // of info only
   std::optional<std::string> part;  // of info only
+  RemoteOptions remote;
   bool json = false;
 };
 
@@ -55,44 +58,65 @@ Result<double> enclosed_volume(const std::shared_ptr<const IntervalVolume>& set,
   return volume_of(extracted->front.mesh(on_all_cores));
 }
 
-// What both commands do, with a data set of one range or of every range.
-struct Info {
-  template <class DataSet>
-  Result<void> operator()(const InfoCommand& options, const std::shared_ptr<const DataSet>& set) const {
-    const auto range = parse_range(options.range);
-    if (!range) return tl::unexpected(range.error());
-    const auto volume = *range ? enclosed_volume(set, **range) : Result<double>(0);
-    if (!volume) return tl::unexpected(volume.error());
-    const double share = *volume / box_volume(set->description().grid);
-    if (options.json) {
-      auto stats = stats_of(*set, options.file);
-      if (*range) {
-        stats["enclosed_volume"] = *volume;
-        stats["enclosed_share"] = share;
-      }
-      return print_json(stats);
+template <class DataSet>
+Result<void> print_data_set(const InfoCommand& options, const std::shared_ptr<const DataSet>& set, std::uint64_t file_bytes) {
+  const auto range = parse_range(options.range);
+  if (!range) return tl::unexpected(range.error());
+  const auto volume = *range ? enclosed_volume(set, **range) : Result<double>(0);
+  if (!volume) return tl::unexpected(volume.error());
+  const double share = *volume / box_volume(set->description().grid);
+  if (options.json) {
+    auto stats = stats_of(*set, file_bytes);
+    if (*range) {
+      stats["enclosed_volume"] = *volume;
+      stats["enclosed_share"] = share;
     }
-    std::string text = text_of(*set, options.file);
-    if (*range)
-      text += fmt::format("range [{:g}, {:g}]: volume {:.6g}, {:.4g} % of the box\n", (*range)->alpha, (*range)->beta, *volume, 100 * share);
-    return print(text);
+    return print_json(stats);
   }
-};
-
-// The data set of a file. faults: as of decode_ivm().
-template <class Use>
-Result<void> with_data_set(const std::string& file, const ParallelFor& parallel, PageFaults* faults, const Use& use) {
-  return is_value_file(file) ? load_values(file, parallel, faults).and_then(use) : load_ivm(file, parallel, faults).and_then(use);
+  std::string text = text_of(*set, file_bytes);
+  if (*range) text += fmt::format("range [{:g}, {:g}]: volume {:.6g}, {:.4g} % of the box\n", (*range)->alpha, (*range)->beta, *volume, 100 * share);
+  return print(text);
 }
 
-struct Verify {
-  template <class DataSet>
-  Result<void> operator()(const InfoCommand& options, const std::shared_ptr<const DataSet>& set) const {
-    if (auto valid = validate(*set); !valid) return fail(options.file + ": " + valid.error().message);
-    if (options.json) return print_json({{"file", options.file}, {"valid", true}, {"updates", size_of(*set)}});
-    return print(printable(options.file) + ": all checksums and invariants hold (" + std::to_string(size_of(*set)) + " updates)\n");
-  }
-};
+template <class DataSet>
+Result<void> verify_data_set(const InfoCommand& options, const std::shared_ptr<const DataSet>& set) {
+  const std::string shown = shown_url(options.file);
+  if (auto valid = validate(*set); !valid) return fail(shown + ": " + valid.error().message);
+  if (options.json) return print_json({{"file", shown}, {"valid", true}, {"updates", size_of(*set)}});
+  return print(printable(shown) + ": all checksums and invariants hold (" + std::to_string(size_of(*set)) + " updates)\n");
+}
+
+// Of a file: use(the data set, the file's bytes). faults: as of decode_ivm().
+template <class Use>
+Result<void> with_local(const std::string& file, const ParallelFor& parallel, PageFaults* faults, const Use& use) {
+  const auto use_set = [&](const auto& set) { return use(set, file_size_of(file)); };
+  return is_value_file(file) ? load_values(file, parallel, faults).and_then(use_set) : load_ivm(file, parallel, faults).and_then(use_set);
+}
+
+// The same, of a URL.
+template <class Use>
+Result<void> with_remote(const InfoCommand& options, const ParallelFor& parallel, PageFaults* faults, const Use& use) {
+  const auto url = parse_remote_url(options.file);
+  if (!url) return tl::unexpected(url.error());
+  const auto access = read_access(options.remote);
+  if (!access) return tl::unexpected(access.error());
+  auto contents = read_remote(*url, *access, {}, parallel);
+  if (!contents) return tl::unexpected(contents.error());
+  auto& bytes = contents->bytes;
+  const std::uint64_t file_bytes = bytes.size();
+  const auto use_set = [&](auto set) -> Result<void> {
+    bytes = {};
+    if (!set) return fail(url->shown + ": " + set.error().message);
+    return use(std::make_shared<const typename decltype(set)::value_type>(std::move(*set)), file_bytes);
+  };
+  if (scope_of(bytes) == FileScope::every_range) return use_set(decode_values(bytes, url->name, parallel, kAnyRoom, faults));
+  return use_set(decode_ivm(bytes, url->name, parallel, kAnyRoom, faults));
+}
+
+template <class Use>
+Result<void> with_data_set(const InfoCommand& options, const ParallelFor& parallel, PageFaults* faults, const Use& use) {
+  return is_remote_url(options.file) ? with_remote(options, parallel, faults, use) : with_local(options.file, parallel, faults, use);
+}
 
 const char* name_of(Encoding encoding) {
   switch (encoding) {
@@ -165,45 +189,64 @@ Result<void> print_input(const InfoCommand& options, const VolumeHeader& header,
   return print(text);
 }
 
-template <class Command>
-void add(Program& program, const char* name, const char* description) {
-  const auto options = std::make_shared<InfoCommand>();
-  const auto run = [options](const auto& set) { return Command()(*options, set); };
-  CLI::App& command = program.add_command(name, description, [options, run]() -> Result<void> {
-    if constexpr (std::is_same_v<Command, Info>) {
-      const NamedVolume volume = named_volume(options->file, options->part);
-      const auto header = read_volume_header(volume.path, volume.part);
-      if (header && *header) return print_input(*options, **header, volume.part.has_value());
-      if (!header) return tl::unexpected(header.error());
-      if (!begins_as_ivm(options->file) && std::filesystem::path(options->file).extension() != ".ivm")
-        return fail(in_quotes(options->file) + " is neither an interval volume (.ivm) nor " + kVolumeFormats);
-    }
-    if constexpr (std::is_same_v<Command, Verify>) {
-      std::optional<Progress> progress("verifying " + printable(options->file));
-      PageFaults faults;
-      return with_data_set(options->file, with_progress(*progress, on_all_cores), &faults, [&](const auto& set) -> Result<void> {
-        progress.reset();
-        return faults.any() ? fail(options->file + ": " + to_text(faults)) : run(set);
-      });
-    }
-    return with_data_set(options->file, on_all_cores, nullptr, run);
-  });
-  constexpr bool is_info = std::is_same_v<Command, Info>;
-  command.add_option("FILE", options->file, is_info ? "Interval volume (.ivm), or a volume or folder that build reads" : "Interval volume (.ivm)")
-      ->required();
-  if constexpr (is_info) {
-    command.add_option("--part,--series", options->part, "Which volume of a file or folder with several")->type_name("NAME");
-    add_range_option(command, options->range, "Print the volume that this closed range of values encloses, too: numbers, -inf or inf");
+// A volume that build reads; true: printed. Anything else may be a data set.
+Result<bool> print_if_input(const InfoCommand& options) {
+  const NamedVolume volume = named_volume(options.file, options.part);
+  const auto header = read_volume_header(volume.path, volume.part);
+  if (!header) return tl::unexpected(header.error());
+  if (*header) return print_input(options, **header, volume.part.has_value()).map([] { return true; });
+  if (!begins_as_ivm(options.file) && std::filesystem::path(options.file).extension() != ".ivm")
+    return fail(in_quotes(options.file) + " is neither an interval volume (.ivm) nor " + kVolumeFormats);
+  return false;
+}
+
+Result<void> run_info(const InfoCommand& options) {
+  if (const auto range = parse_range(options.range); !range) return tl::unexpected(range.error());
+  if (is_remote_url(options.file)) {
+    if (options.part) return misuse("--part belongs to a volume in a file or folder, and a URL names a data set (.ivm)");
+  } else {
+    const auto printed = print_if_input(options);
+    if (!printed) return tl::unexpected(printed.error());
+    if (*printed) return {};
   }
-  add_json_flag(command, options->json);
+  return with_data_set(options, on_all_cores, nullptr,
+                       [&](const auto& set, std::uint64_t file_bytes) { return print_data_set(options, set, file_bytes); });
+}
+
+Result<void> run_verify(const InfoCommand& options) {
+  std::optional<Progress> progress("verifying " + printable(shown_url(options.file)));
+  PageFaults faults;
+  return with_data_set(options, with_progress(*progress, on_all_cores), &faults, [&](const auto& set, std::uint64_t) -> Result<void> {
+    progress.reset();
+    return faults.any() ? fail(shown_url(options.file) + ": " + to_text(faults)) : verify_data_set(options, set);
+  });
+}
+
+void add_shared_options(CLI::App& command, InfoCommand& options) {
+  add_remote_options(command, options.remote);
+  add_remote_authorities_option(command, options.remote);
+  add_json_flag(command, options.json);
 }
 
 }  // namespace
 
 void add_info_command(Program& program) {
-  add<Info>(program, "info", "Print dimensions, values or range, counts and sizes of a data set, or what is in a volume");
+  const auto options = std::make_shared<InfoCommand>();
+  CLI::App& command = program.add_command("info", "Print dimensions, values or range, counts and sizes of a data set, or what is in a volume",
+                                          [options] { return run_info(*options); });
+  command.add_option("FILE", options->file, "Interval volume (.ivm), or its URL (https://, http://), or a volume or folder that build reads")
+      ->required();
+  command.add_option("--part,--series", options->part, "Which volume of a file or folder with several")->type_name("NAME");
+  add_range_option(command, options->range, "Print the volume that this closed range of values encloses, too: numbers, -inf or inf");
+  add_shared_options(command, *options);
 }
 
-void add_verify_command(Program& program) { add<Verify>(program, "verify", "Check every checksum and every invariant of a data set"); }
+void add_verify_command(Program& program) {
+  const auto options = std::make_shared<InfoCommand>();
+  CLI::App& command =
+      program.add_command("verify", "Check every checksum and every invariant of a data set", [options] { return run_verify(*options); });
+  command.add_option("FILE", options->file, "Interval volume (.ivm), or its URL (https://, http://)")->required();
+  add_shared_options(command, *options);
+}
 
 }  // namespace intervale

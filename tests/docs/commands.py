@@ -56,6 +56,8 @@ NOT_RUN = {
     "docker compose -f deploy/compose.yaml up -d --no-deps server-b": NEEDS_DOCKER,
     "intervale serve https://data.example.org/scans/scan.ivm": NO_SUCH_HOST,
     "intervale extract https://data.example.org/scans/scan.ivm --error-percent 5 -o coarse.vtu": NO_SUCH_HOST,
+    "intervale info https://data.example.org/scans/scan.ivm": NO_SUCH_HOST,
+    "intervale verify https://data.example.org/scans/scan.ivm": NO_SUCH_HOST,
     "intervale serve https://scans.s3.eu-west-1.amazonaws.com/scan.ivm --aws-sign --aws-region eu-west-1": NO_SUCH_HOST,
     "intervale-client fetch https://data.example.org/scans/scan.ivm --error-percent 5 -o coarse.vtu": NO_SUCH_HOST,
     "kubectl apply -k deploy/k8s": "needs a cluster; deploy/check reads the configuration with kubectl",

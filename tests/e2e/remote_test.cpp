@@ -43,6 +43,52 @@ TEST(Remote, AFileOnAWebServerIsServedAndFetchedAsALocalOne) {
   EXPECT_EQ(digest_of({program("intervale"), "extract", web.url()}, {}), digest_of({program("intervale"), "extract", buckyball()}, {}));
 }
 
+TEST(Remote, InfoAndVerifyTellWhatTheyTellOfALocalFile) {
+  const TempDir folder;
+  const std::string volume = folder / "small.nrrd", every = folder / "scan.ivm";
+  ASSERT_EQ(run({program("intervale"), "sample", "buckyball", "--size", "33", "-o", volume}).status, 0);
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", every}).status, 0);
+  for (const std::string& file : {buckyball().string(), every}) {
+    const FileServer web(contents_of(file));
+    const std::string name = std::filesystem::path(file).filename(), url = web.url("/scans/" + name + "?signature=secret");
+    for (const Arguments& more : {Arguments{}, {"--json"}, {"--range", "128", "188"}}) {
+      const Finished local = run(Arguments{program("intervale"), "info", file} + more),
+                     remote = run(Arguments{program("intervale"), "info", url} + more);
+      EXPECT_EQ(remote.status, 0) << remote.err;
+      EXPECT_EQ(remote.out, local.out);
+    }
+    const auto verified = json_of(run({program("intervale"), "verify", url, "--json"}));
+    EXPECT_EQ(verified.at("file"), web.url("/scans/" + name));
+    EXPECT_EQ(verified.at("updates"), json_of(run({program("intervale"), "verify", file, "--json"})).at("updates"));
+    EXPECT_THAT(run({program("intervale"), "verify", url}).out, AllOf(HasSubstr("all checksums"), Not(HasSubstr("secret"))));
+  }
+}
+
+TEST(Remote, InfoAndVerifySendHeadersAndRefuseInOneLine) {
+  FileServer web(contents_of(buckyball()));
+  web.misbehave([](const FileRequest& request, std::size_t, FileAnswer& answer) {
+    if (request.header("authorization") != "Bearer of-the-file") answer = {.status = 401};
+  });
+  const TempDir folder;
+  const std::string headers = folder.file("headers", "Authorization: Bearer of-the-file\n").string();
+  std::string damaged = contents_of(buckyball());
+  damaged[damaged.size() / 2] ^= 1;
+  const FileServer broken(damaged), page("<!doctype html>" + std::string(1 << 20, ' '));
+  for (const std::string command : {"info", "verify"}) {
+    const Arguments begin{program("intervale"), command};
+    expect_complaint(run(begin + Arguments{web.url()}), 1, "401", "intervale: ");
+    json_of(run(begin + Arguments{web.url(), "--json", "--header-file", headers}));
+    expect_complaint(run(begin + Arguments{broken.url("/x.ivm?secret")}), 1, broken.url("/x.ivm: "), "intervale: ");
+    expect_complaint(run(begin + Arguments{page.url("/volume.nrrd")}), 1, page.url("/volume.nrrd: not an interval volume"), "intervale: ");
+    expect_complaint(run(begin + Arguments{"http://localhost/"}), 2, "invalid URL", "intervale: ");
+    expect_complaint(run({"/usr/bin/env", "-u", "AWS_ACCESS_KEY_ID", program("intervale"), command, web.url(), "--aws-sign"}), 2, "AWS_ACCESS_KEY_ID",
+                     "intervale: ");
+  }
+  for (const FileRequest& request : page.requests()) EXPECT_EQ(request.header("range"), "bytes=0-65535");
+  EXPECT_EQ(page.requests().size(), 2U);
+  expect_complaint(run({program("intervale"), "info", web.url(), "--part", "one"}), 2, "--part", "intervale: ");
+}
+
 TEST(Remote, FetchSaysThatThereIsNoServer) {
   const FileServer web(contents_of(buckyball()));
   const TempDir folder;
