@@ -1,8 +1,6 @@
 // Replicas behind a real balancer, with the configuration that deploy/ has for it. A session's whole state is what its
 // client brings, so the one takes over from the other.
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,12 +11,12 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "client/net/http_get.h"
 #include "client/net/url.h"
+#include "tests/support/free_ports.h"
 #include "tests/support/programs.h"
 #include "tests/support/serving.h"
 
@@ -30,25 +28,6 @@ std::optional<std::string> haproxy() {
     if (::access(path, X_OK) == 0) return path;
   }
   return {};
-}
-
-// Ports of 127.0.0.1 that nobody has now.
-template <std::size_t count>
-std::array<std::uint16_t, count> free_ports() {
-  std::array<std::uint16_t, count> ports{};
-  std::array<int, count> sockets{};
-  for (std::size_t i = 0; i < count; ++i) {
-    sockets[i] = ::socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    if (::bind(sockets[i], reinterpret_cast<sockaddr*>(&address), size) != 0) throw std::runtime_error("no free port");
-    ::getsockname(sockets[i], reinterpret_cast<sockaddr*>(&address), &size);
-    ports[i] = ntohs(address.sin_port);
-  }
-  for (const int socket : sockets) ::close(socket);
-  return ports;
 }
 
 std::string loopback(std::uint16_t port) { return "127.0.0.1:" + std::to_string(port); }
