@@ -85,14 +85,15 @@ test('a file is shown in any range, beside the data sets of the server, and with
   await close();
 });
 
-// The page and a file on a server that knows neither. Returns its address.
+// The page and the files on a server that knows neither, and lets pages of every origin read them. Returns its address.
 async function serveFolders() {
   const types = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.svg': 'image/svg+xml', '.wasm': 'application/wasm' };
   const files = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://x').pathname));
     try {
       const body = readFileSync(path.startsWith('/data/') ? join(folder, path.slice(6)) : join(process.env.INTERVALE_VIEWER_OUT, path));
-      response.writeHead(200, { 'content-type': types[extname(path)] ?? 'application/octet-stream' }).end(body);
+      const type = types[extname(path)] ?? 'application/octet-stream';
+      response.writeHead(200, { 'content-type': type, 'access-control-allow-origin': '*' }).end(body);
     } catch {
       response.writeHead(404).end();
     }
@@ -114,6 +115,24 @@ test('a plain web server is enough: the address names the file, and the view of 
   assert.match(await bannerOf(page, 'none.ivm'), /was not received: the server responded with status 404/);
   await choose(page, pathOf('gyroid'), 'gyroid');
   await close();
+});
+
+test('the served page shows files of the origins that --connect-origin names, and of no other', async () => {
+  const address = await serveFolders();
+  const query = `?file=${address}/data/any.ivm#data=any&range=20,60&roi=${[...kWhole.min, ...kWhole.max]}`;
+  const mine = await serve(folder, 0, '--connect-origin', address);
+  const allowed = await open(browser, mine.url + query, kSmall);
+  await settled(allowed.page);
+  const { digest, tets } = await digestOf(allowed.page);
+  const native = nativeOf('any', [20, 60]);
+  assert.deepEqual([digest, tets], [native.digest, native.tets]);
+  assert.deepEqual(allowed.errors, []);
+  await allowed.close();
+  await mine.kill();
+  const refused = await open(browser, server.url + query, kSmall);
+  assert.match(await bannerOf(refused.page, 'any.ivm'), /cannot be reached, or this page may not read it: .*--connect-origin/);
+  assert.ok(refused.errors.some((error) => /Content Security Policy/.test(error)), refused.errors.join('; '));
+  await refused.close();
 });
 
 test('a dropped file goes on when the server is gone; budgets and cameras are obeyed', async () => {

@@ -41,7 +41,7 @@ export async function download(address: string, told: (bytes: number) => void): 
   const url = new URL(address, document.baseURI);
   const name = decodeURIComponent(url.pathname.slice(url.pathname.lastIndexOf('/') + 1));
   const response = await fetch(url).catch(() => null);
-  if (!response) throw new Error(`${url.href} cannot be reached, or its server does not allow this page to read it.`);
+  if (!response) throw new Error(`${url.href} cannot be reached, or this page may not read it: its server (Access-Control-Allow-Origin) or the page's (--connect-origin) does not allow that.`);
   if (!response.ok || !response.body) throw new Error(`${url.href} was not received: the server responded with status ${response.status}.`);
   const chunks: Uint8Array<ArrayBuffer>[] = [];
   let bytes = 0;
