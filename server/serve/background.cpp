@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/parallel/all_cores.h"
+#include "server/serve/thread_time.h"
 
 namespace intervale {
 
@@ -49,9 +50,9 @@ void Background::serve(const std::stop_token& stop) {
     }
     work->is_busy = true;
     lock.unlock();
-    const auto since = FairScheduler::Clock::now();
+    const auto since = thread_time();
     const bool has_more = work->slice(work->held);
-    scheduler_.charge(*work->payer, FairScheduler::Clock::now() - since);
+    scheduler_.charge(*work->payer, thread_time() - since);
     lock.lock();
     work->is_busy = false;
     if (has_more) continue;

@@ -1,21 +1,11 @@
 #include "server/serve/connection_executor.h"
 
 #include <boost/asio/executor_work_guard.hpp>
-#include <chrono>
-#include <ctime>
 
 #include "common/parallel/all_cores.h"
+#include "server/serve/thread_time.h"
 
 namespace intervale {
-namespace {
-
-FairScheduler::Time thread_time() {
-  timespec time{};
-  (void)::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);  // does not fail on Linux
-  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
-}
-
-}  // namespace
 
 void ConnectionPayer::set(std::shared_ptr<FairScheduler::Account> account) {
   account_ = accounts_.emplace_back(std::move(account)).get();  // the one before may be in use by a Charge

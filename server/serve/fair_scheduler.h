@@ -25,8 +25,8 @@ namespace intervale {
 // Any thread. Among accounts, fair share scheduling (J. Kay and P. Lauder, "A Fair Share Scheduler", 1988): the worker goes
 // to the account that spent least, where what was spent counts half after kHalfLife. So whoever has just come is served
 // before those who have had much. Accounts that spent the same up to a factor of two take turns. Among the sessions of one account, interactive work
-// is scheduled by start-time fair queueing (P. Goyal, H. M. Vin and H. Cheng, "Start-Time Fair Queuing", 1996), with the measured time of a piece of
-// work as its length; bulk work is first come, first served.
+// is scheduled by start-time fair queueing (P. Goyal, H. M. Vin and H. Cheng, "Start-Time Fair Queuing", 1996), with the processor time of a
+// piece of work as its length; bulk work is first come, first served.
 class FairScheduler {
   struct Waiter;
   using BulkQueue = std::list<Waiter>;

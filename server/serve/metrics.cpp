@@ -74,7 +74,7 @@ Metrics::Metrics()
       updates_sent_total(counter(registry_, "intervale_updates_sent_total", "Updates sent.")),
       bytes_sent_total(counter(registry_, "intervale_bytes_sent_total", "Bytes of streaming messages sent.")),
       faults_total(counter(registry_, "intervale_session_faults_total", "Sessions closed because of a fault of the client.")),
-      selection_(histogram(registry_, "intervale_selection_seconds", "Time to select and encode one message.", kSelectionSeconds)),
+      selection_(histogram(registry_, "intervale_selection_seconds", "Processor time to select and encode one message.", kSelectionSeconds)),
       first_mesh_(histogram(registry_, "intervale_first_mesh_seconds", "From a session's first view until the first message for it is sent.",
                             kAnswerSeconds)),
       view_change_(

@@ -17,6 +17,7 @@
 #include "server/serve/admission.h"
 #include "server/serve/log.h"
 #include "server/serve/session_threads.h"
+#include "server/serve/thread_time.h"
 #include "server/serve/view_timing.h"
 
 namespace intervale {
@@ -39,7 +40,7 @@ constexpr std::chrono::milliseconds kFaultCost{100};
 // Work for a view that goes before that of other sessions: until its first message, but not for longer.
 constexpr std::chrono::milliseconds kUrgentWork{10};
 // Payloads while other sessions wait for a worker: the first of a view, and the others.
-constexpr std::size_t kContendedFirstPayload = 4 << 10, kContendedPayload = 16 << 10;
+constexpr std::size_t kContendedFirstPayload = 1 << 10, kContendedPayload = 16 << 10;
 
 bool breaks_rules(CloseCode code) {
   return code == CloseCode::text_frame || code == CloseCode::malformed || code == CloseCode::out_of_order || code == CloseCode::too_large;
@@ -219,9 +220,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   // Work of the reader; releases the worker, if it has one.
   struct ReadingWork {
     WebSocketSession& session;
-    Clock::time_point since = Clock::now();
+    FairScheduler::Time since = thread_time();
     ~ReadingWork() {
-      session.unscheduled_ += Clock::now() - since;
+      session.unscheduled_ += thread_time() - since;
       const auto worker = std::exchange(session.reader_worker_, std::nullopt);
       if (worker)
         session.context_.scheduler.release(session.flow_, worker->first, worker->second, std::exchange(session.unscheduled_, Clock::duration(0)));
@@ -242,8 +243,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     FairScheduler::Flow& flow;
     FairScheduler::Lane lane;
     FairScheduler::Priority priority;
-    Clock::time_point since = Clock::now();
-    ~ScheduledWork() { scheduler.release(flow, lane, priority, Clock::now() - since); }
+    FairScheduler::Time since = thread_time();
+    ~ScheduledWork() { scheduler.release(flow, lane, priority, thread_time() - since); }
   };
 
   void receive(const protocol::ClientMessage& message) {
@@ -319,7 +320,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     const bool has_waiters = context_.scheduler.has_waiters();
     auto message = state_.next(!has_waiters ? protocol::kMaxBatchPayload : state_.view_is_unanswered() ? kContendedFirstPayload : kContendedPayload);
     memory_.resize(state_.memory_bytes());
-    const auto time = Clock::now() - work.since;
+    const auto time = thread_time() - work.since;
     timing_.add_work(time);
     context_.metrics.observe_selection(time);
     return message;
