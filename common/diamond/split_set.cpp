@@ -34,36 +34,32 @@ std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return extract_p
 }  // namespace
 
 void SplitSet::insert_bits(std::uint32_t w, std::uint64_t bits) {
-  std::uint32_t& page = page_[w / kPageWords];
-  if (page == 0) {
-    page = std::uint32_t(words_.size() / kPageWords);
-    words_.resize(words_.size() + kPageWords);
+  for (std::size_t chunk = std::size_t(w) * 2; bits != 0; ++chunk, bits >>= 32) {
+    if (const auto added = std::uint32_t(bits)) chunks_.update(chunk, [added](std::uint32_t had) { return had | added; });
   }
-  words_[std::size_t(page) * kPageWords + w % kPageWords] |= bits;
 }
 
 void SplitSet::erase_bits(std::uint32_t w, std::uint64_t bits) {
-  const std::uint32_t page = page_[w / kPageWords];
-  if (page != 0) words_[std::size_t(page) * kPageWords + w % kPageWords] &= ~bits;
+  for (std::size_t chunk = std::size_t(w) * 2; bits != 0; ++chunk, bits >>= 32) {
+    if (const auto had = chunks_.find(chunk)) chunks_.set(chunk, *had & ~std::uint32_t(bits));
+  }
 }
 
 void SplitSet::insert_all() {
-  words_.assign((page_.size() + 1) * kPageWords, ~std::uint64_t(0));
-  std::fill_n(words_.begin(), kPageWords, 0);
-  for (std::uint32_t page = 0; page < page_.size(); ++page) page_[page] = page + 1;
+  for (std::size_t chunk = 0; chunk < chunks_.size(); ++chunk) chunks_.set(chunk, ~std::uint32_t(0));
 }
 
 bool operator==(const SplitSet& a, const SplitSet& b) {
-  if (a.page_.size() != b.page_.size()) return false;
-  for (std::uint32_t w = 0; w < a.page_.size() * SplitSet::kPageWords; ++w) {
-    if (a.word(w) != b.word(w)) return false;
+  if (a.chunks_.size() != b.chunks_.size()) return false;
+  for (std::size_t chunk = 0; chunk < a.chunks_.size(); ++chunk) {
+    if (a.chunks_.get(chunk) != b.chunks_.get(chunk)) return false;
   }
   return true;
 }
 
 std::uint64_t SplitSet::count() const {
   std::uint64_t n = 0;
-  for (std::uint64_t w : words_) n += std::uint64_t(std::popcount(w));
+  chunks_.for_each([&n](std::uint32_t bits) { n += std::uint64_t(std::popcount(bits)); });
   return n;
 }
 
@@ -92,10 +88,7 @@ std::vector<SlotGroup> SplitSet::groups(const SupercubeSet& set) const {
   std::vector<SlotGroup> groups;
   const auto bricks = set.bricks();
   for (BrickIndex b{0}; b < bricks.size(); ++b) {
-    const std::uint32_t first = bricks[b].first, end = b + 1 < bricks.size() ? bricks[b + 1].first : set.size();
-    bool is_empty = true;
-    for (std::uint32_t w = first / 64; w < (end + 63) / 64 && is_empty; ++w) is_empty = word(w) == 0;
-    if (is_empty) continue;
+    if (is_untouched(bricks[b].first, set.updates(b))) continue;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       if (const std::uint64_t some = slots(set.first(b, s), set.occupancy()[s])) groups.push_back({b, s, key, some});
     });

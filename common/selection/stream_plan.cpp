@@ -81,8 +81,8 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
     pending.slope = std::uint8_t(relevant_->brick_slope(b));
     pending.object_error = Up16(relevant_->brick_object_error(b));
   }
-  steps_page_.assign(set.supercubes() / kStepsPage + 1, 0);
-  steps_.assign(kStepsPage, {});
+  highest_steps_ = SparseArray<std::uint16_t>(set.supercubes());
+  highest_distances_ = SparseArray<std::uint8_t>(relevant_->has_distances() ? set.supercubes() : 0);
 }
 
 StreamPlan::Highest StreamPlan::of_update(UpdateIndex i) const {
@@ -94,21 +94,16 @@ StreamPlan::Highest StreamPlan::of_relevant(SupercubeIndex s) const {
 }
 
 StreamPlan::Highest StreamPlan::highest(SupercubeIndex s) const {
-  const std::uint32_t page = steps_page_[s / kStepsPage];
-  return page == 0 ? of_relevant(s) : steps_[std::size_t(page) * kStepsPage + s % kStepsPage];
+  const auto steps = highest_steps_.find(s);
+  if (!steps) return of_relevant(s);
+  const std::uint8_t distance = relevant_->has_distances() ? highest_distances_.find(s).value_or(0) : std::uint8_t(0);
+  return {std::uint8_t(*steps >> 8), distance, std::uint8_t(*steps)};
 }
 
 void StreamPlan::set_highest(SupercubeIndex s, Highest to) {
-  if (to == highest(s)) return;
-  std::uint32_t& page = steps_page_[s / kStepsPage];
-  if (page == 0) {
-    page = std::uint32_t(steps_.size() / kStepsPage);
-    const std::size_t first = std::size_t(s) - s % kStepsPage;
-    const auto end = std::min<std::size_t>(relevant_->supercube_error_steps().size(), first + kStepsPage);
-    steps_.resize((page + 1) * std::size_t(kStepsPage));
-    for (std::size_t i = first; i < end; ++i) steps_[page * std::size_t(kStepsPage) + i - first] = of_relevant(SupercubeIndex(std::uint32_t(i)));
-  }
-  steps_[std::size_t(page) * kStepsPage + s % kStepsPage] = to;
+  if (!highest_steps_.find(s) && to == of_relevant(s)) return;
+  highest_steps_.set(s, std::uint16_t(to.error_step << 8 | to.slope));
+  if (relevant_->has_distances()) highest_distances_.set(s, to.distance);
 }
 
 bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
@@ -354,20 +349,25 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const Place& place,
   const UpdateIndex first = place.index;
   const std::uint64_t occupancy = volume_->set().occupancy()[place.supercube];
   SlotGroup in_it{place.brick, place.supercube, place.key, 0};
+  Highest highest;  // in registers, like all that this loop changes
+  unsigned wanted = 0;
   float greatest = 0;
+  auto number = set_bits(candidates).begin();
   // Without branches on what is in the band: that is hard to foresee.
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
-    const UpdateIndex i = first + count_below(occupancy, slot);
-    const Highest own = of_update(i);
+    const Highest own = of_update(first + *number);
+    ++number;
     float importance = ranking.importance(own.error_step, own.distance, own.slope);
     if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;
     importance = std::max(importance, least);
     const bool is_in_it = importance > 0 && importance >= in_band;
     in_it.slots |= std::uint64_t(is_in_it) << slot;
-    rest.highest.raise(is_in_it ? Highest{} : own);
-    rest.wanted += unsigned(importance > 0) & unsigned(!is_in_it);
+    highest.raise(is_in_it ? Highest{} : own);
+    wanted += unsigned(importance > 0) & unsigned(!is_in_it);
     greatest = std::max(greatest, is_in_it ? 0 : importance);
   }
+  rest.highest = highest;
+  rest.wanted = wanted;
   rest.rank = ranking.rank(greatest);
   if (in_it.slots == 0 || add_all(in_it, builder)) return true;
   builder.around.move_to(place.key);  // the batch is nearly full: one at a time

@@ -21,6 +21,7 @@
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ranking.h"
 #include "common/util/bits.h"
+#include "common/util/sparse_array.h"
 #include "common/view/lod.h"
 
 namespace intervale {
@@ -37,8 +38,9 @@ struct Batch {
 inline constexpr std::size_t kFirstPayload = 4 << 10;
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
-// brick, and where something was sent a bit for each update (two with max_updates, one more for each channel) and three
-// bytes for each supercube.
+// brick; for each 32 updates of which one was sent four bytes and a little more (eight with max_updates, four more for
+// each channel); for each supercube whose unsent updates matter less than all of it two bytes, or three if distances are
+// known.
 class StreamPlan {
  public:
   // At first everything that the range of the data set needs is relevant.
@@ -168,10 +170,11 @@ class StreamPlan {
   SplitSet sent_;
   std::vector<Pending> pending_;  // by brick
   std::vector<bool> is_loose_;    // by brick: its rank may be much too high; see refine()
-  // By supercube: bounds on its unsent updates, in pages of 64 supercubes. Page 0: as if none were sent.
-  static constexpr std::uint32_t kStepsPage = 64;
-  std::vector<std::uint32_t> steps_page_;
-  std::vector<Highest> steps_;
+  std::vector<bool> is_loose_;    // by brick: its rank may be much too high; see refine()
+  // Highest of supercubes, where it is not that of their relevant updates: error step * 256 + slope; and distance, if
+  // distances are known.
+  SparseArray<std::uint16_t> highest_steps_;
+  SparseArray<std::uint8_t> highest_distances_;
   std::vector<SentChannel> channels_;         // of the data set
   std::vector<std::size_t> wanted_channels_;  // ascending
   std::uint32_t next_lacking_ = 0;            // bricks before this one lack no value that is wanted

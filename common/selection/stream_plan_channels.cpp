@@ -100,7 +100,7 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
 
 std::size_t StreamPlan::memory_bytes() const {
   std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
-  bytes += pending_.capacity() * sizeof(Pending) + steps_page_.capacity() * sizeof steps_page_[0] + steps_.capacity() * sizeof steps_[0];
+  bytes += pending_.capacity() * sizeof(Pending) + highest_steps_.memory_bytes() + highest_distances_.memory_bytes();
   if (ranking_) bytes += ranking_->memory_bytes();
   for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
   return bytes;

@@ -152,18 +152,38 @@ TEST_P(Select, InOrderParentsComeFirstAndErrorsDoNotAscend) {
 INSTANTIATE_TEST_SUITE_P(Shapes, Select, ::testing::Range(0u, 10u));
 
 TEST(SplitSetLaws, HoldsWhatWasPutInAndNothingElse) {
+  constexpr std::uint32_t kSize = 20000;
   std::mt19937 random(3);
-  SplitSet set(1000);
-  std::vector<bool> model(1000);
-  for (int i = 0; i < 5000; ++i) {
-    const auto n = UpdateIndex(random() % 1000);
-    if (random() % 2 == 0)
-      set.insert(n), model[n] = true;
-    else
-      set.erase(n), model[n] = false;
+  SplitSet set(kSize);
+  std::vector<bool> model(kSize), touched(kSize / 32);
+  for (const std::uint32_t below : {1000u, kSize}) {  // dense and sparse parts
+    for (int i = 0; i < 5000; ++i) {
+      const auto n = UpdateIndex(random() % below);
+      if (random() % 2 == 0)
+        set.insert(n), model[n] = true, touched[n / 32] = true;
+      else
+        set.erase(n), model[n] = false;
+    }
   }
-  for (UpdateIndex n{0}; n < 1000; ++n) EXPECT_EQ(set.contains(n), model[n]);
+  for (UpdateIndex n{0}; n < kSize; ++n) EXPECT_EQ(set.contains(n), model[n]);
   EXPECT_EQ(set.count(), std::uint64_t(std::count(model.begin(), model.end(), true)));
+  for (int i = 0; i < 5000; ++i) {
+    const unsigned count = 1 + random() % 64;
+    const auto first = UpdateIndex(random() % (kSize - count));
+    std::uint64_t some = 0;
+    bool is_untouched = true;
+    for (unsigned k = 0; k < count; ++k) {
+      some |= std::uint64_t(model[first + k]) << k;
+      is_untouched = is_untouched && !touched[(first + k) / 32];
+    }
+    EXPECT_EQ(set.some(first, count), some);
+    EXPECT_EQ(set.is_untouched(first, count), is_untouched);
+  }
+  SplitSet other = set;
+  EXPECT_EQ(other, set);
+  const auto n = UpdateIndex(random() % kSize);
+  model[n] ? other.erase(n) : other.insert(n);
+  EXPECT_NE(other, set);
 }
 
 }  // namespace
