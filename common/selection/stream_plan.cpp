@@ -106,54 +106,6 @@ void StreamPlan::set_highest(SupercubeIndex s, Highest to) {
   if (relevant_->has_distances()) highest_distances_.set(s, to.distance);
 }
 
-bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
-  const SupercubeSet& set = volume_->set();
-  const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
-  if (!found || (slots & ~set.occupancy()[found->supercube]) != 0) return false;
-  const std::uint64_t occupancy = set.occupancy()[found->supercube];
-  const UpdateIndex first = set.first(found->brick, found->supercube);
-  const std::uint64_t added = slots & ~sent_.slots(first, occupancy);
-  if (added == 0) return true;
-  sent_.insert(first, occupancy, added);
-  sent_count_ += std::uint64_t(std::popcount(added));
-  std::uint16_t& unsent = pending_[found->brick].unsent;
-  unsent = std::uint16_t(unsent - std::popcount(added & relevant_->slots(found->supercube, occupancy)));
-  return true;
-}
-
-bool StreamPlan::forget(std::span<const SlotGroup> groups) {
-  const SupercubeSet& set = volume_->set();
-  for (const SlotGroup& g : groups) {
-    const auto found = set.find_supercube(scale_of_key(g.key), position_of_key(g.key));
-    if (!found || (g.slots & ~set.occupancy()[found->supercube]) != 0) return false;
-  }
-  SetNeighbours around(set);
-  const auto sent_slots = [this](const SetFinder::Found& found) { return found.occupancy == 0 ? 0 : sent_.slots(found.first, found.occupancy); };
-  merge_finest_first(groups, around, sent_slots, [&](const SlotGroup& g, Slot slot) {
-    const SetFinder::Found& here = around.at(kHere);
-    const UpdateIndex i = here.index(slot);
-    sent_.erase(i);
-    --sent_count_;
-    for (SentChannel& channel : channels_) {
-      if (channel.count == 0 || !channel.held.contains(i)) continue;
-      channel.held.erase(i);
-      --channel.count;
-    }
-    if ((relevant_->slots(here.supercube, here.occupancy) >> slot & 1) == 0) return;
-    Pending& pending = pending_[here.brick];
-    ++pending.unsent;
-    const Highest again = of_update(i);
-    pending.error_step = std::max(pending.error_step, again.error_step);
-    pending.slope = std::max(pending.slope, again.slope);
-    pending.object_error =
-        Up16(std::max(float(pending.object_error), relevant_->object_error(here.supercube, scale_of_key(g.key), again.error_step, again.distance)));
-    Highest highest = this->highest(here.supercube);
-    highest.raise(again);
-    set_highest(here.supercube, highest);
-  });
-  return true;
-}
-
 void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* ahead) {
   if (searched_ != lod) {
     searched_ = lod;

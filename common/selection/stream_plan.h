@@ -170,7 +170,6 @@ class StreamPlan {
   SplitSet sent_;
   std::vector<Pending> pending_;  // by brick
   std::vector<bool> is_loose_;    // by brick: its rank may be much too high; see refine()
-  std::vector<bool> is_loose_;    // by brick: its rank may be much too high; see refine()
   // Highest of supercubes, where it is not that of their relevant updates: error step * 256 + slope; and distance, if
   // distances are known.
   SparseArray<std::uint16_t> highest_steps_;

@@ -119,7 +119,7 @@ class SparseArray {
     return (kHead + elements * sizeof(T) + kPast + kAllocator + 15) / 16 * 16 - kAllocator;
   }
   [[nodiscard]] static Block copy_of(const Block& block, std::size_t bytes, std::size_t elements) {
-    auto copy = std::make_unique_for_overwrite<std::byte[]>(bytes);
+    Block copy(new std::byte[bytes]);  // the browser's library lacks std::make_unique_for_overwrite
     if (block)
       std::copy_n(block.get(), kHead + elements * sizeof(T), copy.get());
     else
