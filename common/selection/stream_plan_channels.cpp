@@ -100,7 +100,7 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
 
 std::size_t StreamPlan::memory_bytes() const {
   std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
-  bytes += pending_.capacity() * sizeof(Pending) + highest_steps_.memory_bytes() + highest_distances_.memory_bytes();
+  bytes += pending_.capacity() * sizeof(Pending) + is_loose_.capacity() / 8 + highest_steps_.memory_bytes() + highest_distances_.memory_bytes();
   if (ranking_) bytes += ranking_->memory_bytes();
   for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
   return bytes;
