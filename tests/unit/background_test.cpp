@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/serve/thread_time.h"
+
 namespace intervale {
 namespace {
 
@@ -99,7 +101,8 @@ TEST_F(BackgroundTest, EverySliceIsPaidFor) {
   background.run(
       account,
       [left = 3](Memory::Share&) mutable {
-        std::this_thread::sleep_for(5ms);
+        for (const auto since = thread_time(); thread_time() - since < 5ms;) {
+        }
         return --left > 0;
       },
       on_done());
