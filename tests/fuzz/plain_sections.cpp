@@ -17,5 +17,9 @@ std::size_t ZSTD_compress(void* to, std::size_t capacity, const void* from, std:
   return size;
 }
 
+std::size_t ZSTD_compressCCtx(ZSTD_CCtx*, void* to, std::size_t capacity, const void* from, std::size_t size, int) {
+  return ZSTD_compress(to, capacity, from, size, 0);
+}
+
 std::size_t ZSTD_decompress(void* to, std::size_t capacity, const void* from, std::size_t size) { return ZSTD_compress(to, capacity, from, size, 0); }
 }
