@@ -63,6 +63,13 @@ std::uint64_t SplitSet::count() const {
   return n;
 }
 
+unsigned SplitSet::count(UpdateIndex first, unsigned count) const {
+  unsigned n = 0;
+  if (is_untouched(first, count)) return n;
+  for (unsigned at = 0; at < count; at += 64) n += unsigned(std::popcount(some(first + at, std::min(64U, count - at))));
+  return n;
+}
+
 std::uint64_t SplitSet::deposit(std::uint64_t bits, std::uint64_t mask) {
 #if defined(__x86_64__)
   if (kHasBmi2) return deposit_bmi2(bits, mask);

@@ -21,6 +21,8 @@ class SplitSet {
   }
   // Whether none of `count` updates from `first` on was ever in it, as far as chunks tell; count at least 1.
   [[nodiscard]] bool is_untouched(UpdateIndex first, unsigned count) const { return !chunks_.uses_any(first / 32, (first + count - 1) / 32 + 1); }
+  // How many of `count` updates from `first` on are in it; count at least 1.
+  [[nodiscard]] unsigned count(UpdateIndex first, unsigned count) const;
   void insert(UpdateIndex i) { insert_bits(i / 64, std::uint64_t(1) << (i % 64)); }
   void insert_all();  // of all numbers that it can hold, a few more than its size
   void erase(UpdateIndex i) { erase_bits(i / 64, std::uint64_t(1) << (i % 64)); }

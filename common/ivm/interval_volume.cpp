@@ -35,7 +35,7 @@ IntervalVolume::IntervalVolume(Parts parts)
       keys_(std::move(parts.keys)),
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
-      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, std::move(parts.left), std::move(parts.surface)),
+      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, parts.left, parts.surface),
       brick_regions_(description_.grid, regions_of_bricks(domain_, set_)),
       bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
@@ -77,6 +77,8 @@ const ValueBounds& IntervalVolume::bounds(const ParallelFor& parallel) const {
   return *bounds_->found;
 }
 
+bool IntervalVolume::has_bounds() const { return bounds_->bytes != 0; }
+
 Result<void> IntervalVolume::set_channels(std::vector<Channel> channels, std::vector<ChannelKeys> keys) {
   if (auto valid = check_channels(channels); !valid) return valid;
   bool fits = keys.size() == channels.size();
@@ -95,7 +97,7 @@ Result<void> IntervalVolume::set_channels(std::vector<Channel> channels, std::ve
 
 std::uint64_t IntervalVolume::lost_updates() const {
   std::uint64_t lost = size();
-  for (BrickIndex brick{0}; brick < set_.bricks().size(); ++brick) lost -= relevant_.brick_updates(brick);
+  for (BrickIndex brick{0}; brick < set_.bricks().size(); ++brick) lost -= relevant_.bound(brick).updates;
   return lost;
 }
 

@@ -68,6 +68,7 @@ class IntervalVolume {
   // For other ranges than its own; it must have been refined uniformly. The first call finds them, in O(updates);
   // calls meanwhile wait for it. Any thread.
   [[nodiscard]] const ValueBounds& bounds(const ParallelFor& parallel = serial) const;
+  [[nodiscard]] bool has_bounds() const;  // they are found
   // Null: a data set of one range has none.
   [[nodiscard]] const FieldStatistics* statistics() const { return statistics_.get(); }
   [[nodiscard]] std::size_t memory_bytes() const;

@@ -57,8 +57,11 @@ std::vector<std::uint8_t> contents_of(const IntervalVolume& volume, StreamType t
     contents.assign(bytes.begin(), bytes.end());
   }
   if (type == StreamType::error_to_distance) {
-    contents.reserve(volume.relevant().error_to_distance().size());
-    for (const ErrorToDistance code : volume.relevant().error_to_distance()) contents.push_back(code.code());
+    contents.reserve(set.supercubes());
+    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      std::size_t n = 0;
+      set.for_each_supercube(b, [&](SupercubeIndex, SupercubeKey) { contents.push_back(volume.relevant().brick(b).to_distance(n++).code()); });
+    }
   }
   return contents;
 }
@@ -73,8 +76,16 @@ std::vector<std::uint8_t> coded_error_steps(const IntervalVolume& volume) {
 }
 
 std::vector<std::uint8_t> coded_update_slopes(const IntervalVolume& volume) {
-  std::vector<std::uint8_t> slopes(volume.size());
-  for (UpdateIndex i{0}; i < volume.size(); ++i) slopes[i] = std::uint8_t(volume.relevant().slope(i));
+  std::vector<std::uint8_t> slopes;  // all updates are relevant
+  slopes.reserve(volume.size());
+  const SupercubeSet& set = volume.set();
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    std::size_t n = 0;
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
+      for (int i = 0; i < std::popcount(set.occupancy()[s]); ++i) slopes.push_back(volume.relevant().brick(b).slope(n, i));
+      ++n;
+    });
+  }
   RangeEncoder coder;
   (void)code_update_slopes(coder, volume.set(), slopes, serial);
   return coder.finish();

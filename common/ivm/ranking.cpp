@@ -37,9 +37,11 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
 Ranking::Brick Ranking::of_brick(BrickIndex brick) const {
   Brick b;
   b.ranking_ = this;
+  b.brick_ = brick;
   const SupercubeKey key = volume_.set().bricks()[brick].key;
   b.scale_ = scale_of_key(key);
-  const unsigned step = relevant_.brick_error_step(brick);
+  const RelevantUpdates::Bound& all = relevant_.bound(brick);
+  const unsigned step = all.error_step;
   if (step < least_step_) return b;
   if (!roi_ && !screen_) {
     b.bound_ = Rank(step + 1);
@@ -54,12 +56,11 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick) const {
   b.pixels_ = pixels_per_unit(*screen_, region);
   b.near_ = screen_->is_near(region);
   b.is_exact_ = !b.near_ && !(ahead_ && ahead_->is_near(region));
-  const float object_error = relevant_.brick_object_error(brick);
-  if (!(object_error * b.pixels_ > pixel_error_)) return b;
+  if (!(all.object_error * b.pixels_ > pixel_error_)) return b;
   b.weight_ = weight_of(region, b.scale_, b.pixels_, b.is_exact_);
   b.is_seen_ = !is_hidden(region);
   b.bound_ = 1;
-  b.bound_ = b.bound(step, object_error, relevant_.brick_slope(brick));
+  b.bound_ = b.bound(step, all.object_error, all.slope);
   return b;
 }
 
@@ -113,6 +114,9 @@ float Ranking::weight_of(const ScreenError::Region& region, int scale, float pix
 Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, SupercubeKey key) const {
   Supercube s;
   s.ranking_ = ranking_;
+  s.needs_ = &ranking_->relevant_.brick(brick_);
+  s.number_ = supercube - ranking_->volume_.set().bricks()[brick_].first_supercube;
+  s.to_distance_ = s.needs_->to_distance(s.number_);
   s.supercube_ = supercube;
   s.key_ = key;
   s.scale_ = scale_;

@@ -51,7 +51,7 @@ class Ranking {
     [[nodiscard]] float importance(unsigned step, std::uint8_t distance, unsigned slope) const {
       if (step < ranking_->least_step_) return 0;
       if (!ranking_->screen_) return float(step + 1);
-      const float pixels = ranking_->relevant_.object_error(supercube_, scale_, step, distance) * pixels_;
+      const float pixels = ranking_->relevant_.object_error(to_distance_, scale_, step, distance) * pixels_;
       return pixels > ranking_->pixel_error_ ? ranking_->importance_of(pixels, slope, weight_) : 0;
     }
     // The least importance of this rank, 1 or more; and the rank of an importance.
@@ -71,18 +71,22 @@ class Ranking {
     [[nodiscard]] bool meets_roi(Slot slot) const {
       return !ranking_->roi_ || ranking_->roi_->meets(centre_of(key_, slot), std::int32_t(1) << scale_);
     }
-    // The rank of update i, in this slot.
+    // The rank of update i, a relevant one in this slot.
     [[nodiscard]] Rank operator()(UpdateIndex i, Slot slot) const {
-      const RelevantUpdates& relevant = ranking_->relevant_;
-      return meets_roi(slot) ? rank(importance(ranking_->volume_.error_step(i), relevant.distance(i), relevant.slope(i))) : Rank(0);
+      if (!meets_roi(slot)) return 0;
+      const int before = count_below(needs_->slots(number_, ranking_->volume_.set().occupancy()[supercube_]), slot);
+      return rank(importance(ranking_->volume_.error_step(i), needs_->distance(number_, before), needs_->slope(number_, before)));
     }
 
    private:
     friend class Ranking;
     const Ranking* ranking_ = nullptr;
+    const BrickNeeds* needs_ = nullptr;  // of its brick
+    std::size_t number_ = 0;             // in its brick
     SupercubeIndex supercube_;
     SupercubeKey key_ = 0;
     int scale_ = 0;
+    ErrorToDistance to_distance_;
     float pixels_ = 0;  // of one world unit
     float weight_ = 0;  // of what is removed
     bool is_seen_ = true;
@@ -103,6 +107,7 @@ class Ranking {
    private:
     friend class Ranking;
     const Ranking* ranking_ = nullptr;
+    BrickIndex brick_;
     int scale_ = 0;
     bool near_ = false;     // distances from the camera to its supercubes differ much
     bool is_exact_ = true;  // the weight is that of its supercubes, too

@@ -30,9 +30,10 @@ SplitSet select(const IntervalVolume& volume, const RelevantUpdates& relevant, c
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     const Ranking::Brick brick = ranking.of_brick(b);
     if (brick.bound() == 0) continue;
+    std::size_t n = 0;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
-      const std::uint64_t occupancy = set.occupancy()[s], slots = relevant.slots(s, occupancy);
+      const std::uint64_t occupancy = set.occupancy()[s], slots = relevant.brick(b).slots(n++, occupancy);
       UpdateIndex i = set.first(b, s);
       for (const Slot slot : set_bits<Slot>(occupancy)) {
         if ((slots >> slot & 1) != 0 && rank(i, slot) != 0) wanted.insert(i);

@@ -1,106 +1,195 @@
 #include "common/ivm/relevant_slots.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 
 #include "common/codec/value_prediction.h"
-#include "common/diamond/split_set.h"
-#include "common/diamond/supercube_neighbours.h"
 #include "common/ivm/split_lattice.h"
-#include "common/ivm/value_bounds.h"
 #include "common/util/bits.h"
 
 namespace intervale {
 namespace {
 
-// Finds the diamonds of one volume that are relevant to one range.
-class Finder {
- public:
-  Finder(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel)
-      : volume_(volume),
-        set_(volume.set()),
-        bounds_(volume.bounds(parallel)),
-        counts_(KeySides(volume.description().format, shown.range), shown.refine),
-        parallel_(parallel),
-        all_(set_.size()),
-        slots_(set_.supercubes()) {}
+// The parents of classes 0 and 1 of a diamond of class 1 or 2: slots, and the supercube: its own, or the one before it along
+// an axis.
+struct Parents {
+  struct One {
+    Slot slot;
+    std::uint8_t before = 0;  // 1 << axis; 0: its own
+  };
+  std::array<One, kMaxParents> parent{};
+  std::size_t count = 0;
+};
 
-  std::vector<std::uint64_t> find() && {
-    const auto [first, end] = set_.of_scale(0);
-    parallel_(first, [&](std::size_t b) {
-      const BrickIndex brick{std::uint32_t(b)};
-      set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) { find_coarse(brick, s); });
-    });
-    all_.insert_all();
-    parallel_(end - first, [&, first = first](std::size_t piece) { find_fine(BrickIndex(first + std::uint32_t(piece))); });
-    for (const std::size_t cls : {2, 1}) {
-      parallel_(end - first, [&, first = first](std::size_t piece) { add_parents(BrickIndex(first + std::uint32_t(piece)), cls); });
+const std::array<Parents, kSlots>& parents_by_slot() {
+  static const auto kTable = [] {
+    std::array<Parents, kSlots> table{};
+    for (Slot slot{8}; slot < kSlots; ++slot) {
+      const unsigned type = kTypeOfSlot[slot];
+      for (std::size_t k = 0; k < diamond_type(type).parents; ++k) {
+        const Offset to = diamond_type(type).parent[k];
+        const std::array<int, 3> at{int(type & 3) + to.x, int(type >> 2 & 3) + to.y, int(type >> 4 & 3) + to.z};
+        const auto before = std::uint8_t(at[0] < 0 ? 1 : at[1] < 0 ? 2 : at[2] < 0 ? 4 : 0);
+        table[slot].parent[k] = {kSlotOfType[unsigned(at[0] & 3) | unsigned(at[1] & 3) << 2 | unsigned(at[2] & 3) << 4], before};
+      }
+      table[slot].count = diamond_type(type).parents;
     }
-    return std::move(slots_);
+    return table;
+  }();
+  return kTable;
+}
+
+// The words of a brick's supercubes, and of those ahead of them: descendants of the same scale are in no others.
+class Neighbourhood {
+ public:
+  static constexpr int kSide = 5;
+  [[nodiscard]] static bool holds(Vertex p) { return std::max({p.x, p.y, p.z}) < kSide; }
+  [[nodiscard]] std::uint64_t& at(Vertex p) { return words_[std::size_t((p.z * kSide + p.y) * kSide + p.x)]; }
+
+  // Adds the parents of those of a class.
+  void add_parents(std::size_t cls) {
+    const auto& table = parents_by_slot();
+    constexpr std::array<int, 3> kStep{1, kSide, kSide * kSide};
+    for (int z = 0, i = 0; z < kSide; ++z) {
+      for (int y = 0; y < kSide; ++y) {
+        for (int x = 0; x < kSide; ++x, ++i) {
+          for (const Slot slot : set_bits<Slot>(words_[std::size_t(i)] & kSlotsOfClass[cls])) {
+            for (std::size_t k = 0; k < table[slot].count; ++k) {
+              const auto [parent, before] = table[slot].parent[k];
+              if ((before == 1 && x == 0) || (before == 2 && y == 0) || (before == 4 && z == 0)) continue;
+              const int to = before == 0 ? i : i - kStep[std::size_t(std::countr_zero(before))];
+              words_[std::size_t(to)] |= std::uint64_t(1) << parent;
+            }
+          }
+        }
+      }
+    }
   }
 
  private:
-  // Of scale 1 or coarser: as the bounds say.
-  void find_coarse(BrickIndex brick, SupercubeIndex s) {
-    if (!bounds_.is_relevant(counts_, s)) return;
-    UpdateIndex next = set_.first(brick, s);
-    for (const Slot slot : set_bits<Slot>(set_.occupancy()[s])) slots_[s] |= std::uint64_t(bounds_.is_relevant(counts_, next++)) << slot;
-  }
-
-  // Of scale 0: those that count.
-  void find_fine(BrickIndex brick) {
-    SplitLattice lattice(volume_, all_);
-    set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-      if (!bounds_.is_relevant(counts_, s)) return;
-      lattice.move_to(key);
-      (void)lattice.splittable(set_.occupancy()[s]);
-      UpdateIndex next = set_.first(brick, s);
-      next = add_counting<0>(lattice, s, next);
-      next = add_counting<1>(lattice, s, next);
-      add_counting<2>(lattice, s, next);
-    });
-  }
-  template <int Class>
-  UpdateIndex add_counting(const SplitLattice& lattice, SupercubeIndex s, UpdateIndex next) {
-    VertexKeys around;
-    for (const Slot slot : set_bits<Slot>(set_.occupancy()[s] & kSlotsOfClass[Class])) {
-      KeySpan span = lattice.gather<Class>(slot, around);
-      span.add(volume_.key(next++));
-      slots_[s] |= std::uint64_t(counts_(span.least, span.greatest)) << slot;
-    }
-    return next;
-  }
-
-  // Of scale 0: the parents of a class's relevant diamonds, but those of coarser scales.
-  void add_parents(BrickIndex brick, std::size_t cls) {
-    SetNeighbours around(set_);
-    set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-      const std::uint64_t chosen = __atomic_load_n(&slots_[s], __ATOMIC_RELAXED) & kSlotsOfClass[cls];
-      if (chosen == 0) return;
-      around.move_to(key);
-      for (const Slot slot : set_bits<Slot>(chosen)) {
-        const Links& links = around.links(slot);
-        for (std::size_t k = 0; k < std::size_t(diamond_type(kTypeOfSlot[slot]).parents); ++k) {
-          const auto parent = around.at(links.vertex[links.parent[k]]);
-          if (!parent.supercube.has(parent.slot) || scale_of_key(parent.supercube.key) != 0) continue;
-          __atomic_fetch_or(&slots_[parent.supercube.supercube], std::uint64_t(1) << parent.slot, __ATOMIC_RELAXED);
-        }
-      }
-    });
-  }
-
-  const IntervalVolume& volume_;
-  const SupercubeSet& set_;
-  const ValueBounds& bounds_;
-  CountingKeys counts_;
-  const ParallelFor& parallel_;
-  SplitSet all_;  // of the volume's updates
-  std::vector<std::uint64_t> slots_;
+  std::array<std::uint64_t, std::size_t(kSide) * kSide * kSide> words_{};
 };
+
+// Where a supercube is in its brick, by the lowest six bits of its key.
+const std::array<Vertex, 64>& places_in_brick() {
+  static const auto kTable = [] {
+    std::array<Vertex, 64> table{};
+    for (unsigned i = 0; i < table.size(); ++i) {
+      const auto axis = [i](unsigned first) { return std::int32_t((i >> first & 1) | (i >> (first + 3) & 1) << 1); };
+      table[i] = {axis(0), axis(1), axis(2)};
+    }
+    return table;
+  }();
+  return kTable;
+}
 
 }  // namespace
 
-std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel) {
-  return Finder(volume, shown, parallel).find();
+RelevantSlots::RelevantSlots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel)
+    : volume_(volume),
+      set_(volume.set()),
+      bounds_(volume.bounds(parallel)),
+      counts_(KeySides(volume.description().format, shown.range), shown.refine),
+      first_fine_(set_.of_scale(0)[0]),
+      counting_(set_.bricks().size() - first_fine_) {}
+
+std::vector<std::uint64_t> RelevantSlots::of(BrickIndex brick) const {
+  if (!has_any(brick)) return Words(std::size_t(std::popcount(set_.bricks()[brick].mask)));
+  Words words = brick < first_fine_ ? of_coarse(brick) : of_fine(brick);
+  const BrickNeeds& left = volume_.relevant().brick(brick);
+  const SupercubeIndex first = set_.bricks()[brick].first_supercube;
+  for (std::size_t n = 0; n < words.size(); ++n) words[n] &= left.slots(n, set_.occupancy()[first + n]);
+  return words;
+}
+
+std::vector<std::uint64_t> RelevantSlots::of_coarse(BrickIndex brick) const {
+  Words words;
+  set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
+    words.push_back(0);
+    if (!bounds_.is_relevant(counts_, s)) return;
+    UpdateIndex next = set_.first(brick, s);
+    for (const Slot slot : set_bits<Slot>(set_.occupancy()[s])) words.back() |= std::uint64_t(bounds_.is_relevant(counts_, next++)) << slot;
+  });
+  return words;
+}
+
+template <int Class>
+UpdateIndex RelevantSlots::add_counting(const SplitLattice& lattice, std::uint64_t occupancy, UpdateIndex next, Counting& counting) const {
+  const ValueFormat& format = volume_.description().format;
+  VertexKeys around;
+  std::uint64_t word = 0;
+  float most = 0;
+  for (const Slot slot : set_bits<Slot>(occupancy & kSlotsOfClass[Class])) {
+    const UpdateIndex i = next++;
+    const KeySpan before = lattice.gather<Class>(slot, around);
+    KeySpan span = before;
+    span.add(volume_.key(i));
+    if (!counts_(span.least, span.greatest)) continue;
+    word |= std::uint64_t(1) << slot;
+    const double error = volume_.error(i);
+    if (error == 0) continue;
+    const bool is_crossed = counts_(before.least, before.greatest);
+    most = std::max(most, is_crossed ? float(std::min(error / (format.value(before.greatest) - format.value(before.least)), 1.0)) : 1.0F);
+  }
+  counting.words.back() |= word;
+  counting.moves.back() = std::max(counting.moves.back(), most);
+  return next;
+}
+
+RelevantSlots::Counting RelevantSlots::find_counting(BrickIndex brick) const {
+  Counting counting;
+  if (!has_any(brick)) return counting;
+  SplitLattice lattice(volume_);
+  set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+    counting.words.push_back(0);
+    counting.moves.push_back(0);
+    if (!bounds_.is_relevant(counts_, s)) return;
+    const std::uint64_t occupancy = set_.occupancy()[s];
+    lattice.move_to(key);
+    (void)lattice.splittable(occupancy);
+    UpdateIndex next = set_.first(brick, s);
+    next = add_counting<0>(lattice, occupancy, next, counting);
+    next = add_counting<1>(lattice, occupancy, next, counting);
+    add_counting<2>(lattice, occupancy, next, counting);
+  });
+  return counting;
+}
+
+// Of a brick of scale 0.
+const RelevantSlots::Counting& RelevantSlots::counting(BrickIndex brick) const {
+  const Counting* const known = counting_.find(brick - first_fine_);
+  return known != nullptr ? *known : counting_.keep(brick - first_fine_, find_counting(brick)).value;
+}
+
+std::vector<float> RelevantSlots::moves(BrickIndex brick) const {
+  std::vector<float> moves = brick < first_fine_ ? find_counting(brick).moves : counting(brick).moves;
+  moves.resize(std::size_t(std::popcount(set_.bricks()[brick].mask)));
+  return moves;
+}
+
+std::vector<std::uint64_t> RelevantSlots::of_fine(BrickIndex brick) const {
+  const Vertex first = position_of_key(set_.bricks()[brick].key);
+  const auto& places = places_in_brick();
+  Neighbourhood around;
+  for (std::int32_t i = 0; i < 7; ++i) {  // not the one ahead on all axes
+    const Vertex ahead{i & 1, i >> 1 & 1, i >> 2};
+    const auto other = i == 0 ? std::optional(brick) : set_.find_brick(0, {first.x / 4 + ahead.x, first.y / 4 + ahead.y, first.z / 4 + ahead.z});
+    const Words* const words = other ? &counting(*other).words : nullptr;
+    if (words == nullptr || words->empty()) continue;
+    std::size_t n = 0;
+    for (const int k : set_bits(set_.bricks()[*other].mask)) {
+      const std::uint64_t word = (*words)[n++];
+      const Vertex p = places[std::size_t(k)], at{p.x + 4 * ahead.x, p.y + 4 * ahead.y, p.z + 4 * ahead.z};
+      if (Neighbourhood::holds(at)) around.at(at) = word;
+    }
+  }
+  around.add_parents(2);
+  around.add_parents(1);
+  Words words;
+  SupercubeIndex s = set_.bricks()[brick].first_supercube;
+  for (const int k : set_bits(set_.bricks()[brick].mask)) words.push_back(around.at(places[std::size_t(k)]) & set_.occupancy()[s++]);
+  return words;
 }
 
 }  // namespace intervale

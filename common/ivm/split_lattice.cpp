@@ -41,7 +41,7 @@ const SplitLattice::Tables& SplitLattice::tables() {
   return made;
 }
 
-SplitLattice::SplitLattice(const IntervalVolume& volume, const SplitSet& split)
+SplitLattice::SplitLattice(const IntervalVolume& volume, const SplitSet* split)
     : volume_(volume),
       split_(split),
       coarser_(std::size_t(volume.domain().levels()) + 1, Coarser{.finder = SetFinder(volume.set())}),
@@ -86,7 +86,7 @@ std::uint64_t SplitLattice::load_neighbour(SetFinder& finder, const SupercubePla
 // Loads the keys of those of a supercube's split diamonds whose slots are used, and returns the slots of those. first: the
 // point of its own corner.
 std::uint64_t SplitLattice::load_slots(const SetFinder::Found& found, std::uint64_t used, ValueKey* first) const {
-  const std::uint64_t slots = split_.slots(found.first, found.occupancy) & used;
+  const std::uint64_t slots = (split_ == nullptr ? found.occupancy : split_->slots(found.first, found.occupancy)) & used;
   switch (volume_.keys().width()) {
     case 1:
       load_keys<1>(found, slots, first);

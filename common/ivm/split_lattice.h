@@ -20,8 +20,10 @@ namespace intervale {
 
 class SplitLattice {
  public:
+  // All diamonds of the volume, which must outlive it, are split.
+  explicit SplitLattice(const IntervalVolume& volume) : SplitLattice(volume, nullptr) {}
   // Both must outlive it. split: must not change. What it says is about a client only if that is closed under parents.
-  SplitLattice(const IntervalVolume& volume, const SplitSet& split);
+  SplitLattice(const IntervalVolume& volume, const SplitSet& split) : SplitLattice(volume, &split) {}
 
   // Fastest along ascending keys.
   void move_to(SupercubeKey key);
@@ -49,6 +51,7 @@ class SplitLattice {
   }
 
  private:
+  SplitLattice(const IntervalVolume& volume, const SplitSet* split);
   static constexpr int kSide = 6;  // points on an axis, from -1 to 4
   static constexpr std::int32_t point_of(int x, int y, int z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
   using Point = std::uint8_t;
@@ -89,7 +92,7 @@ class SplitLattice {
 
   const Tables& tables_ = tables();
   const IntervalVolume& volume_;
-  const SplitSet& split_;
+  const SplitSet* split_;         // nullptr: all
   std::vector<Coarser> coarser_;  // by scale; beyond the coarsest one, the corners of the domain
   SetFinder finder_;
   SupercubePlace place_;  // of the supercube

@@ -53,8 +53,10 @@ ValueBounds::ValueBounds(const PagedValues& values, const ParallelFor& parallel)
     greatest.set(diamond, std::max(greatest[diamond], greatest[child]));
   });
   supercube_least_ = supercube_greatest_ = ValueKeys(set.supercubes(), last);
+  brick_least_ = brick_greatest_ = ValueKeys(set.bricks().size(), last);
   for (BrickIndex brick{0}; brick < set.bricks().size(); ++brick) {
     may_stop(parallel);
+    KeySpan all{least[set.bricks()[brick].first], greatest[set.bricks()[brick].first]};
     set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
       const UpdateIndex first = set.first(brick, s), end = first + std::uint32_t(std::popcount(set.occupancy()[s]));
       KeySpan span{least[first], greatest[first]};
@@ -64,7 +66,10 @@ ValueBounds::ValueBounds(const PagedValues& values, const ParallelFor& parallel)
       }
       supercube_least_.set(s, span.least);
       supercube_greatest_.set(s, span.greatest);
+      all = {std::min(all.least, span.least), std::max(all.greatest, span.greatest)};
     });
+    brick_least_.set(brick, all.least);
+    brick_greatest_.set(brick, all.greatest);
   }
   const std::size_t coarse = coarse_diamonds(set);
   least_ = first_of(least, coarse, last);

@@ -37,18 +37,22 @@ class ValueBounds {
   // The set holds with each diamond all its ancestors. Takes two keys a diamond of memory meanwhile.
   explicit ValueBounds(const PagedValues& values, const ParallelFor& parallel = serial);
 
+  // Whether a brick has diamonds that are relevant.
+  [[nodiscard]] bool is_relevant(const CountingKeys& counts, BrickIndex b) const { return counts(brick_least_[b], brick_greatest_[b]); }
   // Whether a supercube has diamonds that are relevant.
   [[nodiscard]] bool is_relevant(const CountingKeys& counts, SupercubeIndex s) const { return counts(supercube_least_[s], supercube_greatest_[s]); }
   // Whether a diamond of scale 1 or coarser is relevant.
   [[nodiscard]] bool is_relevant(const CountingKeys& counts, UpdateIndex i) const { return counts(least_[i], greatest_[i]); }
 
   [[nodiscard]] std::size_t memory_bytes() const {
-    return least_.memory_bytes() + greatest_.memory_bytes() + supercube_least_.memory_bytes() + supercube_greatest_.memory_bytes();
+    return least_.memory_bytes() + greatest_.memory_bytes() + supercube_least_.memory_bytes() + supercube_greatest_.memory_bytes() +
+           brick_least_.memory_bytes() + brick_greatest_.memory_bytes();
   }
 
  private:
   ValueKeys least_, greatest_;                      // by number, of scale 1 or coarser
   ValueKeys supercube_least_, supercube_greatest_;  // of all its diamonds, by supercube
+  ValueKeys brick_least_, brick_greatest_;          // of all its diamonds, by brick
 };
 
 }  // namespace intervale

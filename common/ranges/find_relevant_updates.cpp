@@ -1,5 +1,6 @@
 #include "common/ranges/find_relevant_updates.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -81,14 +82,45 @@ SurfaceErrors PartFinder::measure(const Range& range, const std::vector<std::uin
   return result;
 }
 
+std::shared_ptr<const RelevantUpdates> PartFinder::find_measured(const RangePart& part) {
+  const SupercubeSet& set = volume_.set();
+  const RelevantSlots relevant(volume_, part.shown, parallel_);
+  std::vector<std::uint64_t> slots(set.supercubes());
+  parallel_(set.bricks().size(), [&](std::size_t b) {
+    const BrickIndex brick{std::uint32_t(b)};
+    const std::vector<std::uint64_t> words = relevant.of(brick);
+    std::copy(words.begin(), words.end(), slots.begin() + set.bricks()[brick].first_supercube);
+  });
+  const SurfaceErrors surface = measure(part.shown.range, slots);
+  return std::make_shared<const RelevantUpdates>(volume_.description().grid, set, UpdateErrors{volume_.steps(), volume_.error_steps()},
+                                                 ShownRanges{part.shown}, slots, surface);
+}
+
 std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
-  std::vector<std::uint64_t> slots = relevant_slots(volume_, part.shown, parallel_);
-  for (SupercubeIndex s{0}; s < slots.size(); ++s) slots[s] &= volume_.relevant().slots(s, volume_.set().occupancy()[s]);
-  SurfaceErrors surface{std::vector<ErrorToDistance>(volume_.set().supercubes())};
-  if (part.distances == Distances::estimated) surface.to_distance = estimate_distances(volume_, part.shown.range, slots, parallel_);
-  if (part.distances == Distances::measured) surface = measure(part.shown.range, slots);
-  return std::make_shared<const RelevantUpdates>(volume_.description().grid, volume_.set(), UpdateErrors{volume_.steps(), volume_.error_steps()},
-                                                 ShownRanges{part.shown}, std::move(slots), std::move(surface));
+  if (part.distances == Distances::measured) return find_measured(part);
+  const SupercubeSet& set = volume_.set();
+  const auto slots = std::make_shared<const RelevantSlots>(volume_, part.shown, parallel_);
+  const double reach = diamond_width(volume_.description().grid) / 2;
+  std::vector<RelevantUpdates::Bound> bounds(set.bricks().size());
+  for (BrickIndex b{0}; b < bounds.size(); ++b) {
+    const RelevantUpdates::Bound& whole = volume_.relevant().bound(b);
+    if (whole.updates == 0 || !slots->has_any(b)) continue;
+    bounds[b] = {whole.updates, whole.error_step, 0, 0};
+    const bool moves = part.distances == Distances::estimated && volume_.error_steps()[whole.error_step] > 0;
+    if (moves) bounds[b].object_error = float(reach * std::exp2(scale_of_key(set.bricks()[b].key)));
+  }
+  const auto find_brick = [&volume = volume_, slots, part](BrickIndex brick) {
+    const std::vector<std::uint64_t> relevant = slots->of(brick);
+    std::vector<BrickNeeds::Supercube> needs(relevant.size());
+    for (std::size_t n = 0; n < needs.size(); ++n) needs[n].slots = relevant[n];
+    if (part.distances == Distances::estimated) {
+      const auto to_distance = estimate_distances(volume, brick, slots->moves(brick), relevant);
+      for (std::size_t n = 0; n < needs.size(); ++n) needs[n].to_distance = to_distance[n];
+    }
+    return BrickNeeds(volume.set(), brick, volume.steps(), needs, {});
+  };
+  return std::make_shared<const RelevantUpdates>(volume_.description().grid, UpdateErrors{volume_.steps(), volume_.error_steps()},
+                                                 ShownRanges{part.shown}, std::move(bounds), RelevantUpdates::Known(), find_brick);
 }
 
 std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,
@@ -104,7 +136,7 @@ std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_p
     for (const RangePart& part : parts_of(d.format, one, distances)) each.push_back(find(part));
   }
   if (each.size() == 1 && each.front()->shown() == shown) return each.front();
-  return std::make_shared<const RelevantUpdates>(united(*volume, each, distinct(shown)));
+  return std::make_shared<const RelevantUpdates>(united(*volume, std::move(each), distinct(shown)));
 }
 
 std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,

@@ -20,7 +20,7 @@ namespace intervale {
 // What RelevantUpdates::object_error() tells. Each tells more than those before.
 enum class Distances {
   none,       // 0; levels of detail without a camera need no more
-  estimated,  // estimate_distances.h: within a factor of 4 for most; some 15 ns for each relevant update
+  estimated,  // estimate_distances.h: within a factor of 4 for most; by brick, some 15 ns for each relevant update
   measured,   // error_to_distance.h, for each update; one to two microseconds for each relevant update
 };
 
@@ -38,15 +38,18 @@ struct RangePart {
 // Finds what parts need of one interval volume. One thread at a time.
 class PartFinder {
  public:
-  // The volume was refined uniformly and must outlive this. What `parallel` throws, find() throws.
+  // The volume was refined uniformly and must outlive this, and what is found. What `parallel` throws, find() throws.
   explicit PartFinder(const IntervalVolume& volume, ParallelFor parallel = serial) : volume_(volume), parallel_(std::move(parallel)) {}
 
-  // The first part with measured distances restores the field, which is kept for the next ones: 1, 2 or 8 bytes a sample.
+  // Measured distances are found at once; the first part with them restores the field, which is kept for the next ones: 1,
+  // 2 or 8 bytes a sample. All else is found by brick, as it is asked for: that takes some microseconds here, except for
+  // the first part of a volume, which may take O(updates) (IntervalVolume::bounds()).
   [[nodiscard]] std::shared_ptr<const RelevantUpdates> find(const RangePart& part);
   [[nodiscard]] const IntervalVolume& volume() const { return volume_; }
 
  private:
   [[nodiscard]] SurfaceErrors measure(const Range& range, const std::vector<std::uint64_t>& slots);
+  [[nodiscard]] std::shared_ptr<const RelevantUpdates> find_measured(const RangePart& part);
 
   const IntervalVolume& volume_;
   ParallelFor parallel_;

@@ -11,9 +11,11 @@
 namespace intervale {
 namespace {
 
-// Supercubes and updates visited in one call of next(), which ends its batch: some 2 ms. Much less would cut what a drag of
-// a range needs, a few updates in many places, into small batches that name the same supercubes again.
+// Supercubes and updates visited in one call of next() that finds nothing: some 2 ms; four times as many end a batch. Much less
+// would cut what a drag of a range needs, a few updates in many places, into small batches that name the same supercubes
+// again.
 constexpr std::uint32_t kMaxVisited = 1 << 18;
+constexpr std::uint32_t kFindVisits = 1 << 12;  // finding what a brick needs takes as long as so many visits
 
 }  // namespace
 
@@ -70,38 +72,38 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   wanted_count_ = pending_bricks_ = 0;
   for (BrickIndex b{0}; b < pending_.size(); ++b) {
     Pending& pending = pending_[b];
-    pending.unsent = std::uint16_t(relevant_->brick_updates(b));
-    if (pending.unsent != 0 && !sent_.is_untouched(set.bricks()[b].first, set.updates(b))) {
-      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
-        const std::uint64_t occupancy = set.occupancy()[s];
-        pending.unsent = std::uint16_t(pending.unsent - std::popcount(relevant_->slots(s, occupancy) & sent_.slots(set.first(b, s), occupancy)));
-      });
-    }
-    pending.error_step = std::uint8_t(relevant_->brick_error_step(b));
-    pending.slope = std::uint8_t(relevant_->brick_slope(b));
-    pending.object_error = Up16(relevant_->brick_object_error(b));
+    const RelevantUpdates::Bound& bound = relevant_->bound(b);
+    const unsigned all = set.updates(b), left = bound.updates == 0 ? 0 : all - sent_.count(set.bricks()[b].first, all);
+    pending.unsent = std::uint16_t(std::min<unsigned>(bound.updates, left));
+    pending.error_step = bound.error_step;
+    pending.slope = bound.slope;
+    pending.object_error = Up16(bound.object_error);
   }
   highest_steps_ = SparseArray<std::uint16_t>(set.supercubes());
   highest_distances_ = SparseArray<std::uint8_t>(relevant_->has_distances() ? set.supercubes() : 0);
 }
 
-StreamPlan::Highest StreamPlan::of_update(UpdateIndex i) const {
-  return {std::uint8_t(volume_->error_step(i)), relevant_->distance(i), std::uint8_t(relevant_->slope(i))};
+StreamPlan::InBrick StreamPlan::in_brick(BrickIndex brick, SupercubeIndex s) const {
+  return {relevant_->brick(brick), s - volume_->set().bricks()[brick].first_supercube};
 }
 
-StreamPlan::Highest StreamPlan::of_relevant(SupercubeIndex s) const {
-  return {relevant_->supercube_error_steps()[s], relevant_->supercube_distance(s), relevant_->supercube_slopes()[s]};
+StreamPlan::Highest StreamPlan::of_update(const InBrick& in, UpdateIndex i, int before) const {
+  return {std::uint8_t(volume_->error_step(i)), in.needs.distance(in.number, before), in.needs.slope(in.number, before)};
 }
 
-StreamPlan::Highest StreamPlan::highest(SupercubeIndex s) const {
+StreamPlan::Highest StreamPlan::of_relevant(const InBrick& in) {
+  return {in.needs.error_step(in.number), in.needs.distance(in.number), in.needs.slope(in.number)};
+}
+
+StreamPlan::Highest StreamPlan::highest(const InBrick& in, SupercubeIndex s) const {
   const auto steps = highest_steps_.find(s);
-  if (!steps) return of_relevant(s);
+  if (!steps) return of_relevant(in);
   const std::uint8_t distance = relevant_->has_distances() ? highest_distances_.find(s).value_or(0) : std::uint8_t(0);
   return {std::uint8_t(*steps >> 8), distance, std::uint8_t(*steps)};
 }
 
-void StreamPlan::set_highest(SupercubeIndex s, Highest to) {
-  if (!highest_steps_.find(s) && to == of_relevant(s)) return;
+void StreamPlan::set_highest(const InBrick& in, SupercubeIndex s, Highest to) {
+  if (!highest_steps_.find(s) && to == of_relevant(in)) return;
   highest_steps_.set(s, std::uint16_t(to.error_step << 8 | to.slope));
   if (relevant_->has_distances()) highest_distances_.set(s, to.distance);
 }
@@ -242,25 +244,33 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   const Ranking::Brick ranking = ranking_->of_brick(brick);
   if (is_loose_[brick]) refine(brick, ranking);
   if (pending_[brick].rank < band_) return true;
+  if (!relevant_->is_found(brick)) builder.visited += kFindVisits;
+  const BrickNeeds& needs = relevant_->brick(brick);
   Unsent rest;
   float object_error = 0;
   bool full = false;
+  InBrick in{needs, 0};
   set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     if (full) return;
     ++builder.visited;
     const UpdateIndex first = set.first(brick, s);
-    const std::uint64_t occupancy = set.occupancy()[s];
-    const std::uint64_t unsent = ~sent_.some(first, unsigned(std::popcount(occupancy))) & extract_bits(relevant_->slots(s, occupancy), occupancy);
-    if (unsent == 0) return;
-    const auto here = visit_supercube(ranking, {key, brick, s, {}, first}, unsent, builder);
-    full = !here;
-    if (full) return;
-    rest.rank = std::max(rest.rank, here->rank);
-    rest.wanted += here->wanted;
-    rest.highest.raise(here->highest);
-    object_error = std::max(object_error, relevant_->object_error(s, scale_of_key(key), here->highest.error_step, here->highest.distance));
+    const std::uint64_t occupancy = set.occupancy()[s], relevant = needs.slots(in.number, occupancy);
+    const std::uint64_t unsent = ~sent_.some(first, unsigned(std::popcount(occupancy))) & extract_bits(relevant, occupancy);
+    if (unsent != 0) {
+      const auto here = visit_supercube(ranking, in, {key, brick, s, {}, first}, unsent, builder);
+      full = !here;
+      if (full) return;
+      rest.rank = std::max(rest.rank, here->rank);
+      rest.wanted += here->wanted;
+      rest.unsent += here->unsent;
+      rest.highest.raise(here->highest);
+      object_error = std::max(
+          object_error, relevant_->object_error(needs.to_distance(in.number), scale_of_key(key), here->highest.error_step, here->highest.distance));
+    }
+    ++in.number;
   });
   if (full) return false;
+  pending_[brick].unsent = std::uint16_t(std::min<unsigned>(pending_[brick].unsent, rest.unsent));
   set_pending(brick, rest.rank, rest.wanted);
   pending_[brick].error_step = rest.highest.error_step;
   pending_[brick].slope = rest.highest.slope;
@@ -271,12 +281,13 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
 
 // Adds the updates of a supercube that belong to the band, if it may have any. first: its first update. unsent: a bit
 // for each of its updates, in their order. nullopt if the batch is full first.
-std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Brick& brick, const Place& first, std::uint64_t unsent,
-                                                              BatchBuilder& builder) {
+std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Brick& brick, const InBrick& in, const Place& first,
+                                                              std::uint64_t unsent, BatchBuilder& builder) {
   const SupercubeIndex s = first.supercube;
-  const auto count = unsigned(std::popcount(volume_->set().occupancy()[s]));
+  const std::uint64_t occupancy = volume_->set().occupancy()[s];
+  const auto count = unsigned(std::popcount(occupancy));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
-  Unsent rest{.highest = highest(s)};
+  Unsent rest{.unsent = unsigned(std::popcount(unsent)), .highest = highest(in, s)};
   if (candidates == 0) return rest;
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
@@ -288,18 +299,24 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   }
   builder.visited += count;
   rest = {};
-  if (!add_band(ranking, first, candidates, builder, rest)) return {};
-  for (std::uint64_t others = unsent & ~candidates; others != 0; others &= others - 1)
-    rest.highest.raise(of_update(first.index + std::countr_zero(others)));
-  set_highest(s, rest.highest);
+  if (!add_band(ranking, in, first, candidates, builder, rest)) return {};
+  const std::uint64_t others = unsent & ~candidates, relevant = in.needs.slots(in.number, occupancy);
+  rest.unsent += unsigned(std::popcount(others));
+  auto number = set_bits(others).begin();
+  for (const Slot slot : set_bits<Slot>(SplitSet::deposit(others, occupancy))) {
+    rest.highest.raise(of_update(in, first.index + *number, count_below(relevant, slot)));
+    ++number;
+  }
+  set_highest(in, s, rest.highest);
   return rest;
 }
 
 // Adds the candidates that belong to the band, and bounds the others in `rest`. False if the batch is full first.
-bool StreamPlan::add_band(const Ranking::Supercube& ranking, const Place& place, std::uint64_t candidates, BatchBuilder& builder, Unsent& rest) {
+bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, const Place& place, std::uint64_t candidates, BatchBuilder& builder,
+                          Unsent& rest) {
   const float in_band = ranking.least(band_), least = budget_ ? ranking.least(1) : 0;
   const UpdateIndex first = place.index;
-  const std::uint64_t occupancy = volume_->set().occupancy()[place.supercube];
+  const std::uint64_t occupancy = volume_->set().occupancy()[place.supercube], relevant = in.needs.slots(in.number, occupancy);
   SlotGroup in_it{place.brick, place.supercube, place.key, 0};
   Highest highest;  // in registers, like all that this loop changes
   unsigned wanted = 0;
@@ -307,7 +324,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const Place& place,
   auto number = set_bits(candidates).begin();
   // Without branches on what is in the band: that is hard to foresee.
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
-    const Highest own = of_update(first + *number);
+    const Highest own = of_update(in, first + *number, count_below(relevant, slot));
     ++number;
     float importance = ranking.importance(own.error_step, own.distance, own.slope);
     if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;
@@ -320,6 +337,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const Place& place,
   }
   rest.highest = highest;
   rest.wanted = wanted;
+  rest.unsent = unsigned(std::popcount(candidates) - std::popcount(in_it.slots));
   rest.rank = ranking.rank(greatest);
   if (in_it.slots == 0 || add_all(in_it, builder)) return true;
   builder.around.move_to(place.key);  // the batch is nearly full: one at a time
@@ -350,7 +368,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
     }
     if (!visit_brick(BrickIndex(next_brick_ - 1), builder)) break;
     --next_brick_;
-    if (builder.visited >= kMaxVisited) break;
+    if (builder.visited >= (builder.updates == 0 ? kMaxVisited : 4 * kMaxVisited)) break;
   }
   if (builder.updates == 0) return {};
   std::vector<SlotGroup>& groups = builder.groups;

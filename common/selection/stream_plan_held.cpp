@@ -17,7 +17,8 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   sent_.insert(first, occupancy, added);
   sent_count_ += std::uint64_t(std::popcount(added));
   std::uint16_t& unsent = pending_[found->brick].unsent;
-  unsent = std::uint16_t(unsent - std::popcount(added & relevant_->slots(found->supercube, occupancy)));
+  const InBrick in = in_brick(found->brick, found->supercube);
+  unsent = std::uint16_t(unsent - std::popcount(added & in.needs.slots(in.number, occupancy)));
   return true;
 }
 
@@ -39,17 +40,20 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
       channel.held.erase(i);
       --channel.count;
     }
-    if ((relevant_->slots(here.supercube, here.occupancy) >> slot & 1) == 0) return;
+    if (relevant_->bound(here.brick).updates == 0) return;
+    const InBrick in = in_brick(here.brick, here.supercube);
+    const std::uint64_t relevant = in.needs.slots(in.number, here.occupancy);
+    if ((relevant >> slot & 1) == 0) return;
     Pending& pending = pending_[here.brick];
     ++pending.unsent;
-    const Highest again = of_update(i);
+    const Highest again = of_update(in, i, count_below(relevant, slot));
     pending.error_step = std::max(pending.error_step, again.error_step);
     pending.slope = std::max(pending.slope, again.slope);
-    pending.object_error =
-        Up16(std::max(float(pending.object_error), relevant_->object_error(here.supercube, scale_of_key(g.key), again.error_step, again.distance)));
-    Highest highest = this->highest(here.supercube);
+    pending.object_error = Up16(std::max(float(pending.object_error), relevant_->object_error(in.needs.to_distance(in.number), scale_of_key(g.key),
+                                                                                              again.error_step, again.distance)));
+    Highest highest = this->highest(in, here.supercube);
     highest.raise(again);
-    set_highest(here.supercube, highest);
+    set_highest(in, here.supercube, highest);
   });
   return true;
 }

@@ -111,9 +111,9 @@ void SessionState::set_relevant(const RangeAnswer::Relevant& relevant, bool is_m
   is_measured_ = is_measured;
 }
 
-// Without a camera distances do not matter. With one, a view that takes estimates begins with them, coarser than it asks
-// for, since what an estimate sends too much stays; it is completed when they are measured. Other views wait for that.
-// False if this one does.
+// Without a camera distances do not matter. With one, a view that takes estimates begins with them, after the first batch
+// coarser than it asks for, since what an estimate sends too much stays; it is completed when they are measured. Other views
+// wait for that. False if this one does.
 bool SessionState::begin_view() {
   const bool is_planned = planned_ == shown_;
   const bool has_needed = is_planned && (is_measured_ || !lod_.camera);
@@ -124,7 +124,10 @@ bool SessionState::begin_view() {
     const bool needs_measured = measurement_ && (!is_early_ || lod_.max_updates || measurement_->is_soon());
     if (needs_measured || (!is_planned && !estimate())) return false;
   }
-  if (std::exchange(is_new_, false)) plan_->set_lod(measurement_ ? coarser(lod_) : lod_, depth_ ? &*depth_ : nullptr, ahead_ ? &*ahead_ : nullptr);
+  if (std::exchange(is_new_, false)) {
+    const bool is_coarser = measurement_ && view_ != ViewState::unanswered;
+    plan_->set_lod(is_coarser ? coarser(lod_) : lod_, depth_ ? &*depth_ : nullptr, ahead_ ? &*ahead_ : nullptr);
+  }
   return true;
 }
 
@@ -202,6 +205,7 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
     if (is_ahead) return {};
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }
+  is_new_ = measurement_ && view_ == ViewState::unanswered;  // coarser after the first batch
   if (!is_ahead) view_ = ViewState::streaming;
   target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
   const StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();

@@ -10,10 +10,29 @@ namespace intervale {
 
 RangeCache::RangeCache(Memory& memory, FairScheduler& scheduler, Find find, std::size_t most_bytes)
     : memory_(memory), scheduler_(scheduler), find_(std::move(find)), most_bytes_(most_bytes) {
-  const unsigned count = std::max(1u, std::thread::hardware_concurrency());
-  threads_.reserve(count + 1);
-  for (unsigned i = 0; i < count; ++i) threads_.emplace_back([this](const std::stop_token& stop) { serve(soon_, stop); });
+  threads_.reserve(2);
+  threads_.emplace_back([this](const std::stop_token& stop) { serve(soon_, stop); });
   threads_.emplace_back([this](const std::stop_token& stop) { serve(measuring_, stop); });
+}
+
+// The same, whose memory counts as long as anybody has it: it grows.
+RangeCache::Relevant RangeCache::counted(Relevant relevant) const {
+  struct Counted {
+    std::mutex resizing;
+    Memory::Share share;
+    Relevant relevant;
+    Counted(Memory& memory, Relevant one) : share(memory, Memory::Holder::ranges, one->memory_bytes()), relevant(std::move(one)) {
+      relevant->set_on_growth([this] {
+        const std::lock_guard lock(resizing);
+        share.resize(relevant->memory_bytes());
+      });
+    }
+    Counted(const Counted&) = delete;
+    Counted& operator=(const Counted&) = delete;
+    ~Counted() { relevant->set_on_growth({}); }
+  };
+  const auto both = std::make_shared<const Counted>(memory_, std::move(relevant));
+  return {both, both->relevant.get()};
 }
 
 // What is known of a part, or is being found; better known distances before others.
@@ -39,7 +58,7 @@ RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volu
   const auto entry = entries_.insert(entries_.begin(), Entry{volume, part, promise.get_future().share()});
   lock.unlock();
   try {
-    Relevant relevant = counted(memory_, Memory::Holder::ranges, find_(finder, part));
+    Relevant relevant = counted(find_(finder, part));
     promise.set_value(relevant);
     lock.lock();
     entry->bytes = relevant->memory_bytes();
@@ -60,6 +79,7 @@ void RangeCache::drop_old(const Volume& volume, const RangePart& found) {
   for (auto entry = entries_.begin(); entry != entries_.end();) {
     const bool is_computed = entry->bytes != 0, is_first = entry == entries_.begin();
     const bool is_worse = entry->part.distances < found.distances && entry->part.shown == found.shown && entry->volume.lock() == volume;
+    if (is_computed) entry->bytes = entry->relevant.get()->memory_bytes();
     bytes += is_worse ? 0 : entry->bytes;
     const bool is_old = is_worse || entry->volume.expired() || (bytes > most_bytes_ && !is_first);
     entry = is_computed && is_old ? entries_.erase(entry) : std::next(entry);
@@ -103,10 +123,9 @@ std::shared_ptr<const RangeCache::Answer> RangeCache::ask(const Volume& volume, 
     request->promise_.set_value(std::move(whole));
     return request;
   }
-  const bool is_one = request->parts_.size() == 1 && request->parts_[0].relevant && request->parts_[0].relevant->shown() == shown;
-  if (request->parts_.empty() || is_one) {  // nothing to put together
+  if (request->first_lacking() == nullptr || (request->is_soon_ && volume->has_bounds())) {
     lock.unlock();
-    answer(*request);
+    find_now(*request);
     return request;
   }
   Queue& queue = request->is_soon_ ? soon_ : measuring_;
@@ -131,7 +150,7 @@ void RangeCache::answer(Answer& request) {
       relevant = find_relevant_updates(request.volume_, request.shown_, request.distances_, part_of);
       const auto is_same = [&](const Answer::Part& one) { return one.relevant == relevant; };
       const bool is_new = std::none_of(request.parts_.begin(), request.parts_.end(), is_same) && relevant.get() != &request.volume_->relevant();
-      if (is_new) relevant = counted(memory_, Memory::Holder::ranges, std::move(relevant));
+      if (is_new) relevant = counted(std::move(relevant));
       const std::lock_guard lock(mutex_);
       std::erase_if(wholes_, [](const Whole& whole) { return whole.relevant.expired(); });
       wholes_.push_back({request.volume_, request.distances_, relevant});
@@ -140,6 +159,20 @@ void RangeCache::answer(Answer& request) {
   } catch (...) {
     request.promise_.set_exception(std::current_exception());
   }
+}
+
+// What takes microseconds.
+void RangeCache::find_now(Answer& request) {
+  try {
+    PartFinder finder(*request.volume_);
+    for (Answer::Part& one : request.parts_) {
+      if (!one.relevant) one.relevant = get_part(finder, request.volume_, one.part);
+    }
+  } catch (...) {
+    request.promise_.set_exception(std::current_exception());
+    return;
+  }
+  answer(request);
 }
 
 void RangeCache::stop() {

@@ -2,9 +2,10 @@
 //
 // A range consists of parts, one for each of its surfaces (find_relevant_updates.h). Each part is found once, for all
 // ranges that have it, and kept. Ranges of several parts are put together for each session, and shared while one has them.
-// All this takes from milliseconds to a second and cannot be cut into slices, so threads of its own do it, behind the
-// sessions' work: some that estimate distances and put parts together, and one that measures distances. Each serves the
-// account that spent least, and the newest request of that account, first.
+// Where distances need not be measured, that takes microseconds: whoever asks does it, and what a brick needs is found when
+// a session comes to it (relevant_updates.h). To measure distances takes up to a second and cannot be cut into slices, so
+// a thread of its own does it, behind the sessions' work; another finds the bounds of a data set's values, which the first
+// range of it needs. Each serves the account that spent least, and the newest request of that account, first.
 #pragma once
 
 #include <condition_variable>
@@ -93,6 +94,7 @@ class RangeCache {
 
   [[nodiscard]] std::list<Entry>::iterator find_entry(const Volume& volume, const RangePart& part);
   [[nodiscard]] Relevant find_whole(const Volume& volume, const ShownRanges& shown, Distances distances) const;
+  [[nodiscard]] Relevant counted(Relevant relevant) const;
   [[nodiscard]] Relevant get_part(PartFinder& finder, const Volume& volume, const RangePart& part);
   void drop_old(const Volume& volume, const RangePart& found);
   void serve(Queue& queue, const std::stop_token& stop);
@@ -100,6 +102,7 @@ class RangeCache {
   [[nodiscard]] std::vector<Request> take_complete(const Volume& volume, const RangePart& part, const Relevant& relevant);
   void work_for(Request request, PartFinder& finder);
   void answer(Answer& request);
+  void find_now(Answer& request);
 
   Memory& memory_;
   FairScheduler& scheduler_;

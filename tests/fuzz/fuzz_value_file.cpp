@@ -3,9 +3,9 @@
 
 #include "common/ivm/every_range.h"
 #include "common/ivm/extraction.h"
-#include "common/ivm/relevant_slots.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_verify.h"
+#include "common/ranges/find_relevant_updates.h"
 #include "tests/fuzz/small_volumes.h"
 
 namespace {
@@ -34,10 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto volume = intervale::of_every_range(intervale::ValueVolume::Parts(decoded->parts()));
   if (!volume) std::abort();
   const intervale::ShownRange shown{{middle, middle}, {}};
-  const intervale::RelevantUpdates relevant(volume->description().grid, volume->set(), {volume->steps(), volume->error_steps()},
-                                            intervale::ShownRanges{shown}, relevant_slots(*volume, shown),
-                                            {std::vector<intervale::ErrorToDistance>(volume->set().supercubes())});
-  if (const auto mesh = extract(*volume, relevant, {}); !mesh || mesh->front.validate()) std::abort();
+  const auto relevant = intervale::PartFinder(*volume).find({shown});
+  if (const auto mesh = extract(*volume, *relevant, {}); !mesh || mesh->front.validate()) std::abort();
   if (!intervale::decode_values(intervale::encode_values(*decoded), "again")) std::abort();
   return 0;
 }

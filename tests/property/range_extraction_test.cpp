@@ -13,6 +13,7 @@
 #include "server/builder/value_builder.h"
 #include "tests/support/coverage.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/needs.h"
 #include "tests/support/parents.h"
 #include "tests/support/seeds.h"
 #include "tests/support/value_fields.h"
@@ -102,14 +103,16 @@ TEST_P(RangeExtraction, FindsWhatADataSetOfOneRangeHolds) {
     for (BrickIndex b{0}; b < all.bricks().size(); ++b) {
       all.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
         const auto found = one->set().find_supercube(scale_of_key(key), position_of_key(key));
-        updates += std::uint64_t(std::popcount(relevant->slots(s, all.occupancy()[s])));
-        EXPECT_EQ(relevant->slots(s, all.occupancy()[s]), found ? one->set().occupancy()[found->supercube] : 0);
+        const std::uint64_t slots = testing::slots_of(*relevant, *volume, b, s);
+        updates += std::uint64_t(std::popcount(slots));
+        EXPECT_EQ(slots, found ? one->set().occupancy()[found->supercube] : 0);
         if (!found) return;
-        const bool moves = one->relevant().error_to_distance()[found->supercube].code() != 0;
-        const bool has_error = one->error_steps()[one->relevant().supercube_error_steps()[found->supercube]] > 0;
+        const bool moves = testing::to_distance_of(one->relevant(), *one, found->brick, found->supercube).code() != 0;
+        const bool has_error =
+            one->error_steps()[one->relevant().brick(found->brick).error_step(testing::number_in_brick(*one, found->brick, found->supercube))] > 0;
         // Where a surface only touches the values nothing moves.
-        if (moves && has_error && crossed->slots(s, all.occupancy()[s]) != 0) {
-          EXPECT_GT(relevant->error_to_distance()[s].code(), 0);
+        if (moves && has_error && testing::slots_of(*crossed, *volume, b, s) != 0) {
+          EXPECT_GT(testing::to_distance_of(*relevant, *volume, b, s).code(), 0);
         }
       });
     }

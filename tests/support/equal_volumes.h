@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "common/ivm/interval_volume.h"
+#include "tests/support/needs.h"
 
 namespace intervale::testing {
 
 inline std::vector<std::uint8_t> codes_of(const IntervalVolume& v) {
   std::vector<std::uint8_t> codes;
-  for (const ErrorToDistance c : v.relevant().error_to_distance()) codes.push_back(c.code());
+  for (const ErrorToDistance c : error_to_distance_of(v.relevant(), v)) codes.push_back(c.code());
   return codes;
 }
 
@@ -33,7 +34,7 @@ inline void expect_equal(const IntervalVolume& a, const IntervalVolume& b) {
     ASSERT_TRUE(q);
     EXPECT_EQ(a.key(p.index), b.key(q->index));
     EXPECT_EQ(a.error(p.index), b.error(q->index));
-    EXPECT_EQ(a.relevant().slope(p.index), b.relevant().slope(q->index));
+    EXPECT_EQ(slope_of(a.relevant(), a, p), slope_of(b.relevant(), b, *q));
   });
 }
 

@@ -2,13 +2,16 @@
 #pragma once
 
 #include "common/ivm/interval_volume.h"
+#include "tests/support/needs.h"
 
 namespace intervale::testing {
 
 // By update; empty if they are not known.
 inline std::vector<std::uint8_t> slopes_of(const IntervalVolume& v) {
   std::vector<std::uint8_t> slopes;
-  for (UpdateIndex i{0}; v.relevant().has_slopes() && i < v.size(); ++i) slopes.push_back(std::uint8_t(v.relevant().slope(i)));
+  if (!v.relevant().has_slopes()) return slopes;
+  slopes.resize(v.size());
+  v.set().for_each_down([&](const Place& p) { slopes[p.index] = std::uint8_t(slope_of(v.relevant(), v, p)); });
   return slopes;
 }
 
@@ -18,7 +21,7 @@ inline IntervalVolume::Parts parts_of(const IntervalVolume& v) {
           v.keys(),
           {v.steps().begin(), v.steps().end()},
           {v.error_steps().begin(), v.error_steps().end()},
-          {{v.relevant().error_to_distance().begin(), v.relevant().error_to_distance().end()}, slopes_of(v)}};
+          {error_to_distance_of(v.relevant(), v), slopes_of(v)}};
 }
 
 }  // namespace intervale::testing

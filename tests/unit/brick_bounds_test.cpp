@@ -20,15 +20,15 @@ class BrickBounds : public ::testing::TestWithParam<unsigned> {
     const RelevantUpdates& relevant = volume_.relevant();
     std::vector<Ranking::Rank> ranks;
     for (BrickIndex b{0}; b < volume_.set().bricks().size(); ++b) {
-      const float object_error = relevant.brick_object_error(b);
-      const auto all = bounds(b, relevant.brick_error_step(b), object_error, relevant.brick_slope(b));
+      const float object_error = relevant.bound(b).object_error;
+      const auto all = bounds(b, relevant.bound(b).error_step, object_error, relevant.bound(b).slope);
       ranks.push_back(all.rank);
       const Ranking::Brick brick = ranking.of_brick(b);
       if (ranking.has_camera()) {
         ASSERT_GE(all.pixels, brick.pixels(object_error));
       }
       // Of what remains
-      const unsigned step = unsigned(random_()) % (relevant.brick_error_step(b) + 1), slope = unsigned(random_()) % (relevant.brick_slope(b) + 1);
+      const unsigned step = unsigned(random_()) % (relevant.bound(b).error_step + 1), slope = unsigned(random_()) % (relevant.bound(b).slope + 1);
       const auto some = bounds(b, step, object_error / 2, slope);
       ASSERT_LE(some.rank, all.rank);
       if (some.is_exact) {

@@ -18,6 +18,7 @@
 #include "common/ranges/surface_deviation.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/needs.h"
 #include "tests/support/parents.h"
 #include "tests/support/parts.h"
 
@@ -139,11 +140,11 @@ class ObjectErrors : public ::testing::TestWithParam<unsigned> {
 TEST_P(ObjectErrors, AreNeverAboveHalfTheDiamondsWidthOrWhatIsFurthest) {
   sigma_->set().for_each_down([&](const Place& p) {
     const double width = diamond_width(volume_.grid) * Diamond(SupercubeSet::centre(p)).h;
-    const float error = sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index), 0);
-    const bool is_far = sigma_->relevant().error_to_distance()[p.supercube].is_far();
+    const float error = testing::object_error_of(sigma_->relevant(), *sigma_, p);
+    const bool is_far = testing::to_distance_of(sigma_->relevant(), *sigma_, p.brick, p.supercube).is_far();
     ASSERT_LE(error, (is_far ? 64 * diamond_width(volume_.grid) : width) / 2 * (1 + 1e-6));
     ASSERT_GE(error, 0);
-    ASSERT_LE(error, sigma_->relevant().brick_object_error(p.brick));
+    ASSERT_LE(error, sigma_->relevant().bound(p.brick).object_error);
   });
 }
 
@@ -156,7 +157,7 @@ TEST_P(ObjectErrors, AreNoLessThanHalfOfWhatWasMeasuredAnywhereBelow) {
   std::size_t told = 0;
   set.for_each_down([&](const Place& p) {
     if (sigma_->error(p.index) == 0) return;  // no factor makes anything of that
-    ASSERT_GE(sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index), 0), moves[p.index] / 2 * (1 - 1e-5));
+    ASSERT_GE(testing::object_error_of(sigma_->relevant(), *sigma_, p), moves[p.index] / 2 * (1 - 1e-5));
     told += moves[p.index] > 0;
   });
   EXPECT_GT(told, 10u);
@@ -165,10 +166,8 @@ TEST_P(ObjectErrors, AreNoLessThanHalfOfWhatWasMeasuredAnywhereBelow) {
 TEST_P(ObjectErrors, OfABrickAreThoseOfOneOfItsUpdates) {
   const SupercubeSet& set = sigma_->set();
   std::vector<float> largest(set.bricks().size());
-  set.for_each_down([&](const Place& p) {
-    largest[p.brick] = std::max(largest[p.brick], sigma_->relevant().object_error(p.supercube, scale_of_key(p.key), sigma_->error_step(p.index), 0));
-  });
-  for (BrickIndex b{0}; b < largest.size(); ++b) EXPECT_EQ(sigma_->relevant().brick_object_error(b), largest[b]);
+  set.for_each_down([&](const Place& p) { largest[p.brick] = std::max(largest[p.brick], testing::object_error_of(sigma_->relevant(), *sigma_, p)); });
+  for (BrickIndex b{0}; b < largest.size(); ++b) EXPECT_EQ(sigma_->relevant().bound(b).object_error, largest[b]);
 }
 
 INSTANTIATE_TEST_SUITE_P(Fields, ObjectErrors, ::testing::Range(0u, 12u));
@@ -177,7 +176,7 @@ TEST(IntervalVolumeSet, RefusesYieldsThatAreNotOneForEachSupercube) {
   const Volume volume = testing::gyroid({9, 9, 9});
   const auto made = FieldHierarchy(volume, {.range = {-0.3, 0.2}}).compact();
   ASSERT_TRUE(made);
-  for (const std::size_t size : {std::size_t(0), made->relevant().error_to_distance().size() - 1, made->relevant().error_to_distance().size() + 1}) {
+  for (const std::size_t size : {std::size_t(0), made->set().supercubes() - 1, made->set().supercubes() + 1}) {
     auto parts = testing::parts_of(*made);
     parts.surface.to_distance.resize(size);
     EXPECT_FALSE(IntervalVolume::assemble(std::move(parts)));

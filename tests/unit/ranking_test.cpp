@@ -13,6 +13,7 @@
 #include "common/ivm/refinement.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/cameras.h"
+#include "tests/support/needs.h"
 #include "tests/support/parents.h"
 #include "tests/support/ranks.h"
 
@@ -28,7 +29,7 @@ using testing::Vector;
 // Half of how far the surfaces can move in an update's diamond, from what is stored.
 double object_error(const IntervalVolume& v, const Place& p) {
   const Grid& g = v.description().grid;
-  const std::uint8_t code = v.relevant().error_to_distance()[p.supercube].code();
+  const std::uint8_t code = testing::to_distance_of(v.relevant(), v, p.brick, p.supercube).code();
   const double h = std::exp2(scale_of_key(p.key)), widest = diamond_width(g) / 2 * h;
   if (code == 0 || v.error(p.index) == 0) return 0;
   if (code == 191) return widest;
@@ -102,9 +103,10 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
     const auto ahead = random_ahead(lod, volume_.description().grid, random_);
     const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr, ahead ? &*ahead : nullptr);
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
-      const unsigned level = volume_.relevant().supercube_error_steps()[p.supercube];
-      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, 0, volume_.relevant().supercube_slopes()[p.supercube]), rank)
-          << "trial " << trial;
+      const BrickNeeds& needs = volume_.relevant().brick(p.brick);
+      const std::size_t n = testing::number_in_brick(volume_, p.brick, p.supercube);
+      const unsigned level = needs.error_step(n);
+      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, 0, needs.slope(n)), rank) << "trial " << trial;
     });
   }
 }
@@ -183,12 +185,11 @@ TEST_P(Ranks, WhereDistancesAreKnownTheyTellWhatIsWanted) {
     for_each_rank(volume, ranking, [&](const Place& p, Ranking::Rank rank) {
       const Ranking::Brick brick = ranking.of_brick(p.brick);
       const RelevantUpdates& relevant = volume.relevant();
+      const BrickNeeds& needs = relevant.brick(p.brick);
+      const std::size_t n = testing::number_in_brick(volume, p.brick, p.supercube);
       ASSERT_GE(brick.bound(), rank);
-      ASSERT_GE(brick.supercube(p.supercube, p.key)
-                    .bound(relevant.supercube_error_steps()[p.supercube], relevant.supercube_distance(p.supercube),
-                           relevant.supercube_slopes()[p.supercube]),
-                rank);
-      const double pixels = double(distance_of(relevant.distance(p.index), diamond_width(g))) * pixels_per_unit(volume, view, p);
+      ASSERT_GE(brick.supercube(p.supercube, p.key).bound(needs.error_step(n), needs.distance(n), needs.slope(n)), rank);
+      const double pixels = double(distance_of(testing::distance_of(relevant, volume, p), diamond_width(g))) * pixels_per_unit(volume, view, p);
       if (std::abs(pixels - lod.camera->pixel_error) < 1e-5 * pixels) return;
       ASSERT_EQ(rank != 0, pixels > lod.camera->pixel_error) << "trial " << trial;
     });
@@ -238,10 +239,10 @@ TEST_P(Ranks, GrowWithTheSquaredDeviationInThePicture) {
     for_each_rank(volume, ranking, [&](const Place& p, Ranking::Rank rank) {
       if (rank == 0) return;
       const double a_unit = pixels_per_unit(volume_, view, p), pixels = object_error(volume_, p) * a_unit;
-      ASSERT_LE(pixels, ranking.of_brick(p.brick).pixels(volume_.relevant().brick_object_error(p.brick)) * (1 + 1e-5)) << "trial " << trial;
+      ASSERT_LE(pixels, ranking.of_brick(p.brick).pixels(volume_.relevant().bound(p.brick).object_error) * (1 + 1e-5)) << "trial " << trial;
       const double a_step = spacing * a_unit, h = std::exp2(scale_of_key(p.key)) * a_step;
       const double removed = volume.relevant().has_slopes()
-                                 ? removed_of(volume.relevant().slope(p.index)) * std::pow(a_step, 3) * std::exp2(scale_of_key(p.key))
+                                 ? removed_of(testing::slope_of(volume.relevant(), volume, p)) * std::pow(a_step, 3) * std::exp2(scale_of_key(p.key))
                                  : pixels * pixels * h * h;
       const double large = std::clamp(h / 12, 1.0, 16.0);
       all.emplace_back(rank, removed * large * large * large * view.seen_share(region_around(volume_, view, p)));
@@ -298,7 +299,7 @@ TEST_P(Ranks, PixelsAreANumberWhateverTheCamera) {
       ASSERT_TRUE(check_lod(lod));
       const Ranking ranking(volume_, lod);
       for (BrickIndex b{0}; b < volume_.set().bricks().size(); ++b) {
-        ASSERT_TRUE(std::isfinite(ranking.of_brick(b).pixels(volume_.relevant().brick_object_error(b)))) << "fov " << fov;
+        ASSERT_TRUE(std::isfinite(ranking.of_brick(b).pixels(volume_.relevant().bound(b).object_error))) << "fov " << fov;
       }
       for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ASSERT_LE(rank, ranking.of_brick(p.brick).bound()); });
     }

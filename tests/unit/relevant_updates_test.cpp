@@ -7,12 +7,16 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <random>
 #include <vector>
 
+#include "common/ivm/refinement.h"
+#include "common/ivm/value_bounds.h"
 #include "common/ranges/find_relevant_updates.h"
 #include "common/util/bits.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/needs.h"
 
 namespace intervale {
 namespace {
@@ -41,6 +45,36 @@ class United : public ::testing::TestWithParam<unsigned> {
     return distinct(shown);
   }
 
+  // What is known of bricks and supercubes bounds all that is relevant in them.
+  void expect_bounds(const RelevantUpdates& all) const {
+    const SupercubeSet& set = volume_->set();
+    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      const RelevantUpdates::Bound& bound = all.bound(b);
+      const BrickNeeds& needs = all.brick(b);
+      ASSERT_GE(bound.updates, needs.updates());
+      ASSERT_LE(bound.updates, set.updates(b));
+      unsigned relevant = 0;
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+        const std::size_t n = testing::number_in_brick(*volume_, b, s);
+        unsigned step = 0, slope = 0, distance = 0;
+        for (const Slot slot : set_bits<Slot>(testing::slots_of(all, *volume_, b, s))) {
+          const Place p = set.place_in(b, s, key, slot);
+          ++relevant;
+          step = std::max(step, volume_->error_step(p.index));
+          slope = std::max(slope, testing::slope_of(all, *volume_, p));
+          distance = std::max<unsigned>(distance, testing::distance_of(all, *volume_, p));
+          ASSERT_GE(bound.object_error, testing::object_error_of(all, *volume_, p) * (1 - 1e-5F));
+        }
+        ASSERT_EQ(needs.error_step(n), step);
+        ASSERT_EQ(needs.slope(n), slope);
+        ASSERT_EQ(needs.distance(n), distance);
+        ASSERT_GE(bound.error_step, step);
+        ASSERT_GE(bound.slope, slope);
+      });
+      ASSERT_EQ(needs.updates(), relevant);
+    }
+  }
+
   std::mt19937 random_{GetParam()};
   std::shared_ptr<const IntervalVolume> volume_ =
       testing::build_shared(testing::gyroid(kRelevantBoxes[GetParam() % kRelevantBoxes.size()]), {.range = {-1.5, 1.5}, .refine = Refine::uniform});
@@ -56,53 +90,30 @@ TEST_P(United, IsWhatEachRangeNeeds) {
     const bool has_distances = std::any_of(each.begin(), each.end(), [](const auto& one) { return one->has_distances(); });
     ASSERT_EQ(all.has_distances(), has_distances);
     const bool all_have_distances = std::all_of(each.begin(), each.end(), [](const auto& one) { return one->has_distances(); });
-    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
-      unsigned brick_step = 0;
-      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
-        const std::uint64_t occupancy = set.occupancy()[s];
-        std::uint64_t slots = 0;
-        for (const auto& one : each) slots |= one->slots(s, occupancy);
-        ASSERT_EQ(all.slots(s, occupancy), slots);
-        unsigned most = 0;
-        for (const Slot slot : set_bits<Slot>(slots)) most = std::max(most, volume_->error_step(set.first(b, s) + count_below(occupancy, slot)));
-        ASSERT_EQ(all.supercube_error_steps()[s], most);
-        unsigned steepest = 0;
-        for (const Slot slot : set_bits<Slot>(slots)) {
-          const UpdateIndex i = set.first(b, s) + count_below(occupancy, slot);
-          unsigned slope = 0;
-          for (const auto& one : each) slope = std::max(slope, one->slope(i));
-          ASSERT_EQ(all.slope(i), has_slopes ? slope : 0);
-          steepest = std::max(steepest, all.slope(i));
-        }
-        ASSERT_EQ(all.supercube_slopes()[s], steepest);
-        ASSERT_GE(all.brick_slope(b), steepest);
-        brick_step = std::max(brick_step, most);
-        std::uint8_t longest = 0;
-        for (const Slot slot : set_bits<Slot>(slots)) {
-          const UpdateIndex i = set.first(b, s) + count_below(occupancy, slot);
-          const auto error = [&](const RelevantUpdates& of) { return of.object_error(s, scale_of_key(key), volume_->error_step(i), of.distance(i)); };
-          float farthest = 0;
-          for (const auto& one : each) {
-            if ((one->slots(s, occupancy) >> slot & 1) != 0) farthest = std::max(farthest, error(*one));
-          }
-          ASSERT_GE(error(all), farthest * (1 - 1e-5F));
-          if (all_have_distances) {
-            ASSERT_LE(error(all), farthest * 1.0906F) << "more than one of its steps longer";
-          }
-          // What is refined inside has no distances of its own: it is wanted as far as errors tell.
-          const bool is_told_by_error = has_distances && std::any_of(each.begin(), each.end(), [&](const auto& one) {
-                                          return !one->has_distances() && (one->slots(s, occupancy) >> slot & 1) != 0;
-                                        });
-          if (is_told_by_error) {
-            ASSERT_GE(error(all), all.object_error(all.error_to_distance()[s], scale_of_key(key), volume_->error_step(i)) * (1 - 1e-5F));
-          }
-          ASSERT_GE(all.brick_object_error(b), error(all));
-          longest = std::max(longest, all.distance(i));
-        }
-        ASSERT_EQ(all.supercube_distance(s), longest);
-      });
-      ASSERT_EQ(all.brick_error_step(b), brick_step);
-    }
+    set.for_each_down([&](const Place& p) {
+      const auto relevant_to = [&](const auto& one) { return testing::is_relevant(*one, *volume_, p); };
+      ASSERT_EQ(testing::is_relevant(all, *volume_, p), std::any_of(each.begin(), each.end(), relevant_to));
+      unsigned slope = 0;
+      for (const auto& one : each) slope = std::max(slope, testing::slope_of(*one, *volume_, p));
+      ASSERT_EQ(testing::slope_of(all, *volume_, p), has_slopes ? slope : 0);
+      if (!testing::is_relevant(all, *volume_, p)) return;
+      const auto error = [&](const RelevantUpdates& of) { return testing::object_error_of(of, *volume_, p); };
+      float farthest = 0;
+      for (const auto& one : each) farthest = std::max(farthest, relevant_to(one) ? error(*one) : 0);
+      ASSERT_GE(error(all), farthest * (1 - 1e-5F));
+      if (all_have_distances) {
+        ASSERT_LE(error(all), farthest * 1.0906F) << "more than one of its steps longer";
+      }
+      // What is refined inside has no distances of its own: it is wanted as far as errors tell.
+      const bool is_told_by_error =
+          has_distances && std::any_of(each.begin(), each.end(), [&](const auto& one) { return !one->has_distances() && relevant_to(one); });
+      if (is_told_by_error) {
+        const ErrorToDistance code = testing::to_distance_of(all, *volume_, p.brick, p.supercube);
+        ASSERT_GE(error(all), all.object_error(code, scale_of_key(p.key), volume_->error_step(p.index)) * (1 - 1e-5F));
+      }
+    });
+    expect_bounds(all);
+    for (const auto& one : each) expect_bounds(*one);
   }
 }
 
@@ -113,10 +124,43 @@ TEST_P(United, OrderAndRepetitionDoNotMatter) {
   each.push_back(each.front());
   const RelevantUpdates other = united(*volume_, each, shown_by(each));
   EXPECT_EQ(one.shown(), other.shown());
-  for (SupercubeIndex s{0}; s < volume_->set().supercubes(); ++s) {
-    const std::uint64_t occupancy = volume_->set().occupancy()[s];
-    ASSERT_EQ(one.slots(s, occupancy), other.slots(s, occupancy));
-    ASSERT_EQ(one.error_to_distance()[s].code(), other.error_to_distance()[s].code());
+  EXPECT_EQ(testing::slots_of(one, *volume_), testing::slots_of(other, *volume_));
+  const auto codes = testing::error_to_distance_of(one, *volume_), others = testing::error_to_distance_of(other, *volume_);
+  EXPECT_TRUE(std::ranges::equal(codes, others, {}, &ErrorToDistance::code, &ErrorToDistance::code));
+}
+
+// Against what the values around each diamond say, and its children's: the definition.
+TEST_P(United, APartHasWhatCountsAndAllItsAncestors) {
+  const SupercubeSet& set = volume_->set();
+  PartFinder finder(*volume_);
+  for (const Refine refine : {Refine::boundary, Refine::uniform}) {
+    const double alpha = std::uniform_real_distribution(-1.5, 1.5)(random_);
+    const ShownRange shown{{alpha, alpha + 0.3}, refine};
+    const CountingKeys counts(KeySides(volume_->description().format, shown.range), refine);
+    const SplitSet expected = select(set, [&](const Place& p) {
+      const Diamond d(SupercubeSet::centre(p));
+      KeySpan span{volume_->key(p.index), volume_->key(p.index)};
+      for (int v = 0; v < int(d.row->vertices); ++v) {
+        const int corner = volume_->domain().corner_number(d.vertex(v));
+        const auto place = corner < 0 ? set.find(d.vertex(v)) : std::nullopt;
+        if (corner >= 0) span.add(volume_->description().corners[std::size_t(corner)]);
+        if (place) span.add(volume_->key(place->index));
+      }
+      return counts(span.least, span.greatest);
+    });
+    for (const Distances distances : {Distances::none, Distances::estimated}) {
+      const auto found = finder.find({shown, distances});
+      // In any order of bricks.
+      std::vector<std::uint32_t> bricks(set.bricks().size());
+      std::iota(bricks.begin(), bricks.end(), 0U);
+      std::shuffle(bricks.begin(), bricks.end(), random_);
+      for (const std::uint32_t b : bricks) {
+        set.for_each_in_brick(BrickIndex(b), ~std::uint64_t(0), [&](const Place& p) {
+          ASSERT_EQ(testing::is_relevant(*found, *volume_, p), expected.contains(p.index)) << "scale " << scale_of_key(p.key);
+        });
+      }
+      expect_bounds(*found);
+    }
   }
 }
 
@@ -131,11 +175,13 @@ TEST(FindRelevantUpdates, EstimatesDistances) {
     const SupercubeSet& set = volume->set();
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
-        ASSERT_EQ(estimated->slots(s, set.occupancy()[s]), measured->slots(s, set.occupancy()[s]));
+        ASSERT_EQ(testing::slots_of(*estimated, *volume, b, s), testing::slots_of(*measured, *volume, b, s));
         if (scale_of_key(key) != 0) return;
-        const unsigned step = measured->supercube_error_steps()[s];
-        const float as_estimated = estimated->object_error(s, 0, step, 0),
-                    as_measured = measured->object_error(s, 0, step, measured->supercube_distance(s));
+        const std::size_t n = testing::number_in_brick(*volume, b, s);
+        const BrickNeeds &of_measured = measured->brick(b), &of_estimated = estimated->brick(b);
+        const unsigned step = of_measured.error_step(n);
+        const float as_estimated = estimated->object_error(of_estimated.to_distance(n), 0, step, 0),
+                    as_measured = measured->object_error(of_measured.to_distance(n), 0, step, of_measured.distance(n));
         if (as_measured > 0 && as_estimated > 0) octaves.push_back(std::log2(as_estimated / as_measured));
       });
     }

@@ -1,0 +1,59 @@
+#include "common/ivm/brick_needs.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+namespace intervale {
+namespace {
+
+// Numbers of four bits, two a byte.
+std::vector<std::uint8_t> in_halves(std::span<const std::uint8_t> numbers) {
+  std::vector<std::uint8_t> result((numbers.size() + 1) / 2);
+  for (std::size_t i = 0; i < numbers.size(); ++i) result[i / 2] = std::uint8_t(result[i / 2] | numbers[i] << (i % 2 * 4));
+  return result;
+}
+
+// Often one of the first relevant updates has the highest step of all.
+std::uint8_t highest_step(std::span<const std::uint8_t> steps, std::uint64_t relevant, std::uint64_t occupancy) {
+  const std::uint8_t most_of_all = *std::max_element(steps.begin(), steps.end());
+  std::uint8_t most = 0;
+  for (std::uint64_t left = relevant; left != 0 && most < most_of_all; left &= left - 1)
+    most = std::max(most, steps[std::size_t(count_below(occupancy, std::countr_zero(left)))]);
+  return most;
+}
+
+}  // namespace
+
+BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs,
+                       Surface surface)
+    : highest_(needs.size()), slopes_(in_halves(surface.slopes)), distances_(std::move(surface.distances)) {
+  const bool has_surface = !slopes_.empty() || !distances_.empty();
+  if (has_surface) first_.resize(needs.size());
+  slots_.resize(needs.size());
+  bool is_all = true;
+  std::size_t n = 0;
+  set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
+    const std::uint64_t occupancy = set.occupancy()[s], relevant = needs[n].slots;
+    const auto count = unsigned(std::popcount(relevant));
+    Highest& highest = highest_[n];
+    highest.to_distance = needs[n].to_distance;
+    slots_[n] = relevant;
+    is_all = is_all && relevant == occupancy;
+    if (has_surface) first_[n] = std::uint16_t(updates_);
+    if (relevant != 0)
+      highest.error_step = highest_step(steps.subspan(set.first(brick, s), std::size_t(std::popcount(occupancy))), relevant, occupancy);
+    for (std::size_t i = updates_; !surface.slopes.empty() && i < updates_ + count; ++i) highest.slope = std::max(highest.slope, surface.slopes[i]);
+    for (std::size_t i = updates_; !distances_.empty() && i < updates_ + count; ++i) highest.distance = std::max(highest.distance, distances_[i]);
+    updates_ += count;
+    ++n;
+  });
+  if (is_all) slots_ = {};
+}
+
+std::size_t BrickNeeds::memory_bytes() const {
+  return sizeof *this + highest_.size() * sizeof highest_[0] + slots_.size() * sizeof slots_[0] + first_.size() * sizeof first_[0] + slopes_.size() +
+         distances_.size();
+}
+
+}  // namespace intervale

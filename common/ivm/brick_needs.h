@@ -1,0 +1,64 @@
+// What ranges need of one brick: which of its updates are relevant, and how far the surfaces around them can move.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/diamond/supercube.h"
+#include "common/ivm/distance_codes.h"
+#include "common/util/bits.h"
+
+namespace intervale {
+
+// Immutable. Supercubes are counted within their brick, from 0. Memory: 4 bytes a supercube, 8 more unless all updates
+// are relevant; with slopes or distances 2 more, and for each relevant update a byte for its distance and half a byte
+// for its slope.
+class BrickNeeds {
+ public:
+  struct Supercube {
+    std::uint64_t slots = 0;  // those that are relevant
+    ErrorToDistance to_distance;
+  };
+  // Known of relevant updates, in order of their numbers; empty: not known.
+  struct Surface {
+    std::vector<std::uint8_t> slopes = {};  // at most kMaxSlope
+    std::vector<std::uint8_t> distances = {};
+  };
+  // needs: of each supercube of the brick. steps: the error steps of all updates of the set, by number.
+  BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs, Surface surface);
+
+  // Relevant ones. occupancy: of that supercube.
+  [[nodiscard]] std::uint64_t slots(std::size_t supercube, std::uint64_t occupancy) const { return slots_.empty() ? occupancy : slots_[supercube]; }
+  [[nodiscard]] ErrorToDistance to_distance(std::size_t supercube) const { return highest_[supercube].to_distance; }
+  // The highest of a supercube's relevant updates; 0 if there are none, or if they are not known.
+  [[nodiscard]] std::uint8_t error_step(std::size_t supercube) const { return highest_[supercube].error_step; }
+  [[nodiscard]] std::uint8_t slope(std::size_t supercube) const { return highest_[supercube].slope; }
+  [[nodiscard]] std::uint8_t distance(std::size_t supercube) const { return highest_[supercube].distance; }
+  // Of one relevant update: `before` relevant ones of its supercube have lower slots. 0 where they are not known.
+  [[nodiscard]] std::uint8_t slope(std::size_t supercube, int before) const {
+    if (slopes_.empty()) return 0;
+    const std::size_t i = std::size_t(first_[supercube]) + std::size_t(before);
+    return std::uint8_t(slopes_[i / 2] >> (i % 2 * 4) & 15U);
+  }
+  [[nodiscard]] std::uint8_t distance(std::size_t supercube, int before) const {
+    return distances_.empty() ? std::uint8_t(0) : distances_[std::size_t(first_[supercube]) + std::size_t(before)];
+  }
+  [[nodiscard]] unsigned updates() const { return updates_; }  // that are relevant
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Highest {
+    ErrorToDistance to_distance;
+    std::uint8_t error_step = 0, slope = 0, distance = 0;
+  };
+  std::vector<Highest> highest_;         // by supercube
+  std::vector<std::uint64_t> slots_;     // by supercube; empty: all
+  std::vector<std::uint16_t> first_;     // by supercube: how many relevant updates are before it; empty: no need to know
+  std::vector<std::uint8_t> slopes_;     // by two relevant updates, the first in the lower half
+  std::vector<std::uint8_t> distances_;  // by relevant update
+  unsigned updates_ = 0;
+};
+
+}  // namespace intervale
