@@ -11,10 +11,6 @@
 namespace intervale {
 namespace {
 
-// Supercubes and updates visited in one call of next() that finds nothing: some 2 ms; four times as many end a batch. Much less
-// would cut what a drag of a range needs, a few updates in many places, into small batches that name the same supercubes
-// again.
-constexpr std::uint32_t kMaxVisited = 1 << 18;
 constexpr std::uint32_t kFindVisits = 1 << 12;  // finding what a brick needs takes as long as so many visits
 
 }  // namespace
@@ -289,9 +285,17 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
   Unsent rest{.unsent = unsigned(std::popcount(unsent)), .highest = highest(in, s)};
   if (candidates == 0) return rest;
-  const Ranking::Supercube ranking = brick.supercube(s, first.key);
   // Ancestors in the budget come last.
-  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.distance, rest.highest.slope), budget_ ? Rank(1) : Rank(0));
+  const Rank least = budget_ ? Rank(1) : Rank(0);
+  const Highest& all = rest.highest;
+  const float object_error = relevant_->object_error(in.needs.to_distance(in.number), scale_of_key(first.key), all.error_step, all.distance);
+  if (const Rank most = std::max(brick.bound(all.error_step, object_error, all.slope), least); most < band_) {
+    rest.rank = most;
+    rest.wanted = most == 0 ? 0 : unsigned(std::popcount(candidates));
+    return rest;
+  }
+  const Ranking::Supercube ranking = brick.supercube(s, first.key);
+  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.distance, rest.highest.slope), least);
   if (bound < band_) {
     rest.rank = bound;
     rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
@@ -348,7 +352,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
   return true;
 }
 
-std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
+std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_visits) {
   if (lacks_values()) return next_values(max_bytes);
   if (search_) {
     if (search_->go_on()) return {};
@@ -368,7 +372,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes) {
     }
     if (!visit_brick(BrickIndex(next_brick_ - 1), builder)) break;
     --next_brick_;
-    if (builder.visited >= (builder.updates == 0 ? kMaxVisited : 4 * kMaxVisited)) break;
+    if (builder.visited >= max_visits) break;
   }
   if (builder.updates == 0) return {};
   std::vector<SlotGroup>& groups = builder.groups;

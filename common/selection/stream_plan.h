@@ -44,6 +44,8 @@ inline constexpr std::size_t kFirstPayload = 4 << 10;
 // known.
 class StreamPlan {
  public:
+  static constexpr std::uint32_t kMostVisits = 1 << 19;
+
   // At first everything that the range of the data set needs is relevant.
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
@@ -82,10 +84,11 @@ class StreamPlan {
   // may go on with it; otherwise next() does.
   [[nodiscard]] const std::shared_ptr<BudgetSearch>& search() const { return search_; }
 
-  // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call, about a
-  // millisecond: done() tells which. max_bytes, at least 256, bounds the payload
-  // with its channels before compression, which takes about half of it.
-  std::optional<Batch> next(std::size_t max_bytes);
+  // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call: done() tells
+  // which. max_bytes, at least 256, bounds the payload with its channels before compression, which takes about half of it.
+  // max_visits: of supercubes and updates, after which the batch ends; 2^15 take about a quarter of a millisecond. Few cut
+  // what a drag of a range needs, a few updates in many places, into small batches that name the same supercubes again.
+  std::optional<Batch> next(std::size_t max_bytes, std::uint32_t max_visits = kMostVisits);
   [[nodiscard]] bool done() const { return !search_ && !lacks_values() && (pending_bricks_ == 0 || is_full()); }
   // More is wanted than the client may hold.
   [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }

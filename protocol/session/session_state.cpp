@@ -19,6 +19,7 @@ Fault other_version(std::uint32_t payload) {
 }
 
 constexpr double kCoarser = 4;
+constexpr std::uint32_t kContendedVisits = 1 << 16;  // while other sessions wait: half a millisecond
 
 // For estimates, which are up to this many times too large for most diamonds.
 Lod coarser(Lod lod) {
@@ -195,7 +196,7 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   const std::uint64_t bound =
       std::min({std::uint64_t(target_), std::uint64_t(max_payload), std::max<std::uint64_t>(protocol::kMinPayload, 2 * last_grant_)});
   const std::uint64_t size = std::min(bound, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
-  auto batch = plan_->next(size);
+  auto batch = plan_->next(size, max_payload < protocol::kMaxBatchPayload ? kContendedVisits : StreamPlan::kMostVisits);
   if (!batch) {
     waits_ = plan_->done() && measurement_;
     if (!plan_->done() || measurement_) return {};
