@@ -23,8 +23,9 @@ inline constexpr const char* kPath = "/v1/stream";       // the path of the WebS
 inline constexpr const char* kServerName = "intervale";  // how the HTTP field Server begins
 
 // The version of the layout of batches' payloads. 1: updates are sides and cuts; peers that do not say their version
-// have it. 2: updates are values. 3: the same; descriptions have an affine instead of spacing and origin.
-inline constexpr std::uint32_t kPayloadVersion = 3;
+// have it. 2: updates are values. 3: the same; descriptions have an affine instead of spacing and origin. 4: names
+// are range coded.
+inline constexpr std::uint32_t kPayloadVersion = 4;
 
 // Why a session ended: WebSocket close codes.
 enum class CloseCode : std::uint16_t {

@@ -1,10 +1,10 @@
 // The layout of a batch: updates on the wire. batch_encoder.h writes it and batch_decoder.h applies it.
 //
-// A batch names supercubes. For each diamond in them that can be split, a flag says whether it is; both sides know
-// which diamonds those are. If the diamond is split, the residual of the value at its centre follows. Both sides know
-// the values at its vertices, which give the prediction of the value and the context of the flag. Everything is range
-// coded. Updates stand in the order in which they are applied: scale by scale from coarse to fine; within one scale all
-// of class 0, then class 1, then class 2; then by supercube and slot. PROTOCOL.md has the layout.
+// A batch names supercubes (split_names.h). For each diamond in them that can be split, a flag says whether it is; both
+// sides know which diamonds those are. If the diamond is split, the residual of the value at its centre follows. Both
+// sides know the values at its vertices, which give the prediction of the value and the context of the flag. Everything
+// is range coded. Updates stand in the order in which they are applied: scale by scale from coarse to fine; within
+// one scale all of class 0, then class 1, then class 2; then by supercube and slot. PROTOCOL.md has the layout.
 #pragma once
 
 #include <algorithm>

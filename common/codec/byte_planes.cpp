@@ -26,7 +26,7 @@ ZSTD_CCtx& compressor_of_thread() {
 void append_plane(std::vector<std::uint8_t>& out, std::span<const std::uint8_t> plane, int compression) {
   append_varint(out, plane.size());
   if (plane.empty()) return;
-// The browser's module has no compressor: it sends only names of splits, which are small as they are
+// The browser's modules have no compressor: one of them sends tables of values, to the other
 #ifdef INTERVALE_STORED_PLANES
   (void)compression;
   append_varint(out, plane.size());

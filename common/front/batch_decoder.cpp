@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "common/codec/batch.h"
-#include "common/codec/byte_planes.h"
 #include "common/codec/split_names.h"
 #include "common/util/bits.h"
 
@@ -15,19 +14,19 @@ namespace {
 
 tl::unexpected<Error> damaged(const char* what) { return fail(std::string("a batch is damaged: ") + what); }
 
-// Reads the flags and values of a batch, and splits diamonds of fronts: finds them in the first one, and makes the same
+// Reads the flags and values of a batch, after its names, and splits diamonds of fronts: finds them in the first one, and makes the same
 // splits in the others.
 class BatchDecoder {
  public:
-  BatchDecoder(std::span<Front> fronts, const Description& description, const ShownRanges& shown, std::span<const std::uint8_t> bytes,
+  BatchDecoder(std::span<Front> fronts, const Description& description, const ShownRanges& shown, const RangeDecoder& coder, bool is_plain,
                std::uint64_t max_tets)
       : fronts_(fronts),
         description_(description),
         ranges_(description.format, shown),
         max_tets_(max_tets),
-        coder_(bytes),
+        coder_(coder),
         cursor_(fronts[0].state()) {
-    models_.is_plain = coder_.raw_bits(1) != 0;
+    models_.is_plain = is_plain;
     others_.reserve(fronts.size() - 1);
     for (const Front& other : fronts.subspan(1)) others_.emplace_back(other.state());
   }
@@ -104,11 +103,11 @@ class BatchDecoder {
 
 Result<std::uint64_t> apply_batch(std::span<Front> fronts, const Description& description, const ShownRanges& shown,
                                   std::span<const std::uint8_t> bytes, std::uint64_t max_tets) {
-  const auto keys = take_supercubes(bytes, kBatchUpdatesMost);
+  RangeDecoder coder(bytes);
+  const bool is_plain = coder.raw_bits(1) != 0;
+  const auto keys = decode_supercubes(coder, is_plain, kBatchUpdatesMost);
   if (!keys) return damaged(keys.error().message.c_str());
-  const auto length = take_varint(bytes);
-  if (!length || *length != bytes.size()) return damaged("its length is wrong");
-  const auto decoder = std::make_unique<BatchDecoder>(fronts, description, shown, bytes, max_tets);
+  const auto decoder = std::make_unique<BatchDecoder>(fronts, description, shown, coder, is_plain, max_tets);
   for_each_class(
       keys->size(), [&](std::size_t g) { return (*keys)[g]; }, [&](std::size_t g, int cls) { return decoder->take((*keys)[g], cls); });
   if (decoder->wrong() != nullptr) return damaged(decoder->wrong());

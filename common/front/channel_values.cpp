@@ -28,9 +28,11 @@ Result<std::vector<SlotGroup>> take_names(std::span<const std::uint8_t>& bytes) 
   return names;
 }
 
-// All that is split of the supercubes that updates name.
+// All that is split of the supercubes that a batch of updates names.
 Result<std::vector<SlotGroup>> names_of(std::span<const std::uint8_t> updates, const Front& front) {
-  const auto keys = take_supercubes(updates, kBatchUpdatesMost);
+  RangeDecoder coder(updates);
+  const bool is_plain = coder.raw_bits(1) != 0;
+  const auto keys = decode_supercubes(coder, is_plain, kBatchUpdatesMost);
   if (!keys) return tl::unexpected(keys.error());
   std::vector<SlotGroup> names;
   names.reserve(keys->size());

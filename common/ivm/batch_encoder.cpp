@@ -4,7 +4,6 @@
 #include <bit>
 #include <memory>
 
-#include "common/codec/byte_planes.h"
 #include "common/codec/split_names.h"
 #include "common/ivm/split_lattice.h"
 
@@ -39,9 +38,10 @@ class BatchEncoder {
     }
   }
 
-  // The flags and values, range coded: without models if that is shorter.
+  // The batch: without models if that is shorter.
   [[nodiscard]] std::vector<std::uint8_t> code() const {
-    const std::size_t plain_bits = candidates_.size() + updates_ * std::size_t(std::bit_width(volume_.description().format.last));
+    const std::size_t key_bits = std::size_t(std::bit_width(volume_.description().format.last));
+    const std::size_t plain_bits = plain_supercube_bits(groups_) + candidates_.size() + updates_ * key_bits;
     std::vector<std::uint8_t> bytes = coded(false);
     return bytes.size() > sizeof(std::uint64_t) + plain_bits / 8 ? coded(true) : bytes;
   }
@@ -73,6 +73,7 @@ class BatchEncoder {
     const auto models = std::make_unique<BatchModels>();
     models->is_plain = is_plain;
     coder.raw_bits(1, unsigned(is_plain));
+    encode_supercubes(coder, is_plain, groups_);
     const ValueKey last = volume_.description().format.last;
     for_each_class(
         groups_.size(), [&](std::size_t g) { return groups_[g].key; },
@@ -105,12 +106,7 @@ class BatchEncoder {
 
 std::vector<std::uint8_t> encode_batch(const IntervalVolume& volume, const ShownRanges& shown, const SplitSet& split,
                                        std::span<const SlotGroup> groups) {
-  const std::vector<std::uint8_t> diamonds = BatchEncoder(volume, shown, split, groups).code();
-  std::vector<std::uint8_t> out;
-  append_supercubes(out, groups);
-  append_varint(out, diamonds.size());
-  out.insert(out.end(), diamonds.begin(), diamonds.end());
-  return out;
+  return BatchEncoder(volume, shown, split, groups).code();
 }
 
 }  // namespace intervale

@@ -109,9 +109,9 @@ class StreamPlan {
     SplitSet held;
     std::uint64_t count = 0;
   };
-  static constexpr std::size_t kBrickBytes = 18;     // most bytes that name a brick: a step and a mask
-  static constexpr std::size_t kSupercubeBytes = 7;  // a mask of slots
-  static constexpr std::size_t kPlaneBytes = 64;     // the lengths of all byte planes
+  static constexpr std::size_t kBrickBytes = 18;     // most bytes that name a brick
+  static constexpr std::size_t kSupercubeBytes = 7;  // flags, or a mask of slots
+  static constexpr std::size_t kPlaneBytes = 64;     // lengths, and the ends of what is coded
   // Some updates were sent without a value that is wanted now.
   [[nodiscard]] bool lacks_values() const;
   std::optional<Batch> next_values(std::size_t max_bytes);

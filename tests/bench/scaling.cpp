@@ -82,7 +82,9 @@ class Pages {
   }
   // Adds the pages of a batch, and those without which they cannot be decoded.
   void add(std::span<const std::uint8_t> payload, std::set<std::uint32_t>& to) const {
-    for (const SupercubeKey key : or_throw(take_supercubes(payload, kBatchUpdatesMost))) {
+    RangeDecoder coder(payload);
+    const bool is_plain = coder.raw_bits(1) != 0;
+    for (const SupercubeKey key : or_throw(decode_supercubes(coder, is_plain, kBatchUpdatesMost))) {
       const std::uint32_t page = page_of_.at(block_of(key));
       if (to.insert(page).second) to.insert(needs_[page].begin(), needs_[page].end());
     }

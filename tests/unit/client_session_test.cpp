@@ -121,9 +121,9 @@ TEST(ClientSession, TellsBothVersionsOfBatches) {
   const struct {
     std::uint32_t payload;
     const char* error;
-  } cases[] = {{0, "the server sends batches of version 1, and this client reads version 3: update the server"},
-               {1, "the server sends batches of version 1, and this client reads version 3: update the server"},
-               {4, "the server sends batches of version 4, and this client reads version 3: update the client"}};
+  } cases[] = {{0, "the server sends batches of version 1, and this client reads version 4: update the server"},
+               {1, "the server sends batches of version 1, and this client reads version 4: update the server"},
+               {5, "the server sends batches of version 5, and this client reads version 4: update the client"}};
   for (const auto& c : cases) {
     ClientSession session(kOptions);
     session.look({});

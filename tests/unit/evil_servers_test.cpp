@@ -13,7 +13,8 @@
 #include <vector>
 
 #include "client/core/client_session.h"
-#include "common/codec/byte_planes.h"
+#include "common/codec/batch.h"
+#include "common/codec/split_names.h"
 #include "common/selection/stream_plan.h"
 #include "common/util/printable.h"
 #include "protocol/codec.h"
@@ -93,15 +94,14 @@ Bytes noise(std::size_t size, unsigned seed) {
   for (auto& byte : noise) byte = std::uint8_t(random());
   return noise;
 }
-// A plane of zeros, 16 MiB of them, that claims another length.
-Bytes bomb(std::uint64_t says) {
-  Bytes honest_plane, plane;
-  append_plane(honest_plane, Bytes(16 << 20), 1);
-  std::span<const std::uint8_t> rest(honest_plane);
-  (void)take_varint(rest);
-  append_varint(plane, says);
-  plane.insert(plane.end(), rest.begin(), rest.end());
-  return plane;
+// A batch that names so many supercubes, and nothing else.
+Bytes names(std::uint64_t supercubes) {
+  std::vector<SlotGroup> groups;
+  for (SupercubeKey k = 0; k < supercubes; ++k) groups.push_back({{}, {}, supercube_key(0, {}) + k, 1});
+  RangeEncoder coder;
+  coder.raw_bits(1, 0);
+  encode_supercubes(coder, false, groups);
+  return coder.finish();
 }
 
 std::vector<Lie> descriptions() {
@@ -177,9 +177,9 @@ std::vector<Lie> descriptions() {
 std::vector<Lie> batches() {
   const Honest other = make_honest(testing::digits({9, 12, 5}, 3), {3, 5.5});
   const Bytes good = honest().batches.at(0).payload;
-  Bytes trailing = good, steps;
+  Bytes trailing = good;
   trailing.push_back(0);
-  append_plane(steps, Bytes(1, 0xff), 1);
+  const Bytes many = names(kBatchUpdatesMost), too_many = names(kBatchUpdatesMost + 1);
   protocol::Batch again = honest().batches.at(0);
   again.sequence = 1;
   protocol::Batch second = honest().batches.at(1);
@@ -193,10 +193,10 @@ std::vector<Lie> batches() {
       {"UpdatesOfZeros", payload(Bytes(4096)), "damaged"},
       {"UpdatesAndMore", payload(trailing), "damaged"},
       {"UpdatesOfAnotherDataSet", payload(other.batches.at(0).payload), "violated the protocol"},
-      {"NamesThatDoNotEnd", payload(steps), "damaged"},
-      {"NamesOfALengthThatCannotBe", payload(bomb(kMost)), "damaged"},
-      {"NamesThatAreMoreThanTheySay", payload(bomb(10)), "damaged"},
-      {"NamesThatAreABomb", payload(bomb(16 << 20)), "damaged"},
+      {"UpdatesOfOnes", payload(Bytes(4096, 0xff)), "damaged"},
+      {"NamesThatDoNotEnd", payload({many.begin(), many.begin() + 8}), "damaged"},
+      {"NamesWithoutUpdates", payload(many), "not as many updates as it says"},
+      {"NamesThatAreTooMany", payload(too_many), "damaged"},
       {"FewerUpdatesThanItSays", batch([](protocol::Batch& b) { ++b.updates; }), "not as many updates as it says"},
       {"MoreUpdatesThanItSays", batch([](protocol::Batch& b) { b.updates = 0; }), "not as many updates as it says"},
       {"TheMostUpdates", batch([](protocol::Batch& b) { b.updates = 0xffffffff; }), "violated the protocol"},

@@ -242,9 +242,7 @@ std::vector<Case> shown_parts() {
       {"ForgetsWhatWasNotSent", kAll, forget({{{}, {}, root, slot}})},
       {"ForgetsWhatIsNotThere", kMalformed, forget({{{}, {}, supercube_key(0, {1000, 0, 0}), 1}})},
       {"ForgetsNoSlots", kMalformed, forget({{{}, {}, root, 0}})},
-      {"ForgetsTheSameTwice", kMalformed, forget({{{}, {}, root, 1}, {{}, {}, root, 1}})},
       {"ForgetsBackwards", kMalformed, forget({{{}, {}, root + kElsewhere, 1}, {{}, {}, root, 1}})},
-      {"ForgetsAScaleThatIsNone", kMalformed, forget({{{}, {}, kMost, 1}})},
       {"ForgetsTooMany", kMalformed, forget(many)},
       {"ForgetsAllWithoutRoom", kFull,
        [=](View& view) {

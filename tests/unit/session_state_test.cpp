@@ -23,9 +23,9 @@ TEST(SessionState, EndsASessionForBatchesOfAnotherVersion) {
   const struct {
     std::uint32_t payload;
     const char* text;
-  } cases[] = {{0, "the client reads batches of version 1, and this server sends version 3: update the client"},
-               {1, "the client reads batches of version 1, and this server sends version 3: update the client"},
-               {4, "the client reads batches of version 4, and this server sends version 3: update the server"}};
+  } cases[] = {{0, "the client reads batches of version 1, and this server sends version 4: update the client"},
+               {1, "the client reads batches of version 1, and this server sends version 4: update the client"},
+               {5, "the client reads batches of version 5, and this server sends version 4: update the server"}};
   for (const auto& c : cases) {
     SessionState state([](const std::string&) { return tl::unexpected(protocol::Fault{CloseCode::no_such_dataset, ""}); }, worker);
     const auto fault = state.receive(protocol::Open{.dataset = "made", .payload = c.payload});

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <set>
 
 #include "common/codec/batch.h"
-#include "common/codec/byte_planes.h"
 #include "common/codec/split_names.h"
 #include "common/ivm/extraction.h"
 #include "server/builder/field_hierarchy.h"
@@ -106,13 +106,17 @@ TEST(UpdateCodec, ABatchOfNothingChangesNothing) {
   EXPECT_EQ(canonical(front.mesh()), before);
 }
 
-TEST(UpdateCodec, EveryTruncationIsRefused) {
+// What is missing reads as zeros. A session knows how many updates there are to be.
+TEST(UpdateCodec, EveryTruncationIsRefusedOrHasAnotherNumberOfUpdates) {
   for (const IntervalVolume& v : volumes()) {
     const auto queue = queue_of(v);
-    const Bytes bytes = batch_of(v, std::span(queue).first(std::min<std::size_t>(queue.size(), 300)));
+    const std::size_t updates = std::min<std::size_t>(queue.size(), 300);
+    const Bytes bytes = batch_of(v, std::span(queue).first(updates));
     for (std::size_t n = 0; n < bytes.size(); ++n) {
       Front front = root_of(v);
-      ASSERT_FALSE(apply_exact(front, v, std::span(bytes).first(n))) << "the first " << n << " of " << bytes.size() << " bytes";
+      const auto applied = apply_exact(front, v, std::span(bytes).first(n));
+      ASSERT_NE(applied.value_or(0), updates) << "the first " << n << " of " << bytes.size() << " bytes";
+      ASSERT_EQ(front.validate(), std::nullopt);
     }
     Bytes longer = bytes;
     longer.push_back(0);
@@ -203,12 +207,14 @@ TEST(UpdateCodec, WhatDoesNotFitTheBudgetIsHidden) {
   }
 }
 
-// The range coded part of a batch.
-Bytes coded_part(std::span<const std::uint8_t> batch) {
-  EXPECT_TRUE(take_supercubes(batch, kBatchUpdatesMost));
-  const auto length = take_varint(batch);
-  EXPECT_TRUE(length && *length == batch.size());
-  return {batch.begin(), batch.end()};
+// What names of these updates take without models.
+std::size_t names_bits(const IntervalVolume& v, const std::vector<UpdateIndex>& updates) {
+  std::set<SupercubeKey> keys;
+  for (const UpdateIndex i : updates) keys.insert(v.set().place(i).key);
+  std::vector<SlotGroup> groups;
+  groups.reserve(keys.size());
+  for (const SupercubeKey key : keys) groups.push_back({{}, {}, key, 1});
+  return plain_supercube_bits(groups);
 }
 
 // All diamonds are relevant, so every flag is that of an update.
@@ -221,10 +227,10 @@ TEST(UpdateCodec, ValuesWithoutAnyPatternTakeNoMoreThanTheirBits) {
   const auto queue = queue_of(v);
   ASSERT_EQ(queue.size(), noise.size() - 8);
   for (const std::size_t n : {std::size_t(1), std::size_t(100), queue.size()}) {
-    const Bytes batch = batch_of(v, std::span(queue).first(n)), coded = coded_part(batch);
+    const Bytes batch = batch_of(v, std::span(queue).first(n));
     if (n == queue.size()) {
-      EXPECT_EQ(RangeDecoder(coded).raw_bits(1), 1u) << "coded without models";
-      EXPECT_LE(coded.size(), sizeof(std::uint64_t) + n * 33 / 8 + 1);
+      EXPECT_EQ(RangeDecoder(batch).raw_bits(1), 1u) << "coded without models";
+      EXPECT_LE(batch.size(), sizeof(std::uint64_t) + (n * 33 + names_bits(v, queue)) / 8 + 1);
     }
     Front front = root_of(v);
     const auto applied = apply_exact(front, v, batch);
@@ -253,17 +259,13 @@ Bytes batch_of_root(const IntervalVolume& v, bool is_plain, Code code) {
   const auto models = std::make_unique<BatchModels>();
   models->is_plain = is_plain;
   RangeEncoder encoder;
+  const SlotGroup group{{}, {}, supercube_key(root.scale, cursor.position()), 1};
   encoder.raw_bits(1, unsigned(is_plain));
+  encode_supercubes(encoder, is_plain, {&group, 1});
   models->code_flag(encoder, 0, nearness(KeySides(d.format, d.range), d.refine, around, root.row->vertices), true);
   code(encoder, *models, predict_value(0, root.scale, around, d.weights, d.format.last), root.scale);
   for (int i = 0; i < 64; ++i) encoder.raw_bits(16, 0);  // what follows is never read
-  const Bytes coded = encoder.finish();
-  Bytes bytes;
-  const SlotGroup group{{}, {}, supercube_key(root.scale, cursor.position()), 1};
-  append_supercubes(bytes, {&group, 1});
-  append_varint(bytes, coded.size());
-  bytes.insert(bytes.end(), coded.begin(), coded.end());
-  return bytes;
+  return encoder.finish();
 }
 
 bool is_refused_for_its_value(const IntervalVolume& v, const Bytes& bytes) {

@@ -2,7 +2,7 @@
 // FlatBuffers written and read by hand. Each throws where it goes otherwise than PROTOCOL.md says.
 export const WINDOW = 256 << 10;
 const ENVELOPE = 160;
-const PAYLOAD = 3; // the version of batches
+const PAYLOAD = 4; // the version of batches
 const client = { Open: 1, View: 2, Credit: 3 };
 export const server = { Opened: 1, Batch: 2, Done: 3, Fault: 4 };
 

@@ -12,7 +12,7 @@ import websockets
 
 WINDOW = 256 << 10
 ENVELOPE = 160  # of a batch's cost
-PAYLOAD = 3  # the version of batches
+PAYLOAD = 4  # the version of batches
 
 
 def load_schema(schema):
