@@ -128,9 +128,10 @@ TEST_P(Plan, SendsEveryWantedUpdateOnceWhateverViewsFollow) {
     ASSERT_GE(plan.remaining().updates, receiver.own_left(lod).updates);
     for (int batches = view == 7 ? 100000 : int(random() % 4); batches > 0; --batches) {
       const std::size_t most = std::size_t(256) << random() % 8;
+      const std::uint32_t visits = 1 + std::uint32_t(random()) % (random() % 2 == 0 ? 64 : StreamPlan::kMostVisits);
       const auto left = receiver.left();
-      auto batch = plan.next(most);
-      while (!batch && plan.search()) batch = plan.next(most);  // a slice of the search each
+      auto batch = plan.next(most, visits);
+      while (!batch && !plan.done()) batch = plan.next(most, visits);  // a slice of the search each
       ASSERT_EQ(batch.has_value(), !left.empty());
       if (!batch) {
         ASSERT_TRUE(plan.done());
