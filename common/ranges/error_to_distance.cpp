@@ -10,7 +10,9 @@
 namespace intervale {
 namespace {
 
-constexpr double kMargin = 1.25;  // for what is between the points that are measured
+// For surface points between those that are measured, and for points of the coarse mesh: some are farther from the surface
+// than any point of it is from the mesh.
+constexpr double kMargin = 1.35;
 
 }  // namespace
 
