@@ -14,8 +14,8 @@ namespace {
 
 tl::unexpected<Error> damaged(const char* what) { return fail(std::string("a batch is damaged: ") + what); }
 
-// Reads the flags and values of a batch, after its names, and splits diamonds of fronts: finds them in the first one, and makes the same
-// splits in the others.
+// Reads the flags and values of a batch, after its names, and splits diamonds of fronts: finds them in the first one, and
+// makes the same splits in the others.
 class BatchDecoder {
  public:
   BatchDecoder(std::span<Front> fronts, const Description& description, const ShownRanges& shown, const RangeDecoder& coder, bool is_plain,

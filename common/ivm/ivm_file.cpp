@@ -76,13 +76,16 @@ std::vector<std::uint8_t> coded_error_steps(const IntervalVolume& volume) {
 }
 
 std::vector<std::uint8_t> coded_update_slopes(const IntervalVolume& volume) {
-  std::vector<std::uint8_t> slopes;  // all updates are relevant
+  std::vector<std::uint8_t> slopes;
   slopes.reserve(volume.size());
   const SupercubeSet& set = volume.set();
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     std::size_t n = 0;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
-      for (int i = 0; i < std::popcount(set.occupancy()[s]); ++i) slopes.push_back(volume.relevant().brick(b).slope(n, i));
+      const BrickNeeds& needs = volume.relevant().brick(b);
+      const std::uint64_t relevant = needs.slots(n, set.occupancy()[s]);  // all, unless some were lost
+      for (const Slot slot : set_bits<Slot>(set.occupancy()[s]))
+        slopes.push_back((relevant >> slot & 1) != 0 ? needs.slope(n, count_below(relevant, slot)) : std::uint8_t(0));
       ++n;
     });
   }

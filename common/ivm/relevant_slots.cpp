@@ -75,10 +75,7 @@ class Neighbourhood {
 const std::array<Vertex, 64>& places_in_brick() {
   static const auto kTable = [] {
     std::array<Vertex, 64> table{};
-    for (unsigned i = 0; i < table.size(); ++i) {
-      const auto axis = [i](unsigned first) { return std::int32_t((i >> first & 1) | (i >> (first + 3) & 1) << 1); };
-      table[i] = {axis(0), axis(1), axis(2)};
-    }
+    for (std::size_t i = 0; i < table.size(); ++i) table[i] = position_of_key(i);
     return table;
   }();
   return kTable;

@@ -16,9 +16,10 @@ namespace intervale {
 
 class SplitLattice;
 
-// What counts for the range, and all ancestors of that; without those whose values are lost (page_faults.h). Of scale 1 and coarser, the bounds of
-// values tell. Of scale 0, a diamond is relevant if it or a descendant of the same scale counts; whether it counts itself is found once for each
-// brick and kept, since the bricks before it need it, too. Any thread.
+// What counts for the range, and all ancestors of that; without those whose values are lost (page_faults.h). Of scale 1
+// and coarser, the bounds of values tell. Of scale 0, a diamond is relevant if it or a descendant of the same scale
+// counts; whether it counts itself is found once for each brick and kept, since the bricks before it need it, too. Any
+// thread.
 class RelevantSlots {
  public:
   // The volume was refined uniformly, and must outlive it. The first of a volume takes O(updates): IntervalVolume::bounds().

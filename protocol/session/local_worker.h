@@ -11,8 +11,7 @@
 
 namespace intervale {
 
-// For one session. One thread at a time. What is not measured is found at once: estimates
-// take some 15 ns for each relevant update.
+// For one session. One thread at a time. What is not measured is found at once, or by brick as the session comes to it.
 class LocalWorker : public SessionWorker {
  public:
   // most_bytes: of what is kept of ranges for later.

@@ -30,7 +30,8 @@ class SessionState {
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
   // The next message to send. nullopt: none now; call again if has_work(). max_payload bounds a batch's payload. With
-  // has_work() a call takes about a millisecond, and another one for each 16 KiB of max_payload.
+  // has_work() a call takes some milliseconds at most; with less than the default, a fifth of a millisecond and what it
+  // takes to code the batch.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
   // There may be a batch to select and encode.
