@@ -34,6 +34,18 @@ class ParentTable {
   std::array<std::array<std::array<std::uint64_t, 256>, kBytes>, kPlaces> children_{};
 };
 
+// The parents of a diamond of class 1 or 2: of classes 0 and 1 of the same scale.
+struct ParentSlots {
+  struct One {
+    Slot slot;
+    std::uint8_t place = 0;  // of ParentTable
+  };
+  std::array<One, kMaxParents> parent{};
+  std::size_t count = 0;
+};
+// By slot; those of class 0 have none here. Computed at first use.
+[[nodiscard]] const std::array<ParentSlots, kSlots>& parents_by_slot();
+
 // The table, computed at first use.
 [[nodiscard]] const ParentTable& parent_table();
 

@@ -5,40 +5,12 @@
 #include <bit>
 
 #include "common/codec/value_prediction.h"
+#include "common/diamond/parent_table.h"
 #include "common/ivm/split_lattice.h"
 #include "common/util/bits.h"
 
 namespace intervale {
 namespace {
-
-// The parents of classes 0 and 1 of a diamond of class 1 or 2: slots, and the supercube: its own, or the one before it along
-// an axis.
-struct Parents {
-  struct One {
-    Slot slot;
-    std::uint8_t before = 0;  // 1 << axis; 0: its own
-  };
-  std::array<One, kMaxParents> parent{};
-  std::size_t count = 0;
-};
-
-const std::array<Parents, kSlots>& parents_by_slot() {
-  static const auto kTable = [] {
-    std::array<Parents, kSlots> table{};
-    for (Slot slot{8}; slot < kSlots; ++slot) {
-      const unsigned type = kTypeOfSlot[slot];
-      for (std::size_t k = 0; k < diamond_type(type).parents; ++k) {
-        const Offset to = diamond_type(type).parent[k];
-        const std::array<int, 3> at{int(type & 3) + to.x, int(type >> 2 & 3) + to.y, int(type >> 4 & 3) + to.z};
-        const auto before = std::uint8_t(at[0] < 0 ? 1 : at[1] < 0 ? 2 : at[2] < 0 ? 4 : 0);
-        table[slot].parent[k] = {kSlotOfType[unsigned(at[0] & 3) | unsigned(at[1] & 3) << 2 | unsigned(at[2] & 3) << 4], before};
-      }
-      table[slot].count = diamond_type(type).parents;
-    }
-    return table;
-  }();
-  return kTable;
-}
 
 // The words of a brick's supercubes, and of those ahead of them: descendants of the same scale are in no others.
 class Neighbourhood {
@@ -50,16 +22,15 @@ class Neighbourhood {
   // Adds the parents of those of a class.
   void add_parents(std::size_t cls) {
     const auto& table = parents_by_slot();
-    constexpr std::array<int, 3> kStep{1, kSide, kSide * kSide};
+    constexpr std::array<int, ParentTable::kPlaces> kStep{0, 1, kSide, kSide * kSide};
     for (int z = 0, i = 0; z < kSide; ++z) {
       for (int y = 0; y < kSide; ++y) {
         for (int x = 0; x < kSide; ++x, ++i) {
           for (const Slot slot : set_bits<Slot>(words_[std::size_t(i)] & kSlotsOfClass[cls])) {
             for (std::size_t k = 0; k < table[slot].count; ++k) {
-              const auto [parent, before] = table[slot].parent[k];
-              if ((before == 1 && x == 0) || (before == 2 && y == 0) || (before == 4 && z == 0)) continue;
-              const int to = before == 0 ? i : i - kStep[std::size_t(std::countr_zero(before))];
-              words_[std::size_t(to)] |= std::uint64_t(1) << parent;
+              const auto [parent, place] = table[slot].parent[k];
+              if ((place == 1 && x == 0) || (place == 2 && y == 0) || (place == 3 && z == 0)) continue;
+              words_[std::size_t(i - kStep[place])] |= std::uint64_t(1) << parent;
             }
           }
         }
