@@ -45,10 +45,6 @@ void SplitSet::erase_bits(std::uint32_t w, std::uint64_t bits) {
   }
 }
 
-void SplitSet::insert_all() {
-  for (std::size_t chunk = 0; chunk < chunks_.size(); ++chunk) chunks_.set(chunk, ~std::uint32_t(0));
-}
-
 bool operator==(const SplitSet& a, const SplitSet& b) {
   if (a.chunks_.size() != b.chunks_.size()) return false;
   for (std::size_t chunk = 0; chunk < a.chunks_.size(); ++chunk) {

@@ -24,7 +24,6 @@ class SplitSet {
   // How many of `count` updates from `first` on are in it; count at least 1.
   [[nodiscard]] unsigned count(UpdateIndex first, unsigned count) const;
   void insert(UpdateIndex i) { insert_bits(i / 64, std::uint64_t(1) << (i % 64)); }
-  void insert_all();  // of all numbers that it can hold, a few more than its size
   void erase(UpdateIndex i) { erase_bits(i / 64, std::uint64_t(1) << (i % 64)); }
   [[nodiscard]] std::uint64_t count() const;
   [[nodiscard]] std::size_t memory_bytes() const { return chunks_.memory_bytes(); }
