@@ -167,6 +167,7 @@ class PatchMeasure {
     if (surface.separates(up, value(-enough, steps[0]))) return enough;
     const double here = finest_.at(from);
     if (surface.separates(up, here)) return enough;
+    if (surface.separates(here, value(enough, steps[1])) || surface.separates(here, value(-enough, steps[1]))) return enough;
     std::array<double, 4> last{here, here, here, here};  // to both sides of each line
     const double step = std::max(step_, most / kMostSteps);
     double before = 0;

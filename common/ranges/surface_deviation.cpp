@@ -325,14 +325,21 @@ SurfaceDeviation surface_deviation(const Volume& volume, const Range& range, con
       if (distance > kLeastDeviation * width) to = std::max(to, round_up(distance));
     };
     parallel(set.bricks().size(), [&](std::size_t b) {
-      set.for_each_in_brick(BrickIndex(std::uint32_t(b)), ~std::uint64_t(0), [&](const Place& p) {
-        const Diamond d(SupercubeSet::centre(p), scale_of_key(p.key), kTypeOfSlot[p.slot]);
-        const double tip = patches.at_spine(d, surfaces);
-        at_least(largest[p.index], tip);
-        if (!with_farthest || d.scale > top) return;
-        at_least(farthest[p.index], tip);
-        at_least(farthest[p.index],
-                 patches.within_patches(d, one_of_each, std::max(double(farthest[p.index]), kLeastDeviation * width), width * d.h));
+      const BrickIndex brick{std::uint32_t(b)};
+      set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+        const int scale = scale_of_key(key);
+        const Vertex position = position_of_key(key);
+        UpdateIndex i = set.first(brick, s);
+        for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
+          const Diamond d(centre_of(scale, position, slot), scale, kTypeOfSlot[slot]);
+          const double tip = patches.at_spine(d, surfaces);
+          at_least(largest[i], tip);
+          if (with_farthest && scale <= top) {
+            at_least(farthest[i], tip);
+            at_least(farthest[i], patches.within_patches(d, one_of_each, std::max(double(farthest[i]), kLeastDeviation * width), width * d.h));
+          }
+          ++i;
+        }
       });
     });
   });

@@ -1,12 +1,19 @@
 #include "server/serve/range_cache.h"
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <utility>
 
 #include "common/parallel/all_cores.h"
 
 namespace intervale {
+namespace {
+
+// A hand that drags a range asks again soon: the field that was restored for it is kept so long.
+constexpr std::chrono::seconds kFinderKept(5);
+
+}  // namespace
 
 RangeCache::RangeCache(Memory& memory, FairScheduler& scheduler, Find find, std::size_t most_bytes)
     : memory_(memory), scheduler_(scheduler), find_(std::move(find)), most_bytes_(most_bytes) {
@@ -245,16 +252,18 @@ void RangeCache::serve(Queue& queue, const std::stop_token& stop) {
   yield_to_other_threads();
   const ParallelFor parallel = on_all_cores_until(stop);
   Volume volume;
-  std::optional<PartFinder> finder;  // of `volume`; both while there is something to find
+  std::optional<PartFinder> finder;  // of `volume`; both while there is something to find, and a little longer
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
+    const auto has_request = [&] { return next_request(queue) != nullptr; };
+    if (finder) queue.has_requests.wait_for(lock, stop, kFinderKept, has_request);
     Request request = next_request(queue);
     if (!request || request->volume_ != volume) {
       finder.reset();
       volume.reset();
     }
     if (!request) {
-      queue.has_requests.wait(lock, stop, [&] { return next_request(queue) != nullptr; });
+      queue.has_requests.wait(lock, stop, has_request);
       continue;
     }
     request->is_busy_ = true;
