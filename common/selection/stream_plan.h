@@ -34,9 +34,11 @@ struct Batch {
   std::vector<std::uint8_t> channels;  // their values (common/codec/channel_batch.h); empty if there are none
 };
 
-// Payload of a view's first batch: small, so that there is a mesh to draw soon. Each further batch may be twice as
-// large, up to protocol::kMaxBatchPayload.
+// Bound on the payload of a view's next batch, after `sent` bytes of payload. The first batch is small, so that there is
+// a mesh to draw soon; each further one about doubles what was sent, since a batch takes about a third of its bound. So a
+// client that has room for n bytes shows what fits into n / 2 at least. most: no less than kFirstPayload.
 inline constexpr std::size_t kFirstPayload = 4 << 10;
+[[nodiscard]] constexpr std::size_t next_payload(std::size_t sent, std::size_t most) { return std::clamp(3 * sent, kFirstPayload, most); }
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
 // brick; for each 32 updates of which one was sent four bytes and a little more (eight with max_updates, four more for

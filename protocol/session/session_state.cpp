@@ -89,7 +89,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   is_early_ = view.early;
   is_new_ = true;
   waits_ = false;
-  if (is_other_view || view_ == ViewState::none) target_ = kFirstPayload;
+  if (is_other_view || view_ == ViewState::none) view_bytes_ = 0;
   view_ = ViewState::unanswered;
   return {};
 }
@@ -192,11 +192,12 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
     return {};
   }
   // A batch does not use all the credit: the connection would be idle until the client's next grant arrives. Clients
-  // grant a quarter of their window or more, and a batch takes about half of its bound.
-  const std::uint64_t bound =
-      std::min({std::uint64_t(target_), std::uint64_t(max_payload), std::max<std::uint64_t>(protocol::kMinPayload, 2 * last_grant_)});
-  const std::uint64_t size = std::min(bound, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
-  auto batch = plan_->next(size, max_payload < protocol::kMaxBatchPayload ? kContendedVisits : StreamPlan::kMostVisits);
+  // grant a quarter of their window or more, and a batch takes about a third of its bound.
+  const std::size_t bound = std::min<std::uint64_t>(
+      {next_payload(view_bytes_, protocol::kMaxBatchPayload), max_payload, std::max<std::uint64_t>(protocol::kMinPayload, 2 * last_grant_)});
+  const std::uint64_t size = std::min<std::uint64_t>(bound, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
+  const bool others_wait = max_payload < protocol::kMaxBatchPayload;
+  auto batch = plan_->next(size, others_wait ? kContendedVisits : StreamPlan::kMostVisits);
   if (!batch) {
     waits_ = plan_->done() && measurement_;
     if (!plan_->done() || measurement_) return {};
@@ -208,7 +209,7 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   }
   is_new_ = measurement_ && view_ == ViewState::unanswered;  // coarser after the first batch
   if (!is_ahead) view_ = ViewState::streaming;
-  target_ = std::min(2 * target_, protocol::kMaxBatchPayload);
+  view_bytes_ += others_wait ? size : batch->payload.size();  // fewer and larger batches take less processor time
   const StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();
   protocol::Batch message{epoch_,
                           sequence_++,

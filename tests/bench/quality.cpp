@@ -208,7 +208,7 @@ DepthMap depth_map_of(const Mesh& mesh, const Camera& camera) {
 Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod, bool with_depth = false) {
   StreamPlan plan(sigma);
   plan.set_lod(lod);
-  std::size_t target = kFirstPayload;
+  std::size_t bytes = 0;
   std::uint64_t due = kDepthMapUpdates;
   return follow(*sigma, picture, [&](const StreamClient& client) -> std::optional<std::vector<std::uint8_t>> {
     if (with_depth && client.updates() >= due) {
@@ -216,10 +216,11 @@ Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod, bo
       const DepthMap map = depth_map_of(client.mesh(), *lod.camera);
       plan.set_lod(lod, &map);
     }
-    auto batch = plan.next(target);
-    while (!batch && !plan.done()) batch = plan.next(target);
+    const std::size_t most = next_payload(bytes, protocol::kMaxBatchPayload);
+    auto batch = plan.next(most);
+    while (!batch && !plan.done()) batch = plan.next(most);
     if (!batch) return {};
-    target = std::min(2 * target, protocol::kMaxBatchPayload);
+    bytes += batch->payload.size();
     return std::move(batch->payload);
   });
 }
@@ -276,8 +277,8 @@ std::vector<Row> measure(const Case& c) {
     row.least_bytes = double(bytes_of(*sigma, wanted));
     StreamPlan plan(sigma);
     plan.set_lod(lod);
-    for (std::size_t target = kFirstPayload; !plan.done(); target = std::min(2 * target, protocol::kMaxBatchPayload)) {
-      if (const auto batch = plan.next(target)) row.done_bytes += double(batch->payload.size());
+    for (std::size_t bytes = 0; !plan.done(); row.done_bytes = double(bytes)) {
+      if (const auto batch = plan.next(next_payload(bytes, protocol::kMaxBatchPayload))) bytes += batch->payload.size();
     }
     rows.push_back(std::move(row));
   }

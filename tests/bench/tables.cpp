@@ -83,10 +83,10 @@ std::vector<std::vector<std::uint8_t>> payloads_of(const Sigma& sigma) {
   std::vector<std::vector<std::uint8_t>> payloads;
   StreamPlan plan(sigma);
   plan.set_lod(Lod{});
-  std::size_t target = kFirstPayload;
-  while (auto batch = plan.next(target)) {
+  std::size_t bytes = 0;
+  while (auto batch = plan.next(next_payload(bytes, protocol::kMaxBatchPayload))) {
+    bytes += batch->payload.size();
     payloads.push_back(std::move(batch->payload));
-    target = std::min(2 * target, protocol::kMaxBatchPayload);
   }
   return payloads;
 }
