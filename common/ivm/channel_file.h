@@ -6,6 +6,7 @@
 #include "common/diamond/grid.h"
 #include "common/diamond/supercube.h"
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/kept_pages.h"
 #include "common/ivm/page_faults.h"
 #include "common/ivm/value_keys.h"
 #include "common/patch/channel.h"
@@ -15,9 +16,9 @@
 namespace intervale {
 
 // Appends channels, if there are any. grid, set: of the data set; keys: by channel, component and number in the set. The
-// same bytes whatever `parallel` is.
+// same bytes whatever `parallel` is, and whichever of their pages were kept; kept may be null.
 void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set, const std::vector<Channel>& channels,
-                     const std::vector<ChannelKeys>& keys, const ParallelFor& parallel);
+                     const std::vector<ChannelKeys>& keys, const ParallelFor& parallel, KeptPages* kept);
 
 struct StoredChannels {
   std::vector<Channel> channels;

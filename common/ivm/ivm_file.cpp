@@ -206,9 +206,9 @@ Result<void> read_errors(const Container& file, const RangeRecord& r, IntervalVo
 
 }  // namespace
 
-std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel) {
+std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel, KeptPages* kept) {
   Streams streams;
-  append_values(streams, volume, volume.description().is_exact, parallel);
+  append_values(streams, volume, volume.description().is_exact, parallel, kept);
   append_labels(streams, volume.description().labels);
   const RangeRecord record = record_of(volume);
   append(streams[StreamType::range], std::span(&record, 1));
@@ -225,7 +225,7 @@ std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFo
     append_plane(stored, contents_of(volume, kCompressed[i]), kCompression);
     append<std::uint8_t>(streams[kCompressed[i]], stored);
   });
-  append_channels(streams, volume.description().grid, volume.set(), volume.description().channels, volume.channel_keys(), parallel);
+  append_channels(streams, volume.description().grid, volume.set(), volume.description().channels, volume.channel_keys(), parallel, kept);
   return make_container(FileScope::one_range, streams);
 }
 
@@ -258,8 +258,8 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   return volume;
 }
 
-Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel) {
-  return save_container(path, encode_ivm(volume, parallel));
+Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel, KeptPages* kept) {
+  return save_container(path, encode_ivm(volume, parallel, kept));
 }
 
 Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel, PageFaults* faults) {

@@ -10,6 +10,7 @@
 
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/kept_pages.h"
 #include "common/ivm/page_faults.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
@@ -17,8 +18,8 @@
 namespace intervale {
 
 // The file's bytes. Equal volumes give equal bytes, whatever `parallel` is; the name is not stored. Weights of scales that
-// the box has not are 0.
-[[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = serial);
+// the box has not are 0. kept: pages of this very volume that were compressed before, and where others go; or null.
+[[nodiscard]] std::vector<std::byte> encode_ivm(const IntervalVolume& volume, const ParallelFor& parallel = serial, KeptPages* kept = nullptr);
 
 // The inverse, for bytes from outside: checks every checksum, and every count against what the bytes can hold before it
 // allocates; what is decoded grows with what was read. `parallel` may stop it. Throws NoRoom if it would take more memory
@@ -28,7 +29,8 @@ namespace intervale {
                                                 std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
 // Writes a temporary file and renames it.
-[[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial);
+[[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial,
+                                    KeptPages* kept = nullptr);
 
 // Reads a file of one range, then decode_ivm; the name is the file's, without folders and extension. Errors begin with the path.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel = serial,

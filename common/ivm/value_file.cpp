@@ -106,13 +106,13 @@ std::uint64_t memory_to_decode(const FieldDescription& d) {
 
 bool is_value_file(const std::filesystem::path& path) { return scope_of(path) == FileScope::every_range; }
 
-std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel) {
+std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel, KeptPages* kept) {
   const FieldDescription& d = volume.description();
   Streams streams;
-  append_values(streams, volume.parts(), d.is_exact, parallel);
+  append_values(streams, volume.parts(), d.is_exact, parallel, kept);
   append_labels(streams, d.labels);
   append_statistics(d, streams[StreamType::histogram], streams[StreamType::volumes]);
-  append_channels(streams, d.grid, volume.set(), d.channels, volume.parts().channel_keys, parallel);
+  append_channels(streams, d.grid, volume.set(), d.channels, volume.parts().channel_keys, parallel, kept);
   return make_container(FileScope::every_range, streams);
 }
 
@@ -146,8 +146,8 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
   return ValueVolume(std::move(parts));
 }
 
-Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel) {
-  const std::vector<std::byte> bytes = encode_values(volume, parallel);
+Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel, KeptPages* kept) {
+  const std::vector<std::byte> bytes = encode_values(volume, parallel, kept);
   if (auto ok = save_container(path, bytes); !ok) return tl::unexpected(ok.error());
   return bytes.size();
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/kept_pages.h"
 #include "common/ivm/page_faults.h"
 #include "common/ivm/value_volume.h"
 #include "common/util/parallel.h"
@@ -21,8 +22,9 @@ namespace intervale {
 // those who open it say why.
 [[nodiscard]] bool is_value_file(const std::filesystem::path& path);
 
-// The file's bytes. Equal volumes give equal bytes, whatever `parallel` is; the name is not stored.
-[[nodiscard]] std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel = serial);
+// The file's bytes. Equal volumes give equal bytes, whatever `parallel` is; the name is not stored. kept: as of
+// encode_ivm().
+[[nodiscard]] std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel = serial, KeptPages* kept = nullptr);
 
 // The inverse, for bytes from outside: checks every checksum, and that the bytes can hold as many values as they claim
 // before it allocates. `parallel`, room and faults: as of decode_ivm(); what of_every_range() takes is included.
@@ -30,7 +32,8 @@ namespace intervale {
                                                 std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
 // Writes a temporary file and renames it. Returns the number of bytes.
-[[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial);
+[[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial,
+                                                KeptPages* kept = nullptr);
 
 // Checks the header and the length before it allocates, then decode_values; the name is the file's, without folders and extension. Errors begin with
 // the path.

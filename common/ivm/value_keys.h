@@ -34,6 +34,7 @@ class ValueKeys {
     for (unsigned b = 0; b < width_; ++b) bytes_[i * width_ + b] = std::uint8_t(key >> (8 * b));
   }
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }  // little endian
+  [[nodiscard]] std::span<std::uint8_t> bytes() { return bytes_; }              // to be set
   [[nodiscard]] std::size_t memory_bytes() const { return bytes_.size(); }
 
  private:

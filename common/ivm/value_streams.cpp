@@ -119,19 +119,30 @@ Result<std::vector<StoredPage>> take_stored(std::span<const std::byte>& index, s
 
 }  // namespace
 
-void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel) {
+void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel, KeptPages* kept) {
   const FieldRecord field = record_of(values, is_exact);
   append(streams[StreamType::field], std::span(&field, 1));
   if (values.format.table) append<std::uint8_t>(streams[StreamType::value_table], encode_value_table(*values.format.table));
   const auto scales = std::size_t(Domain(values.grid.dims).levels());
   append(streams[StreamType::weights], std::span<const PredictorWeights>(&values.weights.of[0][0], scales * 3));
-  append_pages(values, streams[StreamType::page_index], streams[StreamType::pages], parallel);
+  append_pages(values, streams[StreamType::page_index], streams[StreamType::pages], parallel, {kept, 0});
 }
 
-void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& to, const ParallelFor& parallel) {
+void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& to, const ParallelFor& parallel,
+                  const PageKeeping& kept) {
   const std::vector<ValuePage> pages = pages_of(values.set);
   std::vector<std::vector<std::uint8_t>> coded(pages.size());
-  parallel(pages.size(), [&](std::size_t page) { coded[page] = encode_page(values, pages[page]); });
+  parallel(pages.size(), [&](std::size_t page) {
+    const PageName name{kept.values, std::uint32_t(page)};
+    if (kept.by != nullptr) {
+      if (auto found = kept.by->find(name)) {
+        coded[page] = std::move(*found);
+        return;
+      }
+    }
+    coded[page] = encode_page(values, pages[page]);
+    if (kept.by != nullptr) kept.by->keep(name, coded[page]);
+  });
   for (auto& page : coded) {
     const PageRecord record{page.size(), XXH3_64bits(page.data(), page.size())};
     append(index, std::span(&record, 1));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/kept_pages.h"
 #include "common/ivm/page_faults.h"
 #include "common/ivm/paged_values.h"
 #include "common/util/parallel.h"
@@ -15,8 +16,9 @@
 
 namespace intervale {
 
-// Writes field, weights, page_index, pages, and value_table if the format has one. The same bytes whatever `parallel` is.
-void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel);
+// Writes field, weights, page_index, pages, and value_table if the format has one. The same bytes whatever `parallel` is, and
+// whichever of their pages were kept; kept may be null.
+void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel, KeptPages* kept);
 
 // The inverse, of bytes from outside. read_field() sets and checks grid, format, corners, max_error and is_exact.
 [[nodiscard]] Result<void> read_field(const Container& file, FieldDescription& to);
@@ -30,8 +32,14 @@ void append_labels(Streams& streams, const Labels& labels);
 // takes damaged pages, whose keys and levels are any; null: they are an error, as the first page always is.
 [[nodiscard]] Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel, PageFaults* faults);
 
+// Pages that are kept, if `by` is not null: of which values they are (PageName::values).
+struct PageKeeping {
+  KeptPages* by = nullptr;
+  std::uint32_t values = 0;
+};
 // Appends the pages of some values, and their index: for each page its bytes and their XXH3-64, two numbers of 8 bytes.
-void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& pages, const ParallelFor& parallel);
+void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& pages, const ParallelFor& parallel,
+                  const PageKeeping& kept);
 // The inverse, of bytes from outside: takes them off the front of both.
 [[nodiscard]] Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& pages, const DecodedValues& to,
                                       const ParallelFor& parallel, PageFaults* faults, const std::string& channel = {});

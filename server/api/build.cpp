@@ -39,7 +39,9 @@ Result<void> check_samples(Volume& volume, const DataSetOptions& options) {
 }
 
 Result<DataSet> build_one_range(Volume& volume, DataSetOptions& options) {
-  auto made = build_range(volume, {*options.range, options.refine, options.progress}, options.step);
+  auto parts = build_range(volume, {*options.range, options.refine, options.progress}, options.step);
+  if (!parts) return tl::unexpected(parts.error());
+  auto made = IntervalVolume::assemble(std::move(*parts));
   if (!made) return tl::unexpected(made.error());
   auto built = build_channels(options, volume.grid, made->set());
   if (!built) return tl::unexpected(built.error());

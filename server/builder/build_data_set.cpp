@@ -21,12 +21,12 @@ std::string text_of_dims(const Grid& grid) {
 
 }  // namespace
 
-Result<IntervalVolume> build_range(Volume& volume, const BuildOptions& options, std::optional<double> step) {
+Result<IntervalVolume::Parts> build_range(Volume& volume, const BuildOptions& options, std::optional<double> step) {
   const auto format = choose_value_format(volume, step);
   if (!format) return tl::unexpected(format.error());
   const bool is_exact = has_exact_values(volume, *format);
   round_samples(volume, *format);
-  Result<IntervalVolume> made = FieldHierarchy(volume, options).compact(*format, is_exact);
+  Result<IntervalVolume::Parts> made = FieldHierarchy(volume, options).parts(*format, is_exact);
   free_samples(volume);
   return made;
 }

@@ -14,8 +14,8 @@
 
 namespace intervale {
 
-// Of one range. volume: its samples are finite; they are freed. step: as of choose_value_format().
-[[nodiscard]] Result<IntervalVolume> build_range(Volume& volume, const BuildOptions& options, std::optional<double> step);
+// Of one range, to be assembled. volume: its samples are finite; they are freed. step: as of choose_value_format().
+[[nodiscard]] Result<IntervalVolume::Parts> build_range(Volume& volume, const BuildOptions& options, std::optional<double> step);
 
 // Of every range, likewise. Misuse for more than kMostSamples samples.
 [[nodiscard]] Result<ValueVolume::Parts> build_every_range(Volume& volume, std::optional<double> step, const std::function<void(double)>& progress);

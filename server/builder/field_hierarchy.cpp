@@ -217,7 +217,13 @@ FullMesh FieldHierarchy::full_mesh(const std::vector<BrickPart>& parts) const {
   return full;
 }
 
-Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>& wanted, bool is_exact) const {
+Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>& format, bool is_exact) const {
+  auto made = parts(format, is_exact);
+  if (!made) return tl::unexpected(made.error());
+  return IntervalVolume::assemble(std::move(*made));
+}
+
+Result<IntervalVolume::Parts> FieldHierarchy::parts(const std::optional<ValueFormat>& wanted, bool is_exact) const {
   const auto format = wanted ? Result<ValueFormat>(*wanted) : choose_value_format(volume_, 0.0);
   if (!format) return tl::unexpected(format.error());
   IntervalVolume::Parts parts;
@@ -250,7 +256,7 @@ Result<IntervalVolume> FieldHierarchy::compact(const std::optional<ValueFormat>&
   parts.surface = measure_error_to_distance(
       volume_, range_, domain_, set_, [&parts](UpdateIndex i) { return double(parts.error_steps[parts.steps[i]]); }, d.max_error, false,
       on_all_cores);
-  return IntervalVolume::assemble(std::move(parts));
+  return parts;
 }
 
 }  // namespace intervale

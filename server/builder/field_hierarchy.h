@@ -45,6 +45,8 @@ class FieldHierarchy {
   // without it, an exact one, which may fail (choose_value_format() with step 0). is_exact: whether the samples are
   // those of the input.
   [[nodiscard]] Result<IntervalVolume> compact(const std::optional<ValueFormat>& format = {}, bool is_exact = true) const;
+  // The same, to be assembled.
+  [[nodiscard]] Result<IntervalVolume::Parts> parts(const std::optional<ValueFormat>& format, bool is_exact) const;
 
  private:
   [[nodiscard]] double value(Vertex v) const;  // of any vertex: the sample it clamps to

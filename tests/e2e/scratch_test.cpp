@@ -62,7 +62,7 @@ TEST_F(ScratchBuild, WithAChannelIsTheSameFile) { expect_same_file({"--channel",
 TEST_F(ScratchBuild, OptionsThatCannotBeAreOneLine) {
   const auto alone = run(build(volume, small, {"--scratch", folder.path()}));
   EXPECT_EQ(alone.status, 2);
-  EXPECT_EQ(alone.err, "intervale: --scratch belongs to a limit of memory: give --memory too\n");
+  EXPECT_EQ(alone.err, "intervale: --scratch belongs to a limit of memory, or to --resume: give --memory or --resume too\n");
   const auto little = run(build(volume, small, {"--memory", "1MB"}));
   EXPECT_EQ(little.status, 1);
   EXPECT_THAT(little.err, StartsWith("intervale: a budget of 1 MB is too small: with 2 threads at least "));
