@@ -17,8 +17,9 @@ namespace intervale {
 // Of one range, to be assembled. volume: its samples are finite; they are freed. step: as of choose_value_format().
 [[nodiscard]] Result<IntervalVolume::Parts> build_range(Volume& volume, const BuildOptions& options, std::optional<double> step);
 
-// Of every range, likewise. Misuse for more than kMostSamples samples.
-[[nodiscard]] Result<ValueVolume::Parts> build_every_range(Volume& volume, std::optional<double> step, const std::function<void(double)>& progress);
+// Of every range, likewise; kept: as of BuildOptions. Misuse for more than kMostSamples samples.
+[[nodiscard]] Result<ValueVolume::Parts> build_every_range(Volume& volume, std::optional<double> step, const std::function<void(double)>& progress,
+                                                           KeptErrors* kept = nullptr);
 
 // The channels of a data set, one after the other, so that the samples of one are in memory.
 struct BuiltChannels {

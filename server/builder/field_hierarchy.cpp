@@ -115,18 +115,21 @@ FieldHierarchy::FieldHierarchy(const Volume& volume, const BuildOptions& options
   Relevance found = find_relevant(volume_, range_, refine_, shapes_);
   set_ = std::move(found.set);
   unit_cuts_ = found.unit_cuts;
-  measure_errors(options.progress);
+  measure_errors(options.progress, options.kept);
   saturate(set_, errors_, domain_.levels(), on_all_cores);
 }
 
-void FieldHierarchy::measure_errors(const std::function<void(double)>& progress) {
+void FieldHierarchy::measure_errors(const std::function<void(double)>& progress, KeptErrors* kept) {
   errors_.assign(set_.size(), 0);
   visit_samples(volume_, [&]<class T>(std::span<const T> samples) {
     const Field<T> field{samples, domain_.last()};
     const Extremes<T> extremes(field, on_all_cores);
     for (int scale = 0; scale < domain_.levels(); ++scale) {
-      const DiamondErrors<T> error_of(field, extremes, domain_, scale);
       const auto [begin, end] = set_.of_scale(scale);
+      const auto number = [this](BrickIndex brick) { return brick < set_.bricks().size() ? std::size_t(set_.bricks()[brick].first) : set_.size(); };
+      const std::span<float> of_scale = std::span(errors_).subspan(number(begin), number(end) - number(begin));
+      if (kept != nullptr && kept->find_errors(scale, of_scale)) continue;
+      const DiamondErrors<T> error_of(field, extremes, domain_, scale);
       tbb::parallel_for<std::uint32_t>(begin, end, [&](std::uint32_t b) {
         const BrickIndex brick(b);
         set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
@@ -139,6 +142,7 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress)
           }
         });
       });
+      if (kept != nullptr) kept->keep_errors(scale, of_scale);
       // Every scale visits the whole box at most once: an equal share of the work.
       if (progress) progress(double(scale + 1) / domain_.levels());
     }

@@ -18,6 +18,7 @@
 #include "common/patch/range.h"
 #include "common/patch/volume.h"
 #include "common/ranges/border_shape.h"
+#include "server/builder/kept_errors.h"
 
 namespace intervale {
 
@@ -25,6 +26,7 @@ struct BuildOptions {
   Range range;  // alpha <= beta
   Refine refine = Refine::boundary;
   std::function<void(double)> progress = {};  // called with the fraction done, 0 to 1, from any thread, one call at a time
+  KeptErrors* kept = nullptr;                 // errors of this very volume that were measured before, and where others go
 };
 
 template <class T>
@@ -50,7 +52,7 @@ class FieldHierarchy {
 
  private:
   [[nodiscard]] double value(Vertex v) const;  // of any vertex: the sample it clamps to
-  void measure_errors(const std::function<void(double)>& progress);
+  void measure_errors(const std::function<void(double)>& progress, KeptErrors* kept);
   struct BrickPart;
   template <class T>
   [[nodiscard]] BrickPart count_brick(const Field<T>& field, BrickIndex brick) const;

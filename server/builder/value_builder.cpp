@@ -13,11 +13,11 @@
 #include "server/builder/value_steps.h"
 
 namespace intervale {
-ValueVolume build_value_volume(Volume& volume, const ValueFormat& format, const std::function<void(double)>& progress) {
+ValueVolume build_value_volume(Volume& volume, const ValueFormat& format, const std::function<void(double)>& progress, KeptErrors* kept) {
   const bool is_exact = has_exact_values(volume, format);
   round_samples(volume, format);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const FieldHierarchy hierarchy(volume, {{-kInfinity, kInfinity}, Refine::uniform, progress});
+  const FieldHierarchy hierarchy(volume, {{-kInfinity, kInfinity}, Refine::uniform, progress, kept});
   ValueVolume::Parts parts;
   FieldDescription& d = parts.description;
   d.name = volume.name;

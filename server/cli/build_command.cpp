@@ -84,6 +84,13 @@ void tell_of_resumption(const Build& build, const SupercubeSet& set, const Known
   fmt::print(stderr, "intervale: going on from '{}': {}\n", printable(build.checkpoint->path().string()), text);
 }
 
+// The same, as long as the values are not known.
+void tell_of_errors(const Build& build) {
+  if (build.checkpoint == nullptr || build.checkpoint->error_scales() == 0) return;
+  fmt::print(stderr, "intervale: going on from '{}': errors of {} scales known\n", printable(build.checkpoint->path().string()),
+             build.checkpoint->error_scales());
+}
+
 // The samples of a channel. whole: the grid of the field before it was cropped, if it is known.
 Result<Volume> read_channel(const BuildCommand& options, const ChannelInput& input, const std::optional<Grid>& whole) {
   NamedVolume named = named_volume(input.file.string());
@@ -132,12 +139,13 @@ std::string text_of_values(const Volume& volume) {
 
 // The parts of a data set of one range, without channels; values: what is told of the field's.
 Result<IntervalVolume::Parts> make_range(const Build& build, const Range& range, std::string& values) {
+  tell_of_errors(build);
   auto volume = read_field(build);
   if (!volume) return tl::unexpected(volume.error());
   values = text_of_values(*volume);
   Progress progress("building " + volume->name);
   const Refine refine = build.options.refine == "uniform" ? Refine::uniform : Refine::boundary;
-  auto made = build_range(*volume, {range, refine, [&](double done) { progress.fraction(done); }}, build.options.step);
+  auto made = build_range(*volume, {range, refine, [&](double done) { progress.fraction(done); }, build.checkpoint}, build.options.step);
   if (made && build.checkpoint != nullptr) build.checkpoint->keep_one_range(*made, values);
   return made;
 }
@@ -172,9 +180,11 @@ Result<nlohmann::ordered_json> write_range(const Build& build, const Range& rang
 
 // The parts of a data set of every range, without channels.
 Result<ValueVolume::Parts> make_every_range(const Build& build, Progress& progress) {
+  tell_of_errors(build);
   auto volume = read_field(build);
   if (!volume) return tl::unexpected(volume.error());
-  auto made = build_every_range(*volume, build.options.step, [&](double done) { progress.fraction(done); });
+  auto made = build_every_range(
+      *volume, build.options.step, [&](double done) { progress.fraction(done); }, build.checkpoint);
   if (made && build.checkpoint != nullptr) build.checkpoint->keep_every_range(*made);
   return made;
 }

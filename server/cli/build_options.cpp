@@ -180,7 +180,8 @@ void add_build_options(CLI::App& command, BuildCommand& o) {
   command.add_option("--memory", o.memory, "Most resident memory, such as 2GiB or 500MB; what does not fit is in a scratch file. Default: no limit")
       ->transform(CLI::AsSizeValue(true))
       ->type_name("BYTES");
-  command.add_option("--scratch", o.scratch, "Folder of the scratch file, on a disk; default: that of the output")->type_name("FOLDER");
+  command.add_option("--scratch", o.scratch, "Folder of the scratch file, and of what --resume keeps, on a disk; default: that of the output")
+      ->type_name("FOLDER");
   command.add_flag("--resume", o.resume,
                    "Keep what is finished in OUT.ivm.resume, or in the scratch folder, and go on from what a build that was killed has kept there");
   command.add_option("--dims", o.dims, "Raw input: number of samples on x (fastest), y and z")->expected(3)->type_name("X Y Z");

@@ -15,10 +15,11 @@ namespace intervale {
 namespace {
 
 // Kinds of records.
-enum class Kind : std::uint32_t { every_range = 1, one_range = 2, channel = 3, page = 4 };
+enum class Kind : std::uint32_t { every_range = 1, one_range = 2, channel = 3, page = 4, errors = 5 };
 BuildJournal::Name name_of(Kind kind, std::uint32_t first = 0, std::uint32_t second = 0) { return {std::uint32_t(kind), first, second}; }
 
 constexpr std::size_t kMostText = 4096;
+constexpr std::size_t kShort = 1 << 20;    // bytes of errors that are written at once
 constexpr std::size_t kKeysAtOnce = 4096;  // of supercubes
 
 // The two directions of the functions below, which have one text so that both have the same order. In reading, sizes come
@@ -303,6 +304,23 @@ Result<std::unique_ptr<BuildCheckpoint>> BuildCheckpoint::open(const std::filesy
   return std::unique_ptr<BuildCheckpoint>(new BuildCheckpoint(std::move(*journal)));
 }
 
+bool BuildCheckpoint::find_errors(int scale, std::span<float> errors) {
+  return read(*journal_, name_of(Kind::errors, std::uint32_t(scale)), [&](In& in) {
+    in.require(in.left() == errors.size_bytes());
+    in.bytes(std::as_writable_bytes(errors));
+    in.require(std::all_of(errors.begin(), errors.end(), [](float error) { return error >= 0 && std::isfinite(error); }));
+  });
+}
+
+void BuildCheckpoint::keep_errors(int scale, std::span<const float> errors) {
+  const BuildJournal::Name name = name_of(Kind::errors, std::uint32_t(scale));
+  const auto bytes = std::as_bytes(errors);
+  if (bytes.size() <= kShort) return journal_->append(name, bytes);
+  write(*journal_, name, [&](Out& out) { out.bytes(bytes); });
+}
+
+std::size_t BuildCheckpoint::error_scales() const { return journal_->count(std::uint32_t(Kind::errors)); }
+
 std::optional<ValueVolume::Parts> BuildCheckpoint::take_every_range() {
   ValueVolume::Parts parts;
   if (!read(*journal_, name_of(Kind::every_range), [&](In& in) { code_every_range(in, parts); })) return {};
@@ -311,6 +329,7 @@ std::optional<ValueVolume::Parts> BuildCheckpoint::take_every_range() {
 
 void BuildCheckpoint::keep_every_range(const ValueVolume::Parts& parts) {
   write(*journal_, name_of(Kind::every_range), [&](Out& out) { code_every_range(out, parts); });
+  journal_->free(std::uint32_t(Kind::errors));
 }
 
 std::optional<BuildCheckpoint::OneRange> BuildCheckpoint::take_one_range() {
@@ -321,6 +340,7 @@ std::optional<BuildCheckpoint::OneRange> BuildCheckpoint::take_one_range() {
 
 void BuildCheckpoint::keep_one_range(const IntervalVolume::Parts& parts, const std::string& values) {
   write(*journal_, name_of(Kind::one_range), [&](Out& out) { code_one_range(out, parts, values); });
+  journal_->free(std::uint32_t(Kind::errors));
 }
 
 std::optional<BuildCheckpoint::KeptChannel> BuildCheckpoint::take_channel(std::uint32_t number, const SupercubeSet& set) {

@@ -1,4 +1,5 @@
-// What a build has finished, in a journal: the parts of its data set before their pages are compressed, and those pages.
+// What a build has finished, in a journal: the errors of diamonds, by scale; then the parts of its data set before their
+// pages are compressed; then those pages.
 #pragma once
 
 #include <cstdint>
@@ -15,6 +16,7 @@
 #include "common/ivm/value_volume.h"
 #include "common/patch/channel.h"
 #include "common/util/result.h"
+#include "server/builder/kept_errors.h"
 #include "server/resume/build_journal.h"
 
 namespace intervale {
@@ -22,10 +24,15 @@ namespace intervale {
 // Functions that begin with take_ give what was kept, from bytes from outside: nothing if it is not there, or damaged, of
 // which the journal warns. They allocate no more than the journal has bytes. Functions that begin with keep_ write, and
 // throw JournalFailed. Arrays are read and written in pieces of a megabyte, without a copy. One thread; pages from any.
-class BuildCheckpoint final : public KeptPages {
+class BuildCheckpoint final : public KeptPages, public KeptErrors {
  public:
   // As BuildJournal::open().
   static Result<std::unique_ptr<BuildCheckpoint>> open(const std::filesystem::path& path, std::uint64_t fingerprint, BuildJournal::Warn warn);
+
+  // Until the values are kept.
+  [[nodiscard]] bool find_errors(int scale, std::span<float> errors) override;
+  void keep_errors(int scale, std::span<const float> errors) override;
+  [[nodiscard]] std::size_t error_scales() const;  // how many are there
 
   // Of every range, without channels. The name is empty.
   [[nodiscard]] std::optional<ValueVolume::Parts> take_every_range();

@@ -193,6 +193,16 @@ void BuildJournal::drop(const Name& name) {
   records_.erase(name);
 }
 
+void BuildJournal::free(std::uint32_t kind) noexcept {
+  const std::lock_guard lock(mutex_);
+  const auto begin = records_.lower_bound({kind, 0, 0}), end = records_.lower_bound({kind + 1, 0, 0});
+  for (auto record = begin; record != end; ++record) {
+    const auto& [offset, bytes, checksum] = record->second;
+    if (bytes != 0) (void)::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, off_t(offset), off_t(bytes));
+  }
+  records_.erase(begin, end);
+}
+
 std::size_t BuildJournal::count(std::uint32_t kind) const {
   return std::size_t(std::distance(records_.lower_bound({kind, 0, 0}), records_.lower_bound({kind + 1, 0, 0})));
 }

@@ -99,6 +99,10 @@ class BuildJournal {
   // Warns of damage, and forgets a record: also one whose contents make no sense. Any thread.
   void drop(const Name& name);
 
+  // Gives the disk back what the records of a kind take, which are needed no more. They are not there any longer; to a later
+  // build they are damaged.
+  void free(std::uint32_t kind) noexcept;
+
   // Removes the file, and gives the lock back. Whatever fails is ignored: the file is of no use to anybody.
   void remove() noexcept;
 

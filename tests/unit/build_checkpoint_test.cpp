@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/diamond/domain.h"
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/value_file.h"
 #include "server/builder/channel_builder.h"
@@ -107,8 +108,8 @@ TEST_F(CheckpointTest, GivesBackWhatWasKept) {
 }
 
 TEST_F(CheckpointTest, KeepsATableOfValues) {
-  std::vector<double> samples;
-  for (int i = 0; i < kBox[0] * kBox[1] * kBox[2]; ++i) samples.push_back(std::exp(10.0 * (i % 7)));
+  std::vector<double> samples(std::size_t(kBox[0] * kBox[1] * kBox[2]));
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = std::exp(10.0 * double(i % 7));
   Volume volume = testing::volume_of_type(SampleType::f64, kBox, samples);
   every = build_value_volume(volume, choose_value_format(volume, 0.0).value(), {}).take();
   ASSERT_TRUE(every.description.format.table);
@@ -128,6 +129,32 @@ TEST_F(CheckpointTest, PagesOfTheFieldAndOfChannelsDiffer) {
     EXPECT_EQ(encode_values(ValueVolume(every), serial, checkpoint.get()), expected);
     EXPECT_EQ(checkpoint->pages(), 2);
   }
+}
+
+TEST_F(CheckpointTest, ErrorsOfScalesAreThereUntilTheValuesAre) {
+  Volume volume = testing::gyroid({33, 20, 17});
+  const auto hierarchy = [&volume](BuildCheckpoint* kept) { return FieldHierarchy(volume, {{-0.3, 0.2}, Refine::boundary, {}, kept}); };
+  const auto expected = encode_ivm(hierarchy(nullptr).compact().value());
+  std::size_t scales = 0;
+  {
+    const auto checkpoint = open();
+    EXPECT_EQ(encode_ivm(hierarchy(checkpoint.get()).compact().value()), expected);
+    scales = checkpoint->error_scales();
+    EXPECT_EQ(int(scales), Domain(volume.grid.dims).levels());
+  }
+  std::string bytes = contents_of(path);
+  {
+    const auto checkpoint = open();
+    EXPECT_EQ(encode_ivm(hierarchy(checkpoint.get()).compact().value()), expected);
+    EXPECT_EQ(checkpoint->error_scales(), scales);
+    EXPECT_THAT(warnings, IsEmpty());
+    checkpoint->keep_one_range(one, {});
+    EXPECT_EQ(checkpoint->error_scales(), 0);
+  }
+  bytes[1000] ^= 1;
+  folder.file("out.ivm.resume", bytes);
+  EXPECT_EQ(encode_ivm(hierarchy(open().get()).compact().value()), expected);
+  EXPECT_EQ(warnings.size(), 1);
 }
 
 TEST_F(CheckpointTest, EveryTruncationLeavesWhatIsWhole) {
