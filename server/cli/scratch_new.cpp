@@ -1,6 +1,7 @@
-// The program's `operator new`: large arrays lie in a scratch file while one is installed (build --memory).
+// The program's `operator new`: large arrays lie in a scratch file while one is installed: those of a build
+// (build --memory), and those of data sets that are served (serve --data-memory).
 //
-// Whoever allocates them: so no array of a build, of today or of later, exceeds the budget by being forgotten. [new.delete]
+// Whoever allocates them: so no array, of today or of later, exceeds the budget by being forgotten. [new.delete]
 // of the C++ standard lets a program replace these. Those for extended alignment are left as they are.
 #include <cstddef>
 #include <cstdlib>
@@ -11,7 +12,7 @@
 void* operator new(std::size_t bytes) {
   using intervale::ScratchMemory;
   if (bytes >= ScratchMemory::kLeastBytes) {
-    if (ScratchMemory* const scratch = ScratchMemory::installed()) return scratch->allocate(bytes);
+    if (ScratchMemory* const scratch = ScratchMemory::of_this_thread()) return scratch->allocate(bytes);
   }
   if (bytes == 0) bytes = 1;
   for (;;) {

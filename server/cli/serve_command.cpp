@@ -10,14 +10,19 @@
 #include "common/remote/remote_options.h"
 #include "common/remote/remote_url.h"
 #include "server/cli/commands.h"
+#include "server/scratch/scratch_memory.h"
 #include "server/serve/http_routes.h"
 #include "server/serve/serve.h"
 
 namespace intervale {
 namespace {
 
+constexpr const char* kScratchFolder = "/var/tmp";  // which is on a disk, unlike /tmp on many systems
+
 struct ServeCommand {
   ServeOptions serve;
+  std::optional<std::uint64_t> data_memory;
+  std::optional<std::string> scratch;
   LogOptions log;
   TlsFiles tls;
   std::vector<std::string> inputs;
@@ -29,6 +34,20 @@ struct ServeCommand {
 bool is_empty_in_environment(const char* name) {
   const char* const value = std::getenv(name);
   return value != nullptr && *value == '\0';
+}
+
+// nullptr: data sets lie in the process' own memory.
+Result<std::unique_ptr<ScratchMemory>> open_data_memory(const ServeCommand& options) {
+  if (!options.data_memory) {
+    if (options.scratch) return misuse("--scratch belongs to a limit of the data sets' memory: give --data-memory too");
+    return nullptr;
+  }
+  if (options.serve.max_memory && *options.serve.max_memory <= *options.data_memory)
+    return misuse("--max-memory must be more than --data-memory, which it includes");
+  auto memory = ScratchMemory::open_for_data_sets(options.scratch.value_or(kScratchFolder), *options.data_memory);
+  if (!memory) return fail("--data-memory: " + memory.error().message);
+  ScratchMemory::install(**memory);
+  return memory;
 }
 
 Result<void> run(const ServeCommand& options) {
@@ -56,7 +75,11 @@ Result<void> run(const ServeCommand& options) {
   }
   remote.access = std::move(*access);
   remote.poll_time = options.remote_poll_time;
-  return serve(options.serve, options.log, paths, std::move(remote));
+  const auto data_memory = open_data_memory(options);
+  if (!data_memory) return tl::unexpected(data_memory.error());
+  ServeOptions serve_options = options.serve;
+  serve_options.data_memory = data_memory->get();
+  return serve(serve_options, options.log, paths, std::move(remote));
 }
 
 // The log level in a configuration file; nullopt if it has none, or cannot be read.
@@ -125,7 +148,8 @@ CLI::Option* add_limit(CLI::App& command, const std::string& name, Limit& limit,
   return command.add_option(name, limit, description)->check(check_at_least_one)->group("Limits");
 }
 
-void add_limits(CLI::App& command, ServeOptions& serve) {
+void add_limits(CLI::App& command, ServeCommand& options) {
+  ServeOptions& serve = options.serve;
   add_limit(command, "--max-connections", serve.max_connections, "Connections at a time; further ones take the place of silent ones, or are closed")
       ->capture_default_str();
   add_limit(command, "--max-connections-per-address", serve.max_connections_per_address,
@@ -139,6 +163,13 @@ void add_limits(CLI::App& command, ServeOptions& serve) {
             "Default: no limit")
       ->transform(bytes)
       ->type_name("BYTES");
+  add_limit(command, "--data-memory", options.data_memory,
+            "Most resident memory of data sets, such as 2GiB or 500MB; they lie in a scratch file, and may be larger. Default: no limit, and no file")
+      ->transform(bytes)
+      ->type_name("BYTES");
+  command.add_option("--scratch", options.scratch, std::string("Folder of the scratch file, on a disk. Default: ") + kScratchFolder)
+      ->type_name("FOLDER")
+      ->group("Limits");
   add_limit(command, "--max-queued-bytes", serve.max_queued_bytes,
             "Unsent bytes of all sessions; above, the slowest readers are disconnected, if their message has been waiting for more "
             "than 1 s. Default: 512MiB")
@@ -245,7 +276,7 @@ void add_serve_command(Program& program) {
                    "How often files at URLs are asked whether they have changed. Default: 60")
       ->group(kRemoteGroup);
   add_access_options(command, options->serve, options->tls);
-  add_limits(command, options->serve);
+  add_limits(command, *options);
 }
 
 }  // namespace intervale

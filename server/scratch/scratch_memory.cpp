@@ -1,16 +1,16 @@
 #include "server/scratch/scratch_memory.h"
 
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <oneapi/tbb/task_scheduler_observer.h>
 #include <sched.h>
 #include <sys/mman.h>
-#include <time.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <charconv>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <iterator>
@@ -25,19 +25,11 @@ constexpr std::size_t kReleased = 16 << 20;      // so many bytes that are no lo
 constexpr std::uint64_t kProgram = 64 << 20;     // resident, of code and small objects
 constexpr std::uint64_t kThread = 32 << 20;      // for each thread
 constexpr std::uint64_t kMostMargin = 64 << 20;  // may become resident from one tick to the next
-constexpr long kPeriod = 1'000'000;              // nanoseconds between two looks of a thread
+constexpr std::chrono::milliseconds kPeriod{1};  // between two looks of a thread
+constexpr std::uint64_t kLeastData = 4'000'000;  // of a budget for data sets: some stretches of the keeper, and some pages for each thread
 
-// Resident bytes of the process. statm: /proc/self/statm.
-std::uint64_t resident_bytes(int statm) {
-  std::array<char, 128> text{};
-  const ssize_t n = ::pread(statm, text.data(), text.size(), 0);
-  if (n <= 0) return 0;
-  const char* const end = text.data() + n;
-  const char* at = std::find(text.data(), text.data() + n, ' ');
-  std::uint64_t pages = 0;
-  if (at != end) std::from_chars(at + 1, end, pages);
-  return pages * std::uint64_t(::sysconf(_SC_PAGESIZE));
-}
+// The keeper's thread: how long it sleeps while little is resident, and when it counts again, at first and later.
+constexpr std::chrono::milliseconds kIdle{8}, kFirstCount{125}, kLastCount{64'000};
 
 std::string reason(int error) { return std::generic_category().message(error); }
 std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes + 999'999) / 1'000'000) + " MB"; }
@@ -52,10 +44,31 @@ int open_unnamed(const std::filesystem::path& folder) {
   return named;
 }
 
+// Whether the file lies in memory, and not on a disk.
+bool is_in_memory(int file) {
+  struct statfs system {};
+  return ::fstatfs(file, &system) == 0 && (system.f_type == TMPFS_MAGIC || system.f_type == RAMFS_MAGIC);
+}
+
 // Threads that are looking, or about to.
 std::atomic<int> looking{0};
 
 std::atomic<ScratchMemory*> installed_memory{nullptr};
+std::atomic<ScratchMemory*> of_all_threads{nullptr};  // the same, or nullptr
+thread_local constinit ScratchMemory* of_scope = nullptr;
+thread_local constinit bool is_own = false;
+
+// While it exists, what the calling thread allocates lies in the process' own memory: the lists of what is in the file.
+class Own {
+ public:
+  Own() : before_(std::exchange(is_own, true)) {}
+  Own(const Own&) = delete;
+  Own& operator=(const Own&) = delete;
+  ~Own() { is_own = before_; }
+
+ private:
+  bool before_;
+};
 std::atomic<const std::byte*> last_base{nullptr};  // of the last one installed
 
 }  // namespace
@@ -69,37 +82,49 @@ class ScratchMemory::Timers : public tbb::task_scheduler_observer {
   }
   Timers(const Timers&) = delete;
   Timers& operator=(const Timers&) = delete;
-  ~Timers() override {
-    observe(false);
-    for (const auto& [thread, timer] : timers_) ::timer_delete(timer);
-  }
+  ~Timers() override { observe(false); }
   void on_scheduler_entry(bool /*is_worker*/) override { add_this_thread(); }
 
  private:
   void add_this_thread() {
     const pid_t thread = ::gettid();
     const std::lock_guard lock(mutex_);
-    if (timers_.contains(thread)) return;
-    sigevent event{};
-    event.sigev_notify = SIGEV_THREAD_ID;
-    event.sigev_signo = SIGPROF;
-    event._sigev_un._tid = thread;
-    timer_t timer{};
-    if (::timer_create(CLOCK_MONOTONIC, &event, &timer) != 0) return;
-    const itimerspec period{{0, kPeriod}, {0, kPeriod}};
-    ::timer_settime(timer, 0, &period, nullptr);
-    timers_.emplace(thread, timer);
+    timers_.try_emplace(thread, SIGPROF, kPeriod);
   }
   std::mutex mutex_;
-  std::unordered_map<pid_t, timer_t> timers_;
+  std::unordered_map<pid_t, ThreadTimer> timers_;
 };
 
 ScratchMemory* ScratchMemory::installed() { return installed_memory.load(std::memory_order_acquire); }
+
+ScratchMemory* ScratchMemory::of_this_thread() {
+  if (is_own) return nullptr;
+  return of_scope != nullptr ? of_scope : of_all_threads.load(std::memory_order_acquire);
+}
+
+ScratchMemory::Scope::Scope(ScratchMemory* memory) : before_(of_scope) {
+  if (memory == nullptr) return;
+  of_scope = memory;
+  if (memory == installed()) timer_.emplace(SIGPROF, kPeriod);
+}
+
+ScratchMemory::Scope::~Scope() { of_scope = before_; }
 
 Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open(const std::filesystem::path& folder, std::uint64_t budget, unsigned threads) {
   const std::uint64_t least = kProgram + threads * kThread;
   if (budget < least)
     return fail("a budget of " + megabytes(budget) + " is too small: with " + std::to_string(threads) + " threads at least " + megabytes(least));
+  return map_file(folder, budget, Use::build);
+}
+
+Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open_for_data_sets(const std::filesystem::path& folder, std::uint64_t budget) {
+  if (budget < kLeastData) return fail("a budget of " + megabytes(budget) + " is too small: at least " + megabytes(kLeastData));
+  auto memory = map_file(folder, budget, Use::data_sets);
+  if (memory) (*memory)->keeping_ = std::jthread([&scratch = **memory](const std::stop_token& stop) { scratch.keep(stop); });
+  return memory;
+}
+
+Result<std::unique_ptr<ScratchMemory>> ScratchMemory::map_file(const std::filesystem::path& folder, std::uint64_t budget, Use use) {
   const auto cannot = [&folder](int error) { return fail("cannot make a scratch file in '" + folder.string() + "': " + reason(error)); };
   const int statm = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
   if (statm < 0) return fail("cannot tell how much memory is resident: /proc/self/statm: " + reason(errno));
@@ -108,6 +133,11 @@ Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open(const std::filesystem
     const int error = errno;
     ::close(statm);
     return cannot(error);
+  }
+  if (use == Use::data_sets && is_in_memory(file)) {
+    ::close(file);
+    ::close(statm);
+    return fail("the scratch folder '" + folder.string() + "' lies in memory (tmpfs): name one on a disk");
   }
   void* const base = ::ftruncate(file, off_t(kRegionBytes)) == 0
                          ? ::mmap(nullptr, kRegionBytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_NORESERVE, file, 0)
@@ -118,19 +148,22 @@ Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open(const std::filesystem
     ::close(statm);
     return cannot(error);
   }
-  return std::unique_ptr<ScratchMemory>(new ScratchMemory(folder, file, statm, static_cast<std::byte*>(base), budget));
+  return std::unique_ptr<ScratchMemory>(new ScratchMemory(folder, file, statm, static_cast<std::byte*>(base), budget, use));
 }
 
-ScratchMemory::ScratchMemory(std::filesystem::path folder, int file, int statm, std::byte* base, std::uint64_t budget)
+ScratchMemory::ScratchMemory(std::filesystem::path folder, int file, int statm, std::byte* base, std::uint64_t budget, Use use)
     : folder_(std::move(folder)), file_(file), statm_(statm), base_(base), budget_(budget) {
   ::madvise(base_, kRegionBytes, MADV_RANDOM);  // or one access makes up to two megabytes resident
   unused_.emplace(0, kRegionBytes);
+  if (use == Use::data_sets) keeper_.emplace(base_, kRegionBytes, budget_, statm_);
 }
 
 ScratchMemory::~ScratchMemory() {
+  keeping_ = {};
   timers_.reset();
-  ScratchMemory* self = this;
-  installed_memory.compare_exchange_strong(self, nullptr);
+  ScratchMemory *self = this, *same = this;
+  of_all_threads.compare_exchange_strong(self, nullptr);
+  installed_memory.compare_exchange_strong(same, nullptr);
   while (looking.load() != 0) ::sched_yield();
   const std::lock_guard lock(mutex_);
   if (used_.empty()) {
@@ -149,6 +182,8 @@ void ScratchMemory::install(ScratchMemory& memory) {
   action.sa_handler = &ScratchMemory::on_tick;
   action.sa_flags = SA_RESTART;
   ::sigaction(SIGPROF, &action, nullptr);
+  if (memory.keeper_) return;
+  of_all_threads.store(&memory, std::memory_order_release);
   memory.timers_ = std::make_unique<Timers>();
 }
 
@@ -184,26 +219,32 @@ void ScratchMemory::give_back(std::size_t offset, std::size_t bytes) noexcept {
 }
 
 void* ScratchMemory::allocate(std::size_t bytes) {
+  const Own lists;
   bytes = (bytes + kGranule - 1) / kGranule * kGranule;
   const std::lock_guard lock(mutex_);
   const std::size_t offset = take(bytes);
   used_.emplace(offset, bytes);
+  const SignalBlock whole(SIGPROF);  // which would make some file systems give up
   // A page that the disk has no room for would end the process once it is written to.
   if (const int error = ::posix_fallocate(file_, off_t(offset), off_t(bytes)); error != 0) {
+    (void)::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, off_t(offset), off_t(bytes));  // what there was room for
     used_.erase(offset);
     give_back(offset, bytes);
     throw ScratchFull("the scratch folder '" + folder_.string() + "' has no room for " + megabytes(bytes) + " more: " + reason(error));
   }
+  array_bytes_.fetch_add(bytes, std::memory_order_relaxed);
   return base_ + offset;
 }
 
 void ScratchMemory::free(void* array) noexcept {
+  const Own lists;
   const auto offset = std::size_t(static_cast<std::byte*>(array) - base_);
   const std::lock_guard lock(mutex_);
   const auto found = used_.find(offset);
   if (found == used_.end()) return;
   const std::size_t bytes = found->second;
   used_.erase(found);
+  array_bytes_.fetch_sub(bytes, std::memory_order_relaxed);
   if (bytes >= kReleased) (void)::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, off_t(offset), off_t(bytes));
   give_back(offset, bytes);
 }
@@ -211,7 +252,12 @@ void ScratchMemory::free(void* array) noexcept {
 void ScratchMemory::on_tick(int /*signal*/) noexcept {
   const int error = errno;
   ++looking;
-  if (ScratchMemory* const memory = installed()) memory->keep_within_budget();
+  if (ScratchMemory* const memory = installed()) {
+    if (memory->keeper_)
+      memory->keeper_->keep_within_budget(memory->most_bytes());
+    else
+      memory->keep_within_budget();
+  }
   --looking;
   errno = error;
 }
@@ -220,7 +266,7 @@ void ScratchMemory::on_tick(int /*signal*/) noexcept {
 // those in use come back at once. Other threads wait for that.
 void ScratchMemory::keep_within_budget() noexcept {
   const std::uint64_t most = budget_ - std::min(budget_ / 4, kMostMargin);
-  std::uint64_t resident = resident_bytes(statm_);
+  std::uint64_t resident = read_resident(statm_).all;
   if (resident <= most) return;
   if (is_sweeping_.exchange(true, std::memory_order_acquire)) {
     while (is_sweeping_.load(std::memory_order_acquire)) ::sched_yield();
@@ -231,9 +277,23 @@ void ScratchMemory::keep_within_budget() noexcept {
     if (next_sweep_ >= end) next_sweep_ = 0;
     ::madvise(base_ + next_sweep_, std::min(kSweep, end - next_sweep_), MADV_DONTNEED);
     next_sweep_ += kSweep;
-    if (swept / kSweep % 4 == 3) resident = resident_bytes(statm_);
+    if (swept / kSweep % 4 == 3) resident = read_resident(statm_).all;
   }
   is_sweeping_.store(false, std::memory_order_release);
+}
+
+void ScratchMemory::keep(const std::stop_token& stop) noexcept {
+  using Clock = std::chrono::steady_clock;
+  auto pause = kFirstCount;
+  for (auto next_count = Clock::now() + pause; !stop.stop_requested();) {
+    keeper_->keep_within_budget(most_bytes());
+    if (Clock::now() >= next_count) {
+      keeper_->recount(most_bytes());
+      pause = std::min(2 * pause, kLastCount);
+      next_count = Clock::now() + pause;
+    }
+    std::this_thread::sleep_for(keeper_->resident() > budget_ / 2 ? kPeriod : kIdle);
+  }
 }
 
 }  // namespace intervale

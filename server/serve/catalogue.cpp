@@ -37,4 +37,8 @@ Catalogue::Volume Catalogue::find(std::string_view name) const {
   return found == volumes_.end() ? nullptr : found->second;
 }
 
+void complete_in_data_memory(const IntervalVolume& volume, const Memory& memory, const ParallelFor& parallel) {
+  if (memory.data_memory() != nullptr && volume.description().refine == Refine::uniform) (void)volume.bounds(parallel);
+}
+
 }  // namespace intervale

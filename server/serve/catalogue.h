@@ -7,7 +7,9 @@
 #include <string_view>
 
 #include "common/ivm/interval_volume.h"
+#include "common/util/parallel.h"
 #include "common/util/result.h"
+#include "server/serve/memory.h"
 
 namespace intervale {
 
@@ -30,5 +32,9 @@ class Catalogue {
  private:
   std::map<std::string, Volume, std::less<>> volumes_;
 };
+
+// What a data set that lies in data memory needs for ranges: made now, for a session would make it elsewhere. On the thread
+// that loads it. Throws what `parallel` throws, and ScratchFull.
+void complete_in_data_memory(const IntervalVolume& volume, const Memory& memory, const ParallelFor& parallel);
 
 }  // namespace intervale

@@ -9,6 +9,7 @@
 #include "common/ivm/load_volume.h"
 #include "common/parallel/all_cores.h"
 #include "protocol/codec.h"
+#include "server/scratch/scratch_memory.h"
 
 namespace intervale {
 namespace {
@@ -28,9 +29,9 @@ Result<std::vector<fs::path>> files_in(const fs::path& folder) {
 }
 
 // A file that needs more memory than the system has (std::bad_alloc) is an error, and does not end the server. NoRoom is
-// for the caller: there may be room later.
+// for the caller: there may be room later. before: what the error begins with.
 template <class Function>
-auto catching(const fs::path& path, const Function& function) -> decltype(function()) {
+auto catching(const std::string& before, const Function& function) -> decltype(function()) {
   try {
     return function();
   } catch (const Stopped&) {
@@ -38,7 +39,7 @@ auto catching(const fs::path& path, const Function& function) -> decltype(functi
   } catch (const NoRoom&) {
     throw;
   } catch (const std::exception& exception) {
-    return fail(path.string() + ": cannot be read: " + exception.what());
+    return fail(before + "cannot be read: " + exception.what());
   }
 }
 
@@ -53,13 +54,17 @@ void log_faults(const fs::path& path, const PageFaults& faults, const IntervalVo
 }
 
 // Throws NoRoom if that takes more memory than `room`. faults: as of decode_volume().
-Read read(const fs::path& path, const std::string& name, std::uint64_t room, const ParallelFor& parallel, PageFaults* faults) {
+Read read(const fs::path& path, const std::string& name, const Memory& memory, std::uint64_t room, const ParallelFor& parallel, PageFaults* faults) {
   spdlog::debug("reads {}", path.string());
   std::error_code ignored;
   if (const auto size = fs::file_size(path, ignored); !ignored && size > room) throw NoRoom();
-  const auto bytes = catching(path, [&] { return read_volume_file(path, parallel); });
+  const auto bytes = catching(path.string() + ": ", [&] { return read_volume_file(path, parallel); });
   if (!bytes) return {true, tl::unexpected(bytes.error())};
-  auto volume = catching(path, [&] { return decode_volume(*bytes, name, parallel, room - std::min<std::uint64_t>(room, bytes->size()), faults); });
+  auto volume = catching("", [&] {
+    auto decoded = decode_volume(*bytes, name, parallel, room - std::min<std::uint64_t>(room, bytes->size()), faults);
+    if (decoded) complete_in_data_memory(*decoded, memory, parallel);
+    return decoded;
+  });
   if (!volume) return {false, std::move(volume)};
   if (auto fits = protocol::check_sendable(volume->description()); !fits) return {false, tl::unexpected(fits.error())};
   return {false, std::move(volume)};
@@ -68,6 +73,7 @@ Read read(const fs::path& path, const std::string& name, std::uint64_t room, con
 }  // namespace
 
 Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
+  const ScratchMemory::Scope scope(memory_.data_memory());
   const ParallelFor parallel = serial_until(std::move(stop));
   for (const fs::path& input : inputs_) {
     std::error_code ignored;
@@ -77,7 +83,11 @@ Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
     }
     spdlog::debug("reads {}", input.string());
     PageFaults faults;
-    auto volume = catching(input, [&] { return load_volume(input, parallel, tolerates_damage_ ? &faults : nullptr); });
+    auto volume = catching(input.string() + ": ", [&] {
+      auto loaded = load_volume(input, parallel, tolerates_damage_ ? &faults : nullptr);
+      if (loaded) complete_in_data_memory(**loaded, memory_, parallel);
+      return loaded;
+    });
     if (!volume) return tl::unexpected(volume.error());
     log_faults(input, faults, **volume);
     files_.emplace_back(input, counted(memory_, Memory::Holder::datasets, std::move(*volume)));
@@ -115,7 +125,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
   try {
     if (room <= file.too_little) throw NoRoom();
     PageFaults faults;
-    auto volume = read(path, name, room, parallel, tolerates_damage_ ? &faults : nullptr);
+    auto volume = read(path, name, memory_, room, parallel, tolerates_damage_ ? &faults : nullptr);
     file.too_little = 0;
     // Not the file's fault, perhaps: out of descriptors, or no permission; tried again even if the file stays as it is.
     if (volume.is_unread) return skip(volume.contents.error().message);
@@ -134,6 +144,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
 }
 
 std::optional<Catalogue> CatalogueWatcher::poll(std::stop_token stop) {
+  const ScratchMemory::Scope scope(memory_.data_memory());
   const ParallelFor parallel = serial_until(std::move(stop));
   bool changed = remote_.poll(parallel);
   std::map<fs::path, File> found;

@@ -25,7 +25,7 @@ namespace intervale {
 struct ServerContext {
   explicit ServerContext(const ServeOptions& requested)
       : options(requested),
-        memory(requested.max_memory),
+        memory(requested.max_memory, requested.data_memory),
         scheduler(requested.threads),
         background(scheduler, memory, requested.threads),
         write_budget(requested.max_queued_bytes) {}

@@ -12,7 +12,14 @@
 #include <mutex>
 #include <stop_token>
 
+#include "server/scratch/scratch_memory.h"
+
 namespace intervale {
+
+std::uint64_t Memory::bytes(Holder holder) const {
+  const std::uint64_t held = bytes_[std::size_t(holder)].load(std::memory_order_relaxed);
+  return holder == Holder::datasets && data_memory_ != nullptr ? std::min(held, data_memory_->budget()) : held;
+}
 
 std::uint64_t Memory::bytes() const {
   std::uint64_t all = 0;
@@ -21,7 +28,7 @@ std::uint64_t Memory::bytes() const {
 }
 
 std::uint64_t Memory::room() const {
-  if (!limit_) return ~std::uint64_t(0);
+  if (!limit_ || data_memory_ != nullptr) return ~std::uint64_t(0);
   return *limit_ - std::min(*limit_, bytes());
 }
 
@@ -35,8 +42,11 @@ std::uint64_t resident_bytes() {
 }
 
 std::uint64_t uncounted_bytes(const Memory& memory) {
+  // Of data memory, what is resident comes and goes.
+  const PageKeeper* const keeper = memory.data_memory() == nullptr ? nullptr : memory.data_memory()->keeper();
+  const std::uint64_t counted = keeper == nullptr ? memory.bytes() : memory.bytes() - memory.bytes(Memory::Holder::datasets) + keeper->resident();
   const std::uint64_t resident = resident_bytes();
-  return resident - std::min(resident, memory.bytes());
+  return resident - std::min(resident, counted);
 }
 
 bool TrimRule::is_due(std::uint64_t uncounted) {

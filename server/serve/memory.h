@@ -15,16 +15,19 @@
 
 namespace intervale {
 
+class ScratchMemory;
+
 // Any thread.
 class Memory {
  public:
-  // datasets: also those that are replaced and still in use. sessions: connections, before the upgrade too, what was sent,
-  // and work under way (Background). queues: unsent messages. ranges: what ranges need (RangeCache).
+  // datasets: also those that are replaced and still in use; in data memory, no more than its budget. sessions: connections,
+  // before the upgrade too, what was sent, and work under way (Background). queues: unsent messages. ranges: what ranges
+  // need (RangeCache).
   enum class Holder { datasets, sessions, queues, ranges };
   static constexpr std::array kHolders{Holder::datasets, Holder::sessions, Holder::queues, Holder::ranges};
 
-  // limit: of all bytes; nullopt: none.
-  explicit Memory(std::optional<std::uint64_t> limit = {}) : limit_(limit) {}
+  // limit: of all bytes; nullopt: none. data_memory: where data sets lie, which must outlive this; nullptr: with the rest.
+  explicit Memory(std::optional<std::uint64_t> limit = {}, ScratchMemory* data_memory = nullptr) : limit_(limit), data_memory_(data_memory) {}
   Memory(const Memory&) = delete;
   Memory& operator=(const Memory&) = delete;
 
@@ -50,15 +53,18 @@ class Memory {
     std::uint64_t bytes_ = 0;
   };
 
-  [[nodiscard]] std::uint64_t bytes(Holder holder) const { return bytes_[std::size_t(holder)].load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t bytes(Holder holder) const;
   [[nodiscard]] std::uint64_t bytes() const;  // of all holders
   // More is held than the limit allows: no new sessions.
   [[nodiscard]] bool is_full() const { return limit_ && bytes() > *limit_; }
-  [[nodiscard]] std::uint64_t room() const;  // up to the limit; the largest number without one
+  // For data sets, up to the limit; the largest number without one, and in data memory, where the disk limits them.
+  [[nodiscard]] std::uint64_t room() const;
+  [[nodiscard]] ScratchMemory* data_memory() const { return data_memory_; }
 
  private:
   std::array<std::atomic<std::uint64_t>, kHolders.size()> bytes_{};
   std::optional<std::uint64_t> limit_;
+  ScratchMemory* data_memory_;
 };
 
 // The same object, whose memory_bytes() count as long as anybody has it.

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/scratch/scratch_memory.h"
+
 namespace intervale {
 namespace {
 
@@ -51,13 +53,41 @@ MetricFamily gauges(const char* name, const char* help, std::vector<prometheus::
   return {name, help, MetricType::Gauge, std::move(metrics)};
 }
 
+prometheus::ClientMetric count(double number, std::vector<prometheus::ClientMetric::Label> labels = {}) {
+  prometheus::ClientMetric metric;
+  metric.label = std::move(labels);
+  metric.counter.value = number;
+  return metric;
+}
+
 prometheus::ClientMetric cpu_seconds() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
   const auto seconds = [](const timeval& time) { return double(time.tv_sec) + 1e-6 * double(time.tv_usec); };
-  prometheus::ClientMetric metric;
-  metric.counter.value = seconds(usage.ru_utime) + seconds(usage.ru_stime);
-  return metric;
+  return count(seconds(usage.ru_utime) + seconds(usage.ru_stime));
+}
+
+// What --data-memory does.
+void add_data_memory(const ScratchMemory& data, const PageKeeper& keeper, std::vector<MetricFamily>& families) {
+  constexpr double kBlock = 512;  // bytes; of ru_inblock
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  families.push_back(
+      gauges("intervale_data_memory_limit_bytes", "Resident memory of data sets that --data-memory allows.", {value(double(data.budget()))}));
+  families.push_back(gauges("intervale_data_resident_bytes", "Resident memory of data sets.", {value(double(keeper.resident()))}));
+  families.push_back(gauges("intervale_data_scratch_bytes", "Data sets in the scratch file.", {value(double(data.array_bytes()))}));
+  families.push_back({"intervale_data_evicted_bytes_total",
+                      "Pages of data sets that were taken out of memory.",
+                      MetricType::Counter,
+                      {count(double(keeper.taken_out()))}});
+  families.push_back({"intervale_page_faults_total",
+                      "Page faults of the process: major ones waited for a disk, minor ones did not.",
+                      MetricType::Counter,
+                      {count(double(usage.ru_majflt), {{"kind", "major"}}), count(double(usage.ru_minflt), {{"kind", "minor"}})}});
+  families.push_back({"intervale_disk_read_bytes_total",
+                      "Bytes that the process had read from disks, page faults included.",
+                      MetricType::Counter,
+                      {count(kBlock * double(usage.ru_inblock))}});
 }
 
 }  // namespace
@@ -111,6 +141,8 @@ std::string Metrics::text(const Gauges& now) const {
   families.push_back(gauges("intervale_lost_updates", "Updates that damaged files have lost, of the data sets served: see --tolerate-damage.",
                             {value(double(lost))}));
   families.push_back(gauges("intervale_dataset_memory_bytes", "Memory of a data set.", std::move(memory)));
+  if (const ScratchMemory* const data = now.memory.data_memory(); data != nullptr && data->keeper() != nullptr)
+    add_data_memory(*data, *data->keeper(), families);
   if (now.certificate_expires) {
     const std::chrono::duration<double> time = now.certificate_expires->time_since_epoch();
     families.push_back(

@@ -14,6 +14,8 @@
 
 namespace intervale {
 
+class ScratchMemory;
+
 // PEM files.
 struct TlsFiles {
   std::filesystem::path certificate, key;  // the certificate with its chain, and its private key
@@ -34,6 +36,7 @@ struct ServeOptions {
   std::optional<std::size_t> max_connections_per_address;  // at least 1; further ones are closed at once
   std::optional<std::size_t> max_sessions;                 // further ones are answered 503
   std::optional<std::uint64_t> max_memory;                 // bytes that Memory counts; no new sessions above: 503
+  ScratchMemory* data_memory = nullptr;                    // installed, where data sets lie; it must outlive the server
   std::size_t max_queued_bytes = 512 << 20;                // unsent bytes of all sessions, see WriteBudget
   double messages_per_second = 2000;                       // of each session; further ones are delayed
   double views_per_second = 200;                           // views among those messages: the same

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/parallel/all_cores.h"
+#include "server/scratch/scratch_memory.h"
 
 namespace intervale {
 namespace {
@@ -268,8 +269,11 @@ void RangeCache::serve(Queue& queue, const std::stop_token& stop) {
     }
     request->is_busy_ = true;
     lock.unlock();
-    if (!volume) finder.emplace(*(volume = request->volume_), parallel);
-    work_for(std::move(request), *finder);
+    {
+      const ScratchMemory::Scope scope(memory_.data_memory());  // measuring takes as much as the samples
+      if (!volume) finder.emplace(*(volume = request->volume_), parallel);
+      work_for(std::move(request), *finder);
+    }
     lock.lock();
   }
 }

@@ -71,6 +71,7 @@ Result<bool> RemoteDataSets::read(DataSet& set, const RemoteLimits& given, const
     auto volume = decode_volume((*contents)->bytes, set.url.name, parallel, left, tolerates_damage_ ? &faults : nullptr);
     if (!volume) return fail(set.url.shown + ": " + volume.error().message);
     if (auto fits = protocol::check_sendable(volume->description()); !fits) return fail(set.url.shown + ": " + fits.error().message);
+    complete_in_data_memory(*volume, memory_, parallel);
     // It includes a hash of the contents.
     if (set.volume && set.volume->description() == volume->description()) return false;
     if (faults.any()) spdlog::warn("{}: {}; {} of {} updates are not served", set.url.shown, to_text(faults), faults.lost_updates, volume->size());

@@ -15,8 +15,8 @@ namespace intervale {
 // A new empty folder, removed with all it holds at the end of the test.
 class TempDir {
  public:
-  TempDir() {
-    std::string name = (std::filesystem::temp_directory_path() / "intervale-test-XXXXXX").string();
+  explicit TempDir(const std::filesystem::path& in = std::filesystem::temp_directory_path()) {
+    std::string name = (in / "intervale-test-XXXXXX").string();
     if (!::mkdtemp(name.data())) throw std::runtime_error("cannot make a folder like " + name);
     path_ = std::filesystem::canonical(name);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/selection/stream_plan.h"
+#include "server/scratch/scratch_memory.h"
 #include "tests/support/interval_volumes.h"
 
 namespace intervale {
@@ -41,6 +42,20 @@ TEST(Memory, WithoutALimitIsNeverFull) {
   const Memory::Share much(memory, Holder::datasets, std::uint64_t(1) << 50);
   EXPECT_FALSE(memory.is_full());
   EXPECT_EQ(memory.room(), ~std::uint64_t(0));
+}
+
+// What of data sets lies in a file is no matter for a limit of memory.
+TEST(Memory, CountsOfDataMemoryNoMoreThanItsBudget) {
+  constexpr std::uint64_t kData = 10'000'000;
+  const auto data = ScratchMemory::open_for_data_sets("/var/tmp", kData);
+  ASSERT_TRUE(data) << data.error().message;
+  Memory memory(kData + 100, data->get());
+  const Memory::Share much(memory, Holder::datasets, std::uint64_t(1) << 50);
+  EXPECT_EQ(memory.bytes(Holder::datasets), kData);
+  EXPECT_EQ(memory.room(), ~std::uint64_t(0));
+  EXPECT_FALSE(memory.is_full());
+  const Memory::Share more(memory, Holder::sessions, 101);
+  EXPECT_TRUE(memory.is_full());
 }
 
 TEST(Memory, IsCountedByManyThreads) {

@@ -6,9 +6,12 @@
 #include <algorithm>
 #include <string>
 
+#include "server/scratch/scratch_memory.h"
+
 namespace intervale {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using namespace std::chrono_literals;
@@ -38,6 +41,23 @@ TEST(Metrics, ReportWhatWasCounted) {
   EXPECT_THAT(text, Not(HasSubstr("intervale_resident_memory_bytes 0\n")));
   EXPECT_THAT(text, HasSubstr("intervale_uncounted_memory_bytes "));
   EXPECT_THAT(text, HasSubstr("# TYPE intervale_cpu_seconds_total counter\nintervale_cpu_seconds_total "));
+}
+
+TEST(Metrics, TellOfDataMemoryOnlyWhereThereIsSome) {
+  Memory plain;
+  EXPECT_THAT(Metrics().text({.catalogue = {}, .memory = plain}), AllOf(Not(HasSubstr("intervale_data_")), Not(HasSubstr("page_faults"))));
+  const auto data = ScratchMemory::open_for_data_sets("/var/tmp", 10'000'000);
+  ASSERT_TRUE(data) << data.error().message;
+  void* const array = (*data)->allocate(1 << 20);
+  Memory memory({}, data->get());
+  const std::string text = Metrics().text({.catalogue = {}, .memory = memory});
+  for (const char* line :
+       {"intervale_data_memory_limit_bytes 10000000", "intervale_data_scratch_bytes 1048576", "# TYPE intervale_data_resident_bytes gauge",
+        "intervale_data_evicted_bytes_total 0", "# TYPE intervale_page_faults_total counter", "# TYPE intervale_disk_read_bytes_total counter"}) {
+    EXPECT_THAT(text, HasSubstr(std::string(line) + "\n"));
+  }
+  for (const char* kind : {"major", "minor"}) EXPECT_THAT(text, HasSubstr(std::string("intervale_page_faults_total{kind=\"") + kind + "\"} "));
+  (*data)->free(array);
 }
 
 // A client chooses the code it closes with, and may not make the list of series grow.

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include "tests/support/temp_dir.h"
@@ -94,6 +96,92 @@ TEST(ScratchMemory, TellsWhyItCannotBe) {
   const auto nowhere = ScratchMemory::open(folder / "none", kBudget, 1);
   ASSERT_FALSE(nowhere);
   EXPECT_THAT(nowhere.error().message, ::testing::HasSubstr("No such file or directory"));
+}
+
+// On a disk, wherever temporary files are.
+std::unique_ptr<ScratchMemory> open_for_data(std::uint64_t budget) {
+  auto memory = ScratchMemory::open_for_data_sets("/var/tmp", budget);
+  EXPECT_TRUE(memory) << memory.error().message;
+  return std::move(*memory);
+}
+
+TEST(ScratchMemory, OfDataSetsTellsWhyItCannotBe) {
+  const auto small = ScratchMemory::open_for_data_sets("/var/tmp", 1 << 20);
+  ASSERT_FALSE(small);
+  EXPECT_EQ(small.error().message, "a budget of 2 MB is too small: at least 4 MB");
+  const auto in_memory = ScratchMemory::open_for_data_sets("/dev/shm", kBudget);
+  ASSERT_FALSE(in_memory);
+  EXPECT_EQ(in_memory.error().message, "the scratch folder '/dev/shm' lies in memory (tmpfs): name one on a disk");
+}
+
+// Two threads write all of what is eight times the budget, as one that loads does, and then read here and there; another
+// looks how much of it is resident.
+TEST(ScratchMemory, OfDataSetsKeepsItsBudgetWhileThreadsWriteAndRead) {
+  constexpr std::uint64_t kData = 16 << 20, kMargin = 64 << 20;
+  constexpr std::size_t kNumbers = (64 << 20) / sizeof(std::uint32_t);
+  const auto memory = open_for_data(kData);
+  ScratchMemory::install(*memory);
+  std::atomic<int> wrong{0}, working{2};
+  const auto work = [&](std::uint32_t salt) {
+    auto* const numbers = static_cast<std::uint32_t*>(memory->allocate(kNumbers * sizeof(std::uint32_t)));
+    {
+      const ScratchMemory::Scope scope(memory.get());
+      for (std::size_t i = 0; i < kNumbers; ++i) numbers[i] = std::uint32_t(i) * salt;
+    }
+    std::mt19937 random(salt);
+    for (int i = 0; i < 20'000; ++i) {
+      const std::size_t at = random() % kNumbers;
+      wrong += numbers[at] != std::uint32_t(at) * salt;
+    }
+    for (std::size_t i = 0; i < kNumbers; ++i) wrong += numbers[i] != std::uint32_t(i) * salt;
+    memory->free(numbers);
+    --working;
+  };
+  std::thread one(work, 7), two(work, 9);
+  std::uint64_t most = 0;
+  while (working != 0) {
+    most = std::max(most, memory->keeper()->resident());
+    std::this_thread::yield();
+  }
+  one.join();
+  two.join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_LE(most, kData + kMargin);
+  EXPECT_GE(memory->keeper()->taken_out(), 2 * kNumbers * sizeof(std::uint32_t) - most);
+  EXPECT_EQ(memory->array_bytes(), 0u);
+}
+
+TEST(ScratchMemory, AScopeIsOfItsThread) {
+  const auto memory = open_for_data(kBudget);
+  ScratchMemory::install(*memory);
+  EXPECT_EQ(ScratchMemory::of_this_thread(), nullptr);
+  {
+    const ScratchMemory::Scope scope(memory.get());
+    EXPECT_EQ(ScratchMemory::of_this_thread(), memory.get());
+    std::thread([] { EXPECT_EQ(ScratchMemory::of_this_thread(), nullptr); }).join();
+    {
+      const ScratchMemory::Scope nothing(nullptr);
+      EXPECT_EQ(ScratchMemory::of_this_thread(), memory.get());
+    }
+    // Freed by its address, on any thread.
+    void* const array = memory->allocate(1 << 20);
+    EXPECT_EQ(memory->array_bytes(), 1u << 20);
+    std::thread([array] { EXPECT_TRUE(ScratchMemory::free_installed(array)); }).join();
+    EXPECT_EQ(memory->array_bytes(), 0u);
+  }
+  EXPECT_EQ(ScratchMemory::of_this_thread(), nullptr);
+  const ScratchMemory::Scope none(nullptr);
+  EXPECT_EQ(ScratchMemory::of_this_thread(), nullptr);
+}
+
+// What a build has is of all threads.
+TEST(ScratchMemory, OfABuildIsOfAllThreads) {
+  const TempDir folder;
+  const auto memory = open_scratch(folder);
+  EXPECT_EQ(memory->keeper(), nullptr);
+  ScratchMemory::install(*memory);
+  EXPECT_EQ(ScratchMemory::of_this_thread(), memory.get());
+  std::thread([&memory] { EXPECT_EQ(ScratchMemory::of_this_thread(), memory.get()); }).join();
 }
 
 TEST(ScratchMemory, FreesOnlyWhatItOwns) {
