@@ -1,4 +1,4 @@
-// The program's `operator new`: large arrays lie in a scratch file while one is installed: those of a build
+// The program's `operator new`: arrays lie in a scratch file while one is installed: large ones of a build
 // (build --memory), and those of data sets that are served (serve --data-memory).
 //
 // Whoever allocates them: so no array, of today or of later, exceeds the budget by being forgotten. [new.delete]
@@ -11,8 +11,8 @@
 
 void* operator new(std::size_t bytes) {
   using intervale::ScratchMemory;
-  if (bytes >= ScratchMemory::kLeastBytes) {
-    if (ScratchMemory* const scratch = ScratchMemory::of_this_thread()) return scratch->allocate(bytes);
+  if (bytes >= intervale::SmallArrays::kLeastBytes) {
+    if (ScratchMemory* const scratch = ScratchMemory::place_of(bytes)) return scratch->allocate(bytes);
   }
   if (bytes == 0) bytes = 1;
   for (;;) {

@@ -97,9 +97,10 @@ class ScratchMemory::Timers : public tbb::task_scheduler_observer {
 
 ScratchMemory* ScratchMemory::installed() { return installed_memory.load(std::memory_order_acquire); }
 
-ScratchMemory* ScratchMemory::of_this_thread() {
+ScratchMemory* ScratchMemory::place_of(std::size_t bytes) {
   if (is_own) return nullptr;
-  return of_scope != nullptr ? of_scope : of_all_threads.load(std::memory_order_acquire);
+  if (of_scope != nullptr) return bytes >= SmallArrays::kLeastBytes ? of_scope : nullptr;
+  return bytes >= kLeastBytes ? of_all_threads.load(std::memory_order_acquire) : nullptr;
 }
 
 ScratchMemory::Scope::Scope(ScratchMemory* memory) : before_(of_scope) {
@@ -166,7 +167,7 @@ ScratchMemory::~ScratchMemory() {
   installed_memory.compare_exchange_strong(same, nullptr);
   while (looking.load() != 0) ::sched_yield();
   const std::lock_guard lock(mutex_);
-  if (used_.empty()) {
+  if (arrays_ == 0) {
     ::munmap(base_, kRegionBytes);
     const std::byte* base = base_;
     last_base.compare_exchange_strong(base, nullptr);
@@ -220,8 +221,27 @@ void ScratchMemory::give_back(std::size_t offset, std::size_t bytes) noexcept {
 
 void* ScratchMemory::allocate(std::size_t bytes) {
   const Own lists;
-  bytes = (bytes + kGranule - 1) / kGranule * kGranule;
   const std::lock_guard lock(mutex_);
+  std::byte* array = bytes <= SmallArrays::kMostBytes ? small_.take(bytes) : allocate_large(bytes);
+  if (array == nullptr) {
+    small_.add(bytes, allocate_large(SmallArrays::kChunkBytes));
+    array = small_.take(bytes);
+  }
+  ++arrays_;
+  return array;
+}
+
+void ScratchMemory::free(void* array) noexcept {
+  const Own lists;
+  const std::lock_guard lock(mutex_);
+  const auto [is_small, unused_chunk] = small_.free(static_cast<std::byte*>(array));
+  if (is_small || free_large(static_cast<std::byte*>(array))) --arrays_;
+  if (unused_chunk != nullptr) free_large(unused_chunk);
+}
+
+// With the lock held.
+std::byte* ScratchMemory::allocate_large(std::size_t bytes) {
+  bytes = (bytes + kGranule - 1) / kGranule * kGranule;
   const std::size_t offset = take(bytes);
   used_.emplace(offset, bytes);
   const SignalBlock whole(SIGPROF);  // which would make some file systems give up
@@ -236,17 +256,17 @@ void* ScratchMemory::allocate(std::size_t bytes) {
   return base_ + offset;
 }
 
-void ScratchMemory::free(void* array) noexcept {
-  const Own lists;
-  const auto offset = std::size_t(static_cast<std::byte*>(array) - base_);
-  const std::lock_guard lock(mutex_);
+// With the lock held.
+bool ScratchMemory::free_large(std::byte* array) noexcept {
+  const auto offset = std::size_t(array - base_);
   const auto found = used_.find(offset);
-  if (found == used_.end()) return;
+  if (found == used_.end()) return false;
   const std::size_t bytes = found->second;
   used_.erase(found);
   array_bytes_.fetch_sub(bytes, std::memory_order_relaxed);
   if (bytes >= kReleased) (void)::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, off_t(offset), off_t(bytes));
   give_back(offset, bytes);
+  return true;
 }
 
 void ScratchMemory::on_tick(int /*signal*/) noexcept {

@@ -7,8 +7,9 @@
 //
 // For a build, the budget is of the whole process, and all threads that compute have their large arrays in the file. Every
 // millisecond a timer interrupts each of them to look. So the threads that fill memory empty it, however busy the machine
-// is. For a server, the budget is of the arrays: those of data sets, and what measuring a range takes. A thread that makes
-// them says so by a Scope, and is interrupted likewise; while sessions read, a thread of its own looks every millisecond.
+// is. For a server, the budget is of the arrays: those of data sets, small ones too, and what measuring a range takes. A
+// thread that makes them says so by a Scope, and is interrupted likewise; while sessions read, a thread of its own looks
+// every millisecond.
 #pragma once
 
 #include <atomic>
@@ -26,6 +27,7 @@
 
 #include "common/util/result.h"
 #include "server/scratch/page_keeper.h"
+#include "server/scratch/small_arrays.h"
 #include "server/scratch/thread_timer.h"
 
 namespace intervale {
@@ -57,7 +59,7 @@ class ScratchMemory {
   // Unmaps the file, unless arrays are left in it.
   ~ScratchMemory();
 
-  // bytes > 0. Its contents are undefined. Throws ScratchFull.
+  // bytes > 0; many small arrays lie side by side. Its contents are undefined. Throws ScratchFull.
   [[nodiscard]] void* allocate(std::size_t bytes);
   void free(void* array) noexcept;
   [[nodiscard]] bool owns(const void* address) const { return address >= base_ && address < base_ + kRegionBytes; }
@@ -72,12 +74,13 @@ class ScratchMemory {
   // those of threads with a Scope; else those of all threads, and the budget is kept, by SIGPROF to the calling thread and
   // to those of oneTBB that work for it. Its destructor ends both. One in a process.
   static void install(ScratchMemory& memory);
-  // Where the calling thread's large arrays belong; nullptr: in the process' own memory.
-  [[nodiscard]] static ScratchMemory* of_this_thread();
+  // Where an array of so many bytes of the calling thread belongs; nullptr: in the process' own memory. With a Scope,
+  // from SmallArrays::kLeastBytes on: much of a data set is in small arrays, some for each of its bricks.
+  [[nodiscard]] static ScratchMemory* place_of(std::size_t bytes);
   // False if the address is in no scratch file. One that is left over from a file that is no longer installed is ignored.
   static bool free_installed(void* array) noexcept;
 
-  // While it exists, the calling thread's large arrays lie in `memory`, and SIGPROF comes to the thread, to keep the budget
+  // While it exists, the calling thread's arrays lie in `memory`, and SIGPROF comes to the thread, to keep the budget
   // while it fills them. They may be freed by any thread, later. nullptr: nothing happens.
   class Scope {
    public:
@@ -97,6 +100,8 @@ class ScratchMemory {
   static Result<std::unique_ptr<ScratchMemory>> map_file(const std::filesystem::path& folder, std::uint64_t budget, Use use);
   ScratchMemory(std::filesystem::path folder, int file, int statm, std::byte* base, std::uint64_t budget, Use use);
   std::size_t take(std::size_t bytes);
+  std::byte* allocate_large(std::size_t bytes);
+  bool free_large(std::byte* array) noexcept;
   void give_back(std::size_t offset, std::size_t bytes) noexcept;
   class Timers;
   static ScratchMemory* installed();
@@ -111,6 +116,8 @@ class ScratchMemory {
   std::mutex mutex_;                                   // of what follows
   std::map<std::size_t, std::size_t> unused_;          // offsets and bytes, no two of which touch
   std::unordered_map<std::size_t, std::size_t> used_;  // the same, of arrays
+  std::size_t arrays_ = 0;                             // that are in use, small ones too
+  SmallArrays small_;                                  // in arrays
   std::atomic<std::size_t> end_{0};                    // of all that was ever used
   std::unique_ptr<Timers> timers_;                     // once it is installed
   std::atomic<bool> is_sweeping_{false};
