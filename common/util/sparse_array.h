@@ -14,8 +14,8 @@
 
 namespace intervale {
 
-// Elements are used or not; an unused one reads as 0. Memory: eight bytes for each page of 256 elements; for each page
-// with a used one some 60 bytes besides, and its used elements. Use of another element moves up to a page.
+// Elements are used or not; an unused one reads as 0. Memory: eight bytes for each page of 1024 elements; for each page
+// with a used one some 190 bytes besides, and its used elements. Use of another element moves up to a page.
 template <std::unsigned_integral T>
 class SparseArray {
  public:
@@ -47,7 +47,7 @@ class SparseArray {
     const std::uint64_t used = all >> (i % 64);
     if ((used & 7) == 0) return 0;
     // Without a branch on which are used: that is hard to foresee.
-    const std::size_t before = std::size_t(block[kWords * 8 + word]) + std::size_t(std::popcount(all & ((std::uint64_t(1) << (i % 64)) - 1)));
+    const std::size_t before = used_before(block, word) + std::size_t(std::popcount(all & ((std::uint64_t(1) << (i % 64)) - 1)));
     const std::byte* at = block + kHead + before * sizeof(T);
     const std::uint64_t first = load<T>(at) & (0 - (used & 1));
     at += (used & 1) * sizeof(T);
@@ -86,10 +86,10 @@ class SparseArray {
   [[nodiscard]] std::size_t memory_bytes() const { return pages_.capacity() * sizeof pages_[0] + block_bytes_; }  // with the allocator's
 
  private:
-  // Of a page with used elements: a bit for each of 256 elements, whether it is used; for each of these four words, how
-  // many elements are used before; the used elements. nullptr: there are none.
+  // Of a page with used elements: a bit for each of 1024 elements, whether it is used; for each of these sixteen words, how
+  // many elements are used before, in two bytes; the used elements. nullptr: there are none.
   using Block = std::unique_ptr<std::byte[]>;
-  static constexpr std::size_t kPage = 256, kWords = kPage / 64, kHead = kWords * 9;
+  static constexpr std::size_t kPage = 1024, kWords = kPage / 64, kHead = kWords * 10;
   static constexpr std::size_t kPast = 12;      // bytes that bits() may read past the elements
   static constexpr std::size_t kAllocator = 8;  // what an allocator takes for a block; their sum is a multiple of 16
   template <class U>
@@ -102,6 +102,10 @@ class SparseArray {
   static void store(std::byte* to, U value) {
     std::memcpy(to, &value, sizeof value);
   }
+  // Used elements before a word's.
+  [[nodiscard]] static std::size_t used_before(const std::byte* block, std::size_t word) {
+    return load<std::uint16_t>(block + kWords * 8 + word * 2);
+  }
   [[nodiscard]] static bool is_used(const Block& block, std::size_t i) {
     return (load<std::uint64_t>(block.get() + i % kPage / 64 * 8) >> (i % 64) & 1) != 0;
   }
@@ -109,10 +113,10 @@ class SparseArray {
   [[nodiscard]] static std::size_t offset(const Block& block, std::size_t i) {
     const std::size_t word = i % kPage / 64;
     const auto used = load<std::uint64_t>(block.get() + word * 8) & ((std::uint64_t(1) << (i % 64)) - 1);
-    return kHead + (std::size_t(block[kWords * 8 + word]) + std::size_t(std::popcount(used))) * sizeof(T);
+    return kHead + (used_before(block.get(), word) + std::size_t(std::popcount(used))) * sizeof(T);
   }
   [[nodiscard]] static std::size_t count(const Block& block) {
-    return std::size_t(block[kWords * 9 - 1]) + std::size_t(std::popcount(load<std::uint64_t>(block.get() + (kWords - 1) * 8)));
+    return used_before(block.get(), kWords - 1) + std::size_t(std::popcount(load<std::uint64_t>(block.get() + (kWords - 1) * 8)));
   }
   // Of a block with so many elements.
   [[nodiscard]] static std::size_t capacity(std::size_t elements) {
@@ -139,7 +143,7 @@ class SparseArray {
     std::memmove(block.get() + at + sizeof(T), block.get() + at, end - at);
     store(block.get() + at, T(0));
     store(block.get() + word * 8, load<std::uint64_t>(block.get() + word * 8) | std::uint64_t(1) << (i % 64));
-    for (std::size_t w = word + 1; w < kWords; ++w) block[kWords * 8 + w] = std::byte(std::size_t(block[kWords * 8 + w]) + 1);
+    for (std::size_t w = word + 1; w < kWords; ++w) store(block.get() + kWords * 8 + w * 2, std::uint16_t(used_before(block.get(), w) + 1));
     return block.get();
   }
 

@@ -49,6 +49,8 @@ NOT_RUN = {
     "docker build -f deploy/Dockerfile -t intervale .": NEEDS_DOCKER,
     'docker run -d --read-only --cap-drop ALL --security-opt no-new-privileges -p 8080:8080 -v "$PWD/data:/data:ro" '
     "intervale": NEEDS_DOCKER,
+    'docker run -d --read-only --cap-drop ALL --security-opt no-new-privileges -p 8080:8080 -v "$PWD/data:/data:ro" \\\n'
+    "    -v scratch:/var/tmp -e INTERVALE_DATA_MEMORY=2GiB intervale": NEEDS_DOCKER,
     "INTERVALE_DATA=$PWD/data docker compose -f deploy/compose.yaml up -d --build": NEEDS_DOCKER,
     "INTERVALE_DATA=$PWD/data docker compose -f deploy/compose.yaml --profile observe up -d": NEEDS_DOCKER,
     "docker compose -f deploy/compose.yaml build": NEEDS_DOCKER,
