@@ -70,7 +70,8 @@ RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volu
     promise.set_value(relevant);
     lock.lock();
     entry->bytes = relevant->memory_bytes();
-    drop_old(volume, part);
+    const std::list<Entry> dropped = take_old(volume, part);
+    lock.unlock();  // what is dropped may have thousands of arrays: nobody waits until they are freed
     return relevant;
   } catch (...) {  // out of memory, or stopped: whoever asks next tries again
     promise.set_exception(std::current_exception());
@@ -80,9 +81,10 @@ RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volu
   }
 }
 
-// Drops what is better known by now, what was used least recently, and what belongs to data sets that are served no
-// more.
-void RangeCache::drop_old(const Volume& volume, const RangePart& found) {
+// What is better known by now, what was used least recently, and what belongs to data sets that are served no more: taken
+// out of the list. With the lock held.
+std::list<RangeCache::Entry> RangeCache::take_old(const Volume& volume, const RangePart& found) {
+  std::list<Entry> old;
   std::size_t bytes = 0;
   for (auto entry = entries_.begin(); entry != entries_.end();) {
     const bool is_computed = entry->bytes != 0, is_first = entry == entries_.begin();
@@ -90,8 +92,11 @@ void RangeCache::drop_old(const Volume& volume, const RangePart& found) {
     if (is_computed) entry->bytes = entry->relevant.get()->memory_bytes();
     bytes += is_worse ? 0 : entry->bytes;
     const bool is_old = is_worse || entry->volume.expired() || (bytes > most_bytes_ && !is_first);
-    entry = is_computed && is_old ? entries_.erase(entry) : std::next(entry);
+    const auto next = std::next(entry);
+    if (is_computed && is_old) old.splice(old.end(), entries_, entry);
+    entry = next;
   }
+  return old;
 }
 
 // A range of several parts that a session has. nullptr: there is none. With the lock held.

@@ -96,7 +96,7 @@ class RangeCache {
   [[nodiscard]] Relevant find_whole(const Volume& volume, const ShownRanges& shown, Distances distances) const;
   [[nodiscard]] Relevant counted(Relevant relevant) const;
   [[nodiscard]] Relevant get_part(PartFinder& finder, const Volume& volume, const RangePart& part);
-  void drop_old(const Volume& volume, const RangePart& found);
+  [[nodiscard]] std::list<Entry> take_old(const Volume& volume, const RangePart& found);
   void serve(Queue& queue, const std::stop_token& stop);
   [[nodiscard]] Request next_request(Queue& queue) const;
   [[nodiscard]] std::vector<Request> take_complete(const Volume& volume, const RangePart& part, const Relevant& relevant);
