@@ -13,8 +13,9 @@ double milliseconds(LoadClock::duration time) { return std::chrono::duration<dou
 
 }  // namespace
 
-void LoadViews::begin(Time now) {
+void LoadViews::begin(Time now, Time end) {
   first_ = now;
+  end_ = end;
   ++stats_.views;
   if (is_only_one()) open_.push_back({now});
 }
@@ -23,7 +24,8 @@ LoadViews::Time LoadViews::next_due() const {
   if (is_only_one() || over_) return Time::max();
   const double rests = path_.scenario == Scenario::range ? rests_before(view_ + 1) : 0;
   const std::chrono::duration<double> after(double(view_ + 1) / path_.views_per_second + rests);
-  return first_ + std::chrono::duration_cast<LoadClock::duration>(after);
+  const Time due = first_ + std::chrono::duration_cast<LoadClock::duration>(after);
+  return due < end_ ? due : Time::max();
 }
 
 bool LoadViews::advance(Time now) {

@@ -27,7 +27,8 @@ class LoadViews {
   // path: with the seed of the client. start: when it was to connect. stats: added to; they outlive this.
   LoadViews(const CameraPath& path, Time start, LoadStats& stats) : path_(path), start_(start), stats_(stats) {}
 
-  void begin(Time now);         // the first WebSocket is open: the first view is due
+  // The first WebSocket is open: the first view is due. end: none is due from then on, even if nobody looks before.
+  void begin(Time now, Time end = Time::max());
   void end() { over_ = true; }  // no view is due from now on
 
   [[nodiscard]] Time next_due() const;  // Time::max(): no view will be
@@ -74,7 +75,8 @@ class LoadViews {
   CameraPath path_;
   Time start_;
   LoadStats& stats_;
-  Time first_;              // when the first one was due
+  Time first_;  // when the first one was due
+  Time end_ = Time::max();
   std::uint64_t view_ = 0;  // number of the last one
   // Of the last one answered, and of those asked for after it; ascending.
   std::deque<std::uint64_t> asked_;

@@ -66,7 +66,7 @@ class LoadClient {
     bool is_open = co_await connection_.open();
     if (is_open) {
       ++stats_.connected;
-      views_.begin(LoadClock::now());
+      views_.begin(LoadClock::now(), plan_.end());
     }
     while (is_open && (state_ == State::connecting || state_ == State::lost)) {
       co_await converse();

@@ -56,6 +56,15 @@ TEST(LoadViews, AreOverOnceAllAreDoneAndThereIsAMesh) {
   EXPECT_EQ(c.stats.first_mesh_ms, (std::vector<double>{1010}));
 }
 
+TEST(LoadViews, AreNotDueAfterTheEndHoweverLateSomebodyLooks) {
+  Client c;
+  c.views.begin(at(0), at(600));
+  EXPECT_TRUE(c.views.advance(at(5000)));  // those of 200 and 400
+  EXPECT_EQ(c.views.next_due(), LoadViews::Time::max());
+  EXPECT_FALSE(c.views.advance(at(9000)));
+  EXPECT_EQ(c.stats.views, 3u);
+}
+
 TEST(LoadViews, AreDoneWithTheDoneForThemOrForANewerOne) {
   Client c;
   c.views.begin(at(0));
