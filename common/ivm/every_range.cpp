@@ -90,6 +90,7 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   parts.set = std::move(values.set);
   parts.keys = std::move(values.keys);
   parts.left = std::move(values.left);
+  parts.finer = values.finer;
   auto made = IntervalVolume::assemble(std::move(parts));
   if (!made) return made;
   (void)made->bounds(parallel);  // whoever asks for a range first would wait for them

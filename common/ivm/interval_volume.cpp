@@ -66,7 +66,7 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   for (std::size_t i = 0; i < parts.keys.size(); ++i) {
     if (parts.keys[i] > d.format.last) return fail("an update's value is out of range");
   }
-  parts.description.updates = parts.set.size();
+  parts.description.updates = std::uint64_t(parts.set.size()) + parts.finer;
   return IntervalVolume(std::move(parts));
 }
 

@@ -205,26 +205,47 @@ void Container::claim(std::uint64_t bytes) const {
   if (room_ != kAnyRoom) room_ -= bytes;
 }
 
-Result<Container> Container::open(std::span<const std::byte> file, FileScope scope, std::uint64_t room, bool tolerates_damage) {
-  const auto head = read_head(file, file.size(), scope);
+// bytes_of: a stream's bytes, by its place and type; all of the pages' bytes that are there.
+template <class BytesOf>
+Result<Container> Container::open_streams(std::span<const std::byte> start, std::uint64_t file_bytes, FileScope scope, bool tolerates_damage,
+                                          const BytesOf& bytes_of) {
+  const auto head = read_head(start, file_bytes, scope);
   if (!head) return tl::unexpected(head.error());
   if (head->header.content_hash != hash_of_contents(head->entries)) return fail("the header is damaged (content hash)");
   Container container;
   container.content_hash_ = head->header.content_hash;
-  container.file_bytes_ = file.size();
-  container.room_ = room;
+  container.file_bytes_ = std::size_t(file_bytes);
   for (const Entry& e : head->entries) {
-    const auto bytes = file.subspan(e.offset, e.bytes);
+    const Result<std::span<const std::byte>> bytes = bytes_of(e);
+    if (!bytes) return tl::unexpected(bytes.error());
     const bool is_pages = StreamType(e.type) == StreamType::pages;
     const bool is_left = tolerates_damage && StreamType(e.type) == StreamType::channel_pages;
-    if (!is_left && e.checksum != (is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size()))) return fail(name_of(e.type) + " is damaged (checksum)");
-    if (e.type < kStreamTypes) container.streams_[e.type] = bytes;
+    if (!is_left && e.checksum != (is_pages ? 0 : XXH3_64bits(bytes->data(), bytes->size()))) return fail(name_of(e.type) + " is damaged (checksum)");
+    if (e.type < kStreamTypes) container.streams_[e.type] = *bytes;
     if (StreamType(e.type) == StreamType::channels) {
       const std::array<std::uint64_t, 2> both{container.content_hash_, e.checksum};
       container.content_hash_ = XXH3_64bits(both.data(), sizeof both);
     }
   }
   return container;
+}
+
+Result<Container> Container::open(std::span<const std::byte> file, FileScope scope, std::uint64_t room, bool tolerates_damage) {
+  auto container = open_streams(file, file.size(), scope, tolerates_damage,
+                                [file](const Entry& e) -> Result<std::span<const std::byte>> { return file.subspan(e.offset, e.bytes); });
+  if (container) container->room_ = room;
+  return container;
+}
+
+Result<Container> Container::open_ends(const FileEnds& file, FileScope scope) {
+  if (file.first.size() > file.file_bytes || file.last.size() > file.file_bytes - file.first.size()) return fail("more bytes than the file has");
+  const std::uint64_t last_from = file.file_bytes - file.last.size();
+  return open_streams(file.first, file.file_bytes, scope, false, [&](const Entry& e) -> Result<std::span<const std::byte>> {
+    if (e.offset >= last_from) return file.last.subspan(std::size_t(e.offset - last_from), e.bytes);
+    if (e.offset + e.bytes <= file.first.size()) return file.first.subspan(e.offset, e.bytes);
+    if (StreamType(e.type) != StreamType::pages) return fail(name_of(e.type) + " is not there yet");
+    return file.first.subspan(std::min<std::size_t>(e.offset, file.first.size()));
+  });
 }
 
 Result<std::span<const std::byte>> Container::stream(StreamType type, std::size_t bytes) const {
@@ -245,10 +266,23 @@ Result<std::uint64_t> check_container_start(std::span<const std::byte> start, st
   return bytes;
 }
 
+Result<StreamPlace> place_of(StreamType type, std::span<const std::byte> start, std::uint64_t file_bytes, FileScope scope) {
+  const auto head = read_head(start, file_bytes, scope);
+  if (!head) return tl::unexpected(head.error());
+  for (const Entry& e : head->entries) {
+    if (e.type == std::uint32_t(type)) return StreamPlace{e.offset, e.bytes};
+  }
+  return StreamPlace{};
+}
+
 bool begins_as_ivm(const std::filesystem::path& path) {
   char start[sizeof kMagic] = {};
   std::ifstream(path, std::ios::binary).read(start, sizeof start);
   return std::memcmp(start, kMagic, sizeof kMagic) == 0;
+}
+
+Result<FileScope> scope_of(std::span<const std::byte> start, std::uint64_t file_bytes) {
+  return read_head(start, file_bytes).map([](const Head& head) { return head.scope(); });
 }
 
 std::optional<FileScope> scope_of(std::span<const std::byte> file) {

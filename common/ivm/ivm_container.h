@@ -77,6 +77,12 @@ void append(std::vector<std::byte>& out, std::span<const T> values) {
 // The file's bytes.
 [[nodiscard]] std::vector<std::byte> make_container(FileScope scope, const Streams& streams);
 
+// What is there of a file: its first bytes and its last, in order; together no more than all of it.
+struct FileEnds {
+  std::span<const std::byte> first, last;
+  std::uint64_t file_bytes = 0;
+};
+
 // A file from outside: its header, table and checksums are in order, and it has the streams of its scope; optional ones
 // of an unknown type are skipped, once their checksums were checked. Pages have checksums of their own, which whoever
 // reads them must check. value_table, update_slopes and the streams of channels are empty if the file has none.
@@ -85,6 +91,10 @@ class Container {
   // The file must outlive the result. Fails, in one line, if it is not a file of this scope. room: of bytes, for claim().
   // tolerates_damage: the pages of channels are left to their own checksums, too.
   static Result<Container> open(std::span<const std::byte> file, FileScope scope, std::uint64_t room = kAnyRoom, bool tolerates_damage = false);
+
+  // The same, of a file of which only the ends are there: of the pages, as many bytes as the first end has. Fails if another
+  // stream is not there whole. The ends must outlive the result.
+  static Result<Container> open_ends(const FileEnds& file, FileScope scope);
 
   // What will be allocated for its contents, at most: throws NoRoom if all claims exceed the room. Called before anything
   // is allocated.
@@ -98,6 +108,9 @@ class Container {
   [[nodiscard]] Result<std::span<const std::byte>> stream(StreamType type, std::size_t bytes) const;
 
  private:
+  template <class BytesOf>
+  static Result<Container> open_streams(std::span<const std::byte> start, std::uint64_t file_bytes, FileScope scope, bool tolerates_damage,
+                                        const BytesOf& bytes_of);
   std::uint64_t content_hash_ = 0;
   std::size_t file_bytes_ = 0;
   mutable std::uint64_t room_ = kAnyRoom;  // that is left
@@ -112,12 +125,22 @@ inline constexpr std::size_t kMostHeadBytes = 2088;
 // as its header says. Returns that length. Fails, in one line, if this is not the beginning of an .ivm file of this version.
 [[nodiscard]] Result<std::uint64_t> check_container_start(std::span<const std::byte> start, std::optional<std::uint64_t> file_bytes);
 
+// Where a stream lies in a file.
+struct StreamPlace {
+  std::uint64_t offset = 0, bytes = 0;
+};
+// Of a scope's file that begins with `start`, as of check_container_start(); no bytes where it has no such stream.
+[[nodiscard]] Result<StreamPlace> place_of(StreamType type, std::span<const std::byte> start, std::uint64_t file_bytes, FileScope scope);
+
 // Whether a file begins as an .ivm file of any version, whole or not.
 [[nodiscard]] bool begins_as_ivm(const std::filesystem::path& path);
 
 // The scope of a file, from its beginning. Nothing if it cannot be read, or is not a whole file of this version: those
 // who open it say why.
 [[nodiscard]] std::optional<FileScope> scope_of(const std::filesystem::path& path);
+
+// The same, from the bytes that a file begins with, as of check_container_start().
+[[nodiscard]] Result<FileScope> scope_of(std::span<const std::byte> start, std::uint64_t file_bytes);
 
 // The same, from all of a file's bytes.
 [[nodiscard]] std::optional<FileScope> scope_of(std::span<const std::byte> file);

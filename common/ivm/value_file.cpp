@@ -102,6 +102,13 @@ std::uint64_t memory_to_decode(const FieldDescription& d) {
   return d.grid.sample_count() * (3 * ValueKeys(0, d.format.last).width() + 2) + supercubes * 72;
 }
 
+// No more than the diamonds of these scales: those at samples whose coordinates are multiples of 2^finest.
+std::uint64_t least_values(const Grid& grid, int finest) {
+  std::uint64_t values = 1;
+  for (const std::int32_t samples : grid.dims) values *= (std::uint64_t(samples - 1) >> finest) + 1;
+  return values;
+}
+
 }  // namespace
 
 bool is_value_file(const std::filesystem::path& path) { return scope_of(path) == FileScope::every_range; }
@@ -116,25 +123,52 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
   return make_container(FileScope::every_range, streams);
 }
 
+namespace {
+
+// All but what the pages hold. finest: the finest scale of those that are there.
+Result<ValueVolume::Parts> read_description(const Container& file, std::string name, int finest) {
+  ValueVolume::Parts parts;
+  FieldDescription& d = parts.description;
+  d.name = std::move(name);
+  d.content_hash = file.content_hash();
+  if (auto ok = read_field(file, d); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_labels(file, d.labels); !ok) return tl::unexpected(ok.error());
+  // Sizes before contents.
+  if (d.grid.sample_count() > kMostSamples) return fail("more samples than this program can read");
+  if (least_values(d.grid, finest) > most_coded_bits(file[StreamType::pages].size()) + kRootVertices)
+    return fail("the file claims more values than it can hold");
+  file.claim(memory_to_decode(d));
+  if (auto ok = read_weights(file, Domain(d.grid.dims).levels(), parts.weights); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_histogram(file[StreamType::histogram], d); !ok) return tl::unexpected(ok.error());
+  if (auto ok = read_volumes(file[StreamType::volumes], d); !ok) return tl::unexpected(ok.error());
+  return parts;
+}
+
+}  // namespace
+
+Result<ValueVolume> decode_coarse_values(const FileEnds& ends, std::string name, int finest, const ParallelFor& parallel) {
+  const auto file = Container::open_ends(ends, FileScope::every_range);
+  if (!file) return tl::unexpected(file.error());
+  auto parts = read_description(*file, std::move(name), finest);
+  if (!parts) return tl::unexpected(parts.error());
+  const Domain domain(parts->description.grid.dims);
+  parts->set = all_diamonds(domain, parallel, finest);
+  parts->finer = count_diamonds(domain) - parts->set.size();
+  parts->keys = ValueKeys(0, parts->description.format.last);
+  auto index = (*file)[StreamType::page_index], pages = (*file)[StreamType::pages];
+  if (auto ok = take_pages(index, pages, *parts, parallel, nullptr); !ok) return tl::unexpected(ok.error());
+  return ValueVolume(std::move(*parts));
+}
+
 Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel, std::uint64_t room,
                                   PageFaults* faults) {
   const auto file = Container::open(bytes, FileScope::every_range, room, faults != nullptr);
   if (!file) return tl::unexpected(file.error());
-  ValueVolume::Parts parts;
+  auto read = read_description(*file, std::move(name), 0);
+  if (!read) return tl::unexpected(read.error());
+  ValueVolume::Parts& parts = *read;
   FieldDescription& d = parts.description;
-  d.name = std::move(name);
-  d.content_hash = file->content_hash();
-  if (auto ok = read_field(*file, d); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_labels(*file, d.labels); !ok) return tl::unexpected(ok.error());
-  // Sizes before contents.
-  if (d.grid.sample_count() > kMostSamples) return fail("more samples than this program can read");
-  if (d.grid.sample_count() > most_coded_bits((*file)[StreamType::pages].size()) + kRootVertices)
-    return fail("the file claims more values than it can hold");
-  file->claim(memory_to_decode(d));
   const Domain domain(d.grid.dims);
-  if (auto ok = read_weights(*file, domain.levels(), parts.weights); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_histogram((*file)[StreamType::histogram], d); !ok) return tl::unexpected(ok.error());
-  if (auto ok = read_volumes((*file)[StreamType::volumes], d); !ok) return tl::unexpected(ok.error());
   parts.set = all_diamonds(domain, parallel);
   parts.keys = ValueKeys(0, d.format.last);
   if (auto ok = read_pages(*file, parts, parallel, faults); !ok) return tl::unexpected(ok.error());

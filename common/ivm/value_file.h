@@ -31,6 +31,10 @@ namespace intervale {
 [[nodiscard]] Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
                                                 std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
+// Of a file whose ends are there (coarse_scales.h): the scales from `finest` on, 1 at least, whose pages the first end has.
+// Channels are left out. Checks all that is there as decode_values() does.
+[[nodiscard]] Result<ValueVolume> decode_coarse_values(const FileEnds& file, std::string name, int finest, const ParallelFor& parallel = serial);
+
 // Writes a temporary file and renames it. Returns the number of bytes.
 [[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial,
                                                 KeptPages* kept = nullptr);

@@ -229,6 +229,16 @@ Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::
   return {};
 }
 
+std::vector<std::uint64_t> page_lengths(std::span<const std::byte> index) {
+  std::vector<std::uint64_t> lengths(index.size() / sizeof(PageRecord));
+  for (std::size_t page = 0; page < lengths.size(); ++page) {
+    PageRecord r;
+    std::memcpy(&r, index.data() + page * sizeof r, sizeof r);
+    lengths[page] = r.bytes;
+  }
+  return lengths;
+}
+
 std::vector<std::uint64_t> take_faults(const Domain& domain, const SupercubeSet& set, PageFaults* faults, std::uint64_t& content_hash) {
   if (faults == nullptr || !faults->any()) return {};
   std::vector<std::uint64_t> left = slots_left(domain, set, faults->lost);

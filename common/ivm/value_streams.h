@@ -44,6 +44,9 @@ void append_pages(const PagedValues& values, std::vector<std::byte>& index, std:
 [[nodiscard]] Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& pages, const DecodedValues& to,
                                       const ParallelFor& parallel, PageFaults* faults, const std::string& channel = {});
 
+// The bytes of each page, from a stream page_index. They are not checked.
+[[nodiscard]] std::vector<std::uint64_t> page_lengths(std::span<const std::byte> index);
+
 // What is left once all pages of field and channels were read: by supercube, as slots_left(); empty if nothing is lost. Sets
 // lost_updates, and changes the hash of the contents, which are others now.
 [[nodiscard]] std::vector<std::uint64_t> take_faults(const Domain& domain, const SupercubeSet& set, PageFaults* faults, std::uint64_t& content_hash);

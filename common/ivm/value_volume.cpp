@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -21,6 +22,19 @@ std::uint64_t updated_slots(const Domain& domain, int scale, Vertex position) {
     if (domain.tets(d) != 0 && !domain.is_noop(d)) slots |= std::uint64_t(1) << slot;
   }
   return slots;
+}
+
+// Calls visit(position) for those supercubes of a scale that may have diamonds in the box.
+template <class Visit>
+void for_each_supercube(const Domain& domain, int scale, const Visit& visit) {
+  // A diamond reaches h from its centre.
+  const auto positions = [&](std::int32_t last) { return std::min(last + (1 << scale), 1 << domain.levels()) >> (scale + 2); };
+  const Vertex last{positions(domain.last().x), positions(domain.last().y), positions(domain.last().z)};
+  for (Vertex p; p.z <= last.z; ++p.z) {
+    for (p.y = 0; p.y <= last.y; ++p.y) {
+      for (p.x = 0; p.x <= last.x; ++p.x) visit(p);
+    }
+  }
 }
 
 }  // namespace
@@ -48,20 +62,13 @@ ErrorLevel ValueVolume::level_of_error(double max_error, double error) {
   return ErrorLevel(std::clamp(kErrorLevels - 1 + exponent - int(ratio == 0.5), 1, kErrorLevels - 1));
 }
 
-SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel) {
+SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel, int finest) {
   std::vector<std::pair<SupercubeKey, std::uint64_t>> found;
-  for (int scale = 0; scale < domain.levels(); ++scale) {
-    // A diamond reaches h from its centre.
-    const auto positions = [&](std::int32_t last) { return std::min(last + (1 << scale), 1 << domain.levels()) >> (scale + 2); };
-    const Vertex last{positions(domain.last().x), positions(domain.last().y), positions(domain.last().z)};
-    for (Vertex p; p.z <= last.z; ++p.z) {
-      for (p.y = 0; p.y <= last.y; ++p.y) {
-        may_stop(parallel);
-        for (p.x = 0; p.x <= last.x; ++p.x) {
-          if (const std::uint64_t slots = updated_slots(domain, scale, p)) found.emplace_back(supercube_key(scale, p), slots);
-        }
-      }
-    }
+  for (int scale = finest; scale < domain.levels(); ++scale) {
+    for_each_supercube(domain, scale, [&](Vertex p) {
+      if (p.x == 0) may_stop(parallel);
+      if (const std::uint64_t slots = updated_slots(domain, scale, p)) found.emplace_back(supercube_key(scale, p), slots);
+    });
   }
   std::sort(found.begin(), found.end());
   std::vector<SupercubeKey> keys;
@@ -71,6 +78,13 @@ SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel) {
     occupancy.push_back(slots);
   }
   return {keys, std::move(occupancy)};
+}
+
+std::uint32_t count_diamonds(const Domain& domain) {
+  std::uint32_t count = 0;
+  for (int scale = 0; scale < domain.levels(); ++scale)
+    for_each_supercube(domain, scale, [&](Vertex p) { count += std::uint32_t(std::popcount(updated_slots(domain, scale, p))); });
+  return count;
 }
 
 std::uint32_t coarse_diamonds(const SupercubeSet& set) {

@@ -65,6 +65,7 @@ class ValueVolume {
     std::vector<ErrorLevel> error_levels;        // by number; of all diamonds of scale 1 and coarser, which come first
     std::vector<ChannelKeys> channel_keys = {};  // by channel of the description, and component
     std::vector<std::uint64_t> left = {};        // as in IntervalVolume::Parts
+    std::uint32_t finer = 0;                     // diamonds of finer scales than the set has: it has those of all others
   };
   explicit ValueVolume(Parts parts);
 
@@ -89,9 +90,11 @@ class ValueVolume {
   Domain domain_;
 };
 
-// All diamonds of a domain that have an update: those that exist, and whose split is not a no-op. `parallel` may
-// stop it.
-[[nodiscard]] SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel = serial);
+// All diamonds of a domain that have an update, of the scale `finest` and coarser: those that exist, and whose split is
+// not a no-op. `parallel` may stop it.
+[[nodiscard]] SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel = serial, int finest = 0);
+// How many there are of all scales: less than 2^32.
+[[nodiscard]] std::uint32_t count_diamonds(const Domain& domain);
 
 // How many diamonds of a set are of scale 1 or coarser; they have the first numbers.
 [[nodiscard]] std::uint32_t coarse_diamonds(const SupercubeSet& set);

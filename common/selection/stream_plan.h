@@ -55,6 +55,8 @@ class StreamPlan {
   // updates. Before the first set_lod(). If ancestors are missing, the client cannot use the updates; the server is
   // not affected.
   bool resume(SupercubeKey key, std::uint64_t slots);
+  // The same for all updates that another plan has sent: one of this data set, or of coarser scales of it.
+  void resume(const StreamPlan& other);
 
   // Marks updates that the client forgets as not sent: those of the groups that Front::forget() removes, too. False,
   // without any change, if the data set has no such updates. groups: keys strictly ascending. Before the set_lod() of

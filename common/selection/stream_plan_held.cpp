@@ -22,6 +22,10 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   return true;
 }
 
+void StreamPlan::resume(const StreamPlan& other) {
+  for (const SlotGroup& g : other.sent_.groups(other.volume_->set())) resume(g.key, g.slots);
+}
+
 bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   const SupercubeSet& set = volume_->set();
   for (const SlotGroup& g : groups) {

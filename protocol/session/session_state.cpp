@@ -43,8 +43,30 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   plan_.emplace(volume_);
   planned_ = {volume_->description().whole()};
   may_have_ = volume_->size() * (1 + std::uint64_t(volume_->description().channels.size()));
+  // Updates that the client has may be among those that are not there yet.
+  if (open.resume && !volume_->is_whole()) return Fault{CloseCode::going_away, "the data set is being read"};
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
+}
+
+// Whether there is more of a data set that was not whole. The description, which has a hash of the contents, stays.
+bool SessionState::grow() {
+  if (volume_->is_whole()) return false;
+  const auto found = find_(dataset_);
+  if (!found || (*found)->size() <= volume_->size() || (*found)->description() != volume_->description()) return false;
+  const StreamPlan before(std::move(*plan_));
+  volume_ = *found;
+  plan_.emplace(volume_);
+  plan_->resume(before);
+  plan_->set_room(room_);
+  planned_ = {volume_->description().whole()};
+  is_measured_ = true;
+  estimate_.reset();
+  measurement_.reset();
+  search_.reset();
+  is_new_ = true;
+  waits_ = false;
+  return true;
 }
 
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
@@ -122,7 +144,8 @@ bool SessionState::begin_view() {
   if (!has_needed && lod_.camera && measure()) {
     is_new_ = true;
   } else {
-    const bool needs_measured = measurement_ && (!is_early_ || lod_.max_updates || measurement_->is_soon());
+    const bool is_estimate = measurement_ || !volume_->is_whole();
+    const bool needs_measured = is_estimate && (!is_early_ || lod_.max_updates || (measurement_ && measurement_->is_soon()));
     if (needs_measured || (!is_planned && !estimate())) return false;
   }
   if (std::exchange(is_new_, false)) {
@@ -142,6 +165,7 @@ bool SessionState::estimate() {
 
 // The same for measured distances.
 bool SessionState::measure() {
+  if (!volume_->is_whole()) return false;  // distances are those from the surfaces of the whole data set
   if (!measurement_) measurement_ = worker_.ask(volume_, shown_, Distances::measured);
   if (!measurement_->is_ready()) return false;
   estimate_.reset();
@@ -178,6 +202,7 @@ bool SessionState::is_searching() {
 std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
   if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
+  if (grow()) return {};  // what follows is has_work()
   if (!has_work()) return {};
   const bool is_ahead = view_ == ViewState::ahead;
   waits_ = false;
@@ -199,8 +224,9 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   const bool others_wait = max_payload < protocol::kMaxBatchPayload;
   auto batch = plan_->next(size, others_wait ? kContendedVisits : StreamPlan::kMostVisits);
   if (!batch) {
-    waits_ = plan_->done() && measurement_;
-    if (!plan_->done() || measurement_) return {};
+    const bool is_last = !measurement_ && volume_->is_whole();
+    waits_ = plan_->done() && !is_last;
+    if (!plan_->done() || !is_last) return {};
     if (is_ahead && !plan_->is_full()) ahead_percent_ = coarse_percent_;
     is_new_ = !is_ahead && goes_ahead();
     view_ = is_new_ ? ViewState::ahead : ViewState::done;

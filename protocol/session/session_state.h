@@ -20,7 +20,8 @@ namespace intervale {
 class SessionState {
  public:
   using Volume = std::shared_ptr<const IntervalVolume>;
-  // The data set of a name, or why the client does not get it. The session keeps what it opened.
+  // The data set of a name, or why the client does not get it. The session keeps what it opened; but one that is not whole
+  // (IntervalVolume::is_whole()) is asked for again, until more of the same contents is found.
   using Find = std::function<tl::expected<Volume, protocol::Fault>(const std::string& name)>;
 
   // worker: must outlive the session. Where waits() says so, it must be called again when the worker has done something.
@@ -36,7 +37,8 @@ class SessionState {
 
   // There may be a batch to select and encode.
   [[nodiscard]] bool has_work() const { return opened_was_sent_ && is_streaming() && !needs_credit() && !waits(); }
-  // Until it is known what new ranges need, how far their surfaces move, or what is within a budget.
+  // Until it is known what new ranges need, how far their surfaces move, or what is within a budget; or until the data set
+  // grows, which whoever calls next() has to find out.
   [[nodiscard]] bool waits() const {
     return waits_ && !(estimate_ && estimate_->is_ready()) && !(measurement_ && measurement_->is_ready()) && !(search_ && search_->is_done());
   }
@@ -60,6 +62,7 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
   std::optional<protocol::Fault> on(const protocol::Have& have);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
+  bool grow();
   bool begin_view();
   [[nodiscard]] bool is_searching();
   bool estimate();

@@ -6,6 +6,7 @@
 #include <exception>
 #include <system_error>
 
+#include "common/ivm/coarse_scales.h"
 #include "common/ivm/load_volume.h"
 #include "common/parallel/all_cores.h"
 #include "protocol/codec.h"
@@ -15,6 +16,8 @@ namespace intervale {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::uint64_t kLargeFile = 1 << 20;  // takes some 0.1 s to decode
 
 Result<std::vector<fs::path>> files_in(const fs::path& folder) {
   std::vector<fs::path> files;
@@ -81,19 +84,55 @@ Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
       if (auto loaded = load_folder(input, parallel); !loaded) return tl::unexpected(loaded.error());
       continue;
     }
-    spdlog::debug("reads {}", input.string());
-    PageFaults faults;
-    auto volume = catching(input.string() + ": ", [&] {
-      auto loaded = load_volume(input, parallel, tolerates_damage_ ? &faults : nullptr);
-      if (loaded) complete_in_data_memory(**loaded, memory_, parallel);
-      return loaded;
-    });
-    if (!volume) return tl::unexpected(volume.error());
-    log_faults(input, faults, **volume);
-    files_.emplace_back(input, counted(memory_, Memory::Holder::datasets, std::move(*volume)));
+    auto& [path, volume] = files_.emplace_back(input, load_coarse(input, parallel));
+    if (volume) continue;
+    if (auto loaded = load_file(path, volume, parallel); !loaded) return tl::unexpected(loaded.error());
   }
   if (auto loaded = remote_.load(parallel); !loaded) return tl::unexpected(loaded.error());
   return catalogue(true);
+}
+
+// All of a named file.
+Result<void> CatalogueWatcher::load_file(const fs::path& path, Catalogue::Volume& volume, const ParallelFor& parallel) {
+  spdlog::debug("reads {}", path.string());
+  PageFaults faults;
+  auto loaded = catching(path.string() + ": ", [&] {
+    auto read = load_volume(path, parallel, tolerates_damage_ ? &faults : nullptr);
+    if (read) complete_in_data_memory(**read, memory_, parallel);
+    return read;
+  });
+  if (!loaded) return tl::unexpected(loaded.error());
+  log_faults(path, faults, **loaded);
+  volume = counted(memory_, Memory::Holder::datasets, std::move(*loaded));
+  return {};
+}
+
+// What a large file begins with. nullptr: it is to be read whole, which also tells what is wrong with it.
+Catalogue::Volume CatalogueWatcher::load_coarse(const fs::path& path, const ParallelFor& parallel) {
+  if (tolerates_damage_ || memory_.room() != ~std::uint64_t(0)) return nullptr;
+  std::error_code ignored;
+  if (const auto size = fs::file_size(path, ignored); ignored || size < kLargeFile) return nullptr;
+  auto volume = catching("", [&] { return load_coarse_volume(path, parallel); });
+  if (!volume || !protocol::check_sendable((*volume)->description())) return nullptr;
+  complete_in_data_memory(**volume, memory_, parallel);
+  return counted(memory_, Memory::Holder::datasets, std::move(*volume));
+}
+
+Result<std::optional<Catalogue>> CatalogueWatcher::complete(std::stop_token stop) {
+  const ScratchMemory::Scope scope(memory_.data_memory());
+  const ParallelFor parallel = serial_until(std::move(stop));
+  for (auto& [path, volume] : files_) {
+    if (volume->is_whole()) continue;
+    if (auto loaded = load_file(path, volume, parallel); !loaded) return tl::unexpected(loaded.error());
+    return std::optional(*catalogue(false));
+  }
+  for (auto& [path, file] : folder_files_) {
+    if (!file.volume || file.volume->is_whole()) continue;
+    file.volume.reset();
+    poll_file(path, file, parallel);
+    return std::optional(*catalogue(false));
+  }
+  return std::nullopt;
 }
 
 Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const ParallelFor& parallel) {
@@ -102,7 +141,8 @@ Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const Paralle
   for (const fs::path& path : *paths) {
     File file;
     file.last_seen = stamp_of(path);  // the first load does not wait for a second look
-    poll_file(path, file, parallel);
+    if (Catalogue::check_name(path.stem().string())) file.volume = load_coarse(path, parallel);
+    if (!file.volume) poll_file(path, file, parallel);
     folder_files_[path] = std::move(file);
   }
   return {};

@@ -33,7 +33,12 @@ class CatalogueWatcher {
   // The catalogue at the start. A file in a folder that is damaged, or whose name is invalid, is logged and skipped.
   // A named file or URL with such a fault is an error; so are two data sets of one name, and a folder that cannot be read.
   // Once stop is requested, load() and poll() give up what they read within milliseconds, and throw Stopped.
+  // Of large files of every range, only the coarse scales are in it (coarse_scales.h).
   Result<Catalogue> load(std::stop_token stop = {});
+
+  // After load(): reads one more data set whole that is not. Returns the new catalogue; nullopt once all are. A named file
+  // that turns out to be damaged is an error; such a file in a folder is logged, and leaves the catalogue.
+  Result<std::optional<Catalogue>> complete(std::stop_token stop = {});
 
   // Reads the folders again. Returns the new catalogue, or nullopt if nothing changed. A new or changed file is
   // loaded once it is the same in two consecutive polls, so that no file is read while it is written. If a file is
@@ -50,7 +55,9 @@ class CatalogueWatcher {
     std::string last_warning;            // logged since it was last read, not to be repeated
     std::uint64_t too_little = 0;        // in so little room it was not read
   };
+  Result<void> load_file(const std::filesystem::path& path, Catalogue::Volume& volume, const ParallelFor& parallel);
   Result<void> load_folder(const std::filesystem::path& folder, const ParallelFor& parallel);
+  [[nodiscard]] Catalogue::Volume load_coarse(const std::filesystem::path& path, const ParallelFor& parallel);
   bool poll_file(const std::filesystem::path& path, File& file, const ParallelFor& parallel);
   [[nodiscard]] Result<Catalogue> catalogue(bool is_start) const;
 

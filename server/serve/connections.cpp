@@ -47,6 +47,17 @@ void Connections::begin_shutdown() {
   }
 }
 
+void Connections::catalogue_changed() {
+  std::vector<std::shared_ptr<Connection>> keep_alive;
+  const std::unique_lock lock(mutex_);
+  for (const auto& [id, weak] : connections_) {
+    if (auto connection = weak.lock()) {
+      connection->catalogue_changed();
+      keep_alive.push_back(std::move(connection));
+    }
+  }
+}
+
 bool Connections::wait_until_empty(std::chrono::milliseconds time) {
   std::unique_lock lock(mutex_);
   return empty_.wait_for(lock, time, [this] { return connections_.empty(); });

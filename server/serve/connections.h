@@ -15,8 +15,9 @@ namespace intervale {
 class Connection {
  public:
   virtual ~Connection() = default;
-  // Any thread; neither blocks.
+  // Any thread; none blocks.
   virtual void begin_shutdown() = 0;        // the server drains: close in order, soon
+  virtual void catalogue_changed() {}       // there may be more of a data set that was not whole
   virtual void abort(const char* why) = 0;  // close the socket at once; why: for the log, a literal
 };
 
@@ -42,6 +43,7 @@ class Connections {
   bool make_room(std::size_t most);
 
   void begin_shutdown();                                  // of all connections, and of those added later
+  void catalogue_changed();                               // for all connections
   bool wait_until_empty(std::chrono::milliseconds time);  // false if there still are connections after that time
   [[nodiscard]] bool draining() const;                    // begin_shutdown() was called
   [[nodiscard]] std::size_t size() const;

@@ -101,6 +101,10 @@ class Loading {
       const std::size_t count = catalogue->volumes().size();
       server_.offer(std::move(*catalogue));
       spdlog::info("serving {} data set{}{}", count, count == 1 ? "" : "s", where_);
+      for (auto more = watcher_.complete(stop); !more || *more; more = watcher_.complete(stop)) {
+        if (!more) return failed_(more.error());
+        server_.offer(std::move(**more));
+      }
       for (wait(stop); !stop.stop_requested(); wait(stop)) {
         if (auto changed = watcher_.poll(stop)) server_.offer(std::move(*changed));
       }

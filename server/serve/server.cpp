@@ -105,7 +105,10 @@ Result<std::unique_ptr<Server>> Server::start(const ServeOptions& requested) {
   return std::unique_ptr<Server>(new Server(std::move(running)));
 }
 
-void Server::offer(Catalogue catalogue) { running_->context.catalogue.store(std::make_shared<const Catalogue>(std::move(catalogue))); }
+void Server::offer(Catalogue catalogue) {
+  running_->context.catalogue.store(std::make_shared<const Catalogue>(std::move(catalogue)));
+  running_->context.connections.catalogue_changed();
+}
 
 void Server::reload() {
   for (ReloadedFiles& files : running_->files) files.reload();

@@ -83,7 +83,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     log_session(id_, spdlog::level::info, "from {}:{}", endpoint.address().to_string(), endpoint.port());
     registration_ = context_.connections.add(shared_from_this());
     threads_.set_wake([weak = weak_from_this()] {
-      if (const auto self = weak.lock()) asio::post(self->ws_.get_executor(), [self] { self->writer_wakeup_.cancel(); });
+      if (const auto self = weak.lock()) self->wake_writer();
     });
     spawn(run(shared_from_this(), request));
   }
@@ -91,6 +91,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   void begin_shutdown() override {
     asio::post(ws_.get_executor(), [self = shared_from_this()] { self->close({CloseCode::going_away, "the server shuts down"}); });
   }
+
+  void catalogue_changed() override { wake_writer(); }
 
   void abort(const char* why) override {
     asio::post(ws_.get_executor(), [self = shared_from_this(), why] {
@@ -100,6 +102,10 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   }
 
  private:
+  void wake_writer() {
+    asio::post(ws_.get_executor(), [self = shared_from_this()] { self->writer_wakeup_.cancel(); });
+  }
+
   void spawn(asio::awaitable<void> coroutine) {
     asio::co_spawn(ws_.get_executor(), std::move(coroutine), [self = shared_from_this()](const std::exception_ptr& failure) {
       if (failure) self->fail_with(failure);

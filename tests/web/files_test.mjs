@@ -9,6 +9,7 @@ import { after, before, test } from 'node:test';
 import { digestOf, fetched, kBlock, kGyroid, killServers, launch, makeData, matches, open, progressOf, serve, set, settled } from './support.mjs';
 
 const kAny = { name: 'any', sample: 'buckyball', size: 33 }; // of every range
+const kLarge = { name: 'large', sample: 'buckyball', size: 129 }; // of every range, in several pages
 const kWhole = { min: [-100, -100, -100], max: [100, 100, 100] };
 const kSmall = { width: 900, height: 600 };
 const kStyle = { color: '#009e73', opacity: 1 };
@@ -19,7 +20,7 @@ let folder; // of the files
 let browser;
 before(async () => {
   server = await serve(makeData(kBlock));
-  folder = makeData(kAny, kGyroid);
+  folder = makeData(kAny, kGyroid, kLarge);
   peer = await serve(folder);
   browser = await launch();
 });
@@ -117,6 +118,60 @@ test('a plain web server is enough: the address names the file, and the view of 
   await close();
 });
 
+// Files in ranges, as web servers send them. gate: awaited before a range of more than half of a file is sent; if it is
+// false, there is no such file then.
+async function serveRanges(gate) {
+  const requests = [];
+  const files = createServer(async (request, response) => {
+    const headers = { 'access-control-allow-origin': '*', 'content-type': 'application/octet-stream' };
+    if (request.method === 'OPTIONS') return response.writeHead(204, { ...headers, 'access-control-allow-headers': 'Range' }).end();
+    const bytes = readFileSync(join(folder, normalize(decodeURIComponent(new URL(request.url, 'http://x').pathname))));
+    const [, first, last] = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '') ?? [];
+    if (first === undefined) return response.writeHead(200, headers).end(bytes);
+    const part = bytes.subarray(Number(first), Number(last) + 1);
+    if (part.length > bytes.length / 2 && (await gate) === false) return response.writeHead(404, headers).end();
+    requests.push(part.length);
+    return response.writeHead(206, { ...headers, 'content-range': `bytes ${first}-${Number(first) + part.length - 1}/${bytes.length}` }).end(part);
+  });
+  await new Promise((resolve) => files.listen(0, '127.0.0.1', resolve));
+  files.unref();
+  return { address: `http://127.0.0.1:${files.address().port}`, requests };
+}
+
+test('a file that is on its way is shown already, as coarse as need be, and ends as the whole file', async () => {
+  let goOn;
+  const { address, requests } = await serveRanges(new Promise((resolve) => (goOn = resolve)));
+  const size = readFileSync(pathOf('large')).length;
+  const mine = await serve(folder, 0, '--connect-origin', address);
+  const { page, errors, close } = await open(browser, `${mine.url}?file=${address}/large.ivm#data=large&range=100,180`, kSmall);
+  await page.waitForFunction(() => window.intervale.live.progress?.tets > 1000);
+  assert.match(await page.textContent('#banner-text'), /^Receiving large\.ivm: /);
+  const { done, updates } = await progressOf(page);
+  const received = requests.reduce((sum, bytes) => sum + bytes, 0);
+  assert.ok(!done && received < size / 2, `${received} of ${size} bytes`);
+  goOn();
+  await settled(page);
+  assert.ok(await page.isHidden('#banner'), 'all was received');
+  assert.ok((await progressOf(page)).updates > updates);
+  await set(page, { region: kWhole });
+  assert.equal((await digestOf(page)).digest, nativeOf('large', [100, 180]).digest);
+  assert.equal(requests.reduce((sum, bytes) => sum + bytes, 0), size, 'nothing is received twice');
+  assert.deepEqual(errors, []);
+  await close();
+  await mine.kill();
+});
+
+test('a file that is lost on its way is told of, and what has arrived stays', async () => {
+  const { address } = await serveRanges(Promise.resolve(false));
+  const mine = await serve(folder, 0, '--connect-origin', address);
+  const { page, errors, close } = await open(browser, `${mine.url}?file=${address}/large.ivm#data=large&range=100,180`, kSmall);
+  assert.match(await bannerOf(page, 'it changed while it was read'), /^Only coarse scales are shown: large\.ivm: /);
+  await page.waitForFunction(() => window.intervale.live.progress?.triangles > 100);
+  assert.deepEqual(errors.filter((error) => !/404/.test(error)), []);
+  await close();
+  await mine.kill();
+});
+
 test('the served page shows files of the origins that --connect-origin names, and of no other', async () => {
   const address = await serveFolders();
   const query = `?file=${address}/data/any.ivm#data=any&range=20,60&roi=${[...kWhole.min, ...kWhole.max]}`;
@@ -129,9 +184,10 @@ test('the served page shows files of the origins that --connect-origin names, an
   assert.deepEqual(allowed.errors, []);
   await allowed.close();
   await mine.kill();
-  const refused = await open(browser, server.url + query, kSmall);
+  const other = await serveRanges();
+  const refused = await open(browser, `${server.url}?file=${other.address}/any.ivm`, kSmall);
   assert.match(await bannerOf(refused.page, 'any.ivm'), /cannot be reached, or this page may not read it: .*--connect-origin/);
-  assert.ok(refused.errors.some((error) => /Content Security Policy/.test(error)), refused.errors.join('; '));
+  assert.deepEqual(other.requests, [], 'nothing is asked of it');
   await refused.close();
 });
 

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/ivm/coarse_scales.h"
 #include "common/ivm/load_volume.h"
 #include "protocol/codec.h"
 #include "protocol/session/data_set_json.h"
@@ -39,23 +40,51 @@ class Inbox {
 
 class LocalDataSet {
  public:
-  // For the bytes of the file.
+  // For bytes of the file.
   val inbox(std::size_t size) { return inbox_.of(size); }
-  // Reads the inbox, and frees it. name: the file's, without folders and extension.
-  std::string load(const std::string& name) {
-    auto read = decode_volume(std::as_bytes(std::span(inbox_.bytes())), name);
-    inbox_.free();
-    if (!read) return read.error().message;
-    if (auto fits = protocol::check_sendable(read->description()); !fits) return fits.error().message;
-    volume_ = std::make_shared<const IntervalVolume>(std::move(*read));
+  // The bytes that a file begins with are in the inbox: finds what can be loaded before all of it (coarse_scales.h).
+  // file_bytes: its length. name: the file's, without folders and extension.
+  std::string begin(const std::string& name, double file_bytes) {
+    name_ = name;
+    file_bytes_ = std::uint64_t(file_bytes);
+    auto scales = coarse_scales(std::as_bytes(std::span(inbox_.bytes())), file_bytes_);
+    if (!scales) return scales.error().message;
+    coarse_ = std::move(*scales);
     return {};
+  }
+  [[nodiscard]] std::size_t coarse_count() const { return coarse_.size(); }
+  // How many bytes at the file's beginning and at its end are needed to load the i-th of those.
+  [[nodiscard]] double first_bytes(std::size_t i) const { return double(coarse_[i].first_bytes); }
+  [[nodiscard]] double last_bytes(std::size_t i) const { return double(coarse_[i].last_bytes); }
+  // Reads these bytes from the inbox, the first ones first.
+  std::string load_coarse(std::size_t i) {
+    const auto bytes = std::as_bytes(std::span(inbox_.bytes()));
+    const auto first = std::size_t(coarse_[i].first_bytes), last = std::size_t(coarse_[i].last_bytes);
+    if (bytes.size() != first + last) return "the bytes are not as many as were asked for";
+    return take(decode_coarse({bytes.first(first), bytes.last(last), file_bytes_}, coarse_[i], name_));
+  }
+  // Reads all of the file from the inbox, and frees that.
+  std::string load() {
+    auto read = decode_volume(std::as_bytes(std::span(inbox_.bytes())), name_);
+    inbox_.free();
+    return take(std::move(read));
   }
   // What a server's /api/datasets/NAME tells.
   [[nodiscard]] std::string describe() const { return data_set_json(*volume_); }
   [[nodiscard]] const std::shared_ptr<const IntervalVolume>& volume() const { return volume_; }
 
  private:
+  std::string take(Result<IntervalVolume> read) {
+    if (!read) return read.error().message;
+    if (auto fits = protocol::check_sendable(read->description()); !fits) return fits.error().message;
+    volume_ = std::make_shared<const IntervalVolume>(std::move(*read));
+    return {};
+  }
+
   Inbox inbox_;
+  std::string name_;
+  std::uint64_t file_bytes_ = 0;
+  std::vector<CoarseScales> coarse_;
   std::shared_ptr<const IntervalVolume> volume_;
 };
 
@@ -71,6 +100,7 @@ class LocalSession {
   void receive() {
     if (fault_) return;
     const auto message = protocol::decode_client_message(inbox_.bytes());
+    is_stuck_ = false;
     fault_ = message ? state_.receive(*message) : protocol::Fault{protocol::CloseCode::malformed, message.error().message};
     is_fault_sent_ = false;
   }
@@ -78,11 +108,13 @@ class LocalSession {
   val step() {
     if (fault_) return std::exchange(is_fault_sent_, true) ? val::null() : buffer_of(*fault_);
     if (const auto message = state_.next()) return buffer_of(*message);
-    if (state_.waits()) (void)worker_.work();
+    is_stuck_ = state_.waits() && !worker_.work();
     return val::null();
   }
-  // Nothing is left to do before the next message.
-  [[nodiscard]] bool is_idle() const { return fault_ ? is_fault_sent_ : !state_.has_work() && !state_.waits(); }
+  // More of the data set was loaded.
+  void grow() { is_stuck_ = false; }
+  // Nothing is left to do before the next message, or before the data set grows.
+  [[nodiscard]] bool is_idle() const { return fault_ ? is_fault_sent_ : !state_.has_work() && (!state_.waits() || is_stuck_); }
 
  private:
   static val buffer_of(const protocol::ServerMessage& message) {
@@ -93,6 +125,7 @@ class LocalSession {
   Inbox inbox_;
   LocalWorker worker_;
   SessionState state_;
+  bool is_stuck_ = false;                 // it waits, and the worker has nothing to do: the data set has to grow
   std::optional<protocol::Fault> fault_;  // why the session ended
   bool is_fault_sent_ = false;
 };
@@ -103,6 +136,11 @@ EMSCRIPTEN_BINDINGS(intervale_local) {
   emscripten::class_<LocalDataSet>("LocalDataSet")
       .constructor<>()
       .function("inbox", &LocalDataSet::inbox)
+      .function("begin", &LocalDataSet::begin)
+      .function("coarseCount", &LocalDataSet::coarse_count)
+      .function("firstBytes", &LocalDataSet::first_bytes)
+      .function("lastBytes", &LocalDataSet::last_bytes)
+      .function("loadCoarse", &LocalDataSet::load_coarse)
       .function("load", &LocalDataSet::load)
       .function("describe", &LocalDataSet::describe);
   emscripten::class_<LocalSession>("LocalSession")
@@ -110,6 +148,7 @@ EMSCRIPTEN_BINDINGS(intervale_local) {
       .function("inbox", &LocalSession::inbox)
       .function("receive", &LocalSession::receive)
       .function("step", &LocalSession::step)
+      .function("grow", &LocalSession::grow)
       .function("isIdle", &LocalSession::is_idle);
 }
 

@@ -1,11 +1,7 @@
-// Files that the user opens or drops onto the page: data sets that are shown without a server.
-import { LocalDataset } from '../package/src/local_dataset';
+// Files that the user opens or drops onto the page, or at addresses: data sets that are shown without a server.
+import { LocalDataset, type LocalOptions } from '../package/src/local_dataset';
 import type { Dataset } from '../package/src/datasets';
 import { element, input, onClick } from './dom';
-
-const kMostBytes = 2 ** 30; // the browser holds the file, and the core what it decodes to
-
-const tooLarge = (name: string) => new Error(`${name} is too large to be shown by the page itself: serve it with intervale serve.`);
 
 export class Files {
   private opened = new Map<Dataset, LocalDataset>();
@@ -20,10 +16,9 @@ export class Files {
   }
 
   // Rejects, with a text for the user. taken: names of other data sets, which it does not get. A file of the same name as
-  // another file takes its place.
-  async open(file: File, taken: string[]): Promise<Dataset> {
-    if (file.size > kMostBytes) throw tooLarge(file.name);
-    const local = await LocalDataset.open(file, file.name);
+  // another file takes its place. options: told and failed.
+  async open(file: FileOrAddress, taken: string[], options: LocalOptions): Promise<Dataset> {
+    const local = await LocalDataset.open(file, nameOf(file), options);
     const { name } = local.dataset;
     const dataset = { ...local.dataset, name: taken.includes(name) ? `${name} (file)` : name };
     for (const [other, old] of this.opened) {
@@ -36,27 +31,10 @@ export class Files {
   }
 }
 
-// The file at an address, relative to the page's. Rejects, with a text for the user. told: called with the bytes received.
-export async function download(address: string, told: (bytes: number) => void): Promise<File> {
-  const url = new URL(address, document.baseURI);
-  const name = decodeURIComponent(url.pathname.slice(url.pathname.lastIndexOf('/') + 1));
-  const response = await fetch(url).catch(() => null);
-  if (!response) throw new Error(`${url.href} cannot be reached, or this page may not read it: its server (Access-Control-Allow-Origin) or the page's (--connect-origin) does not allow that.`);
-  if (!response.ok || !response.body) throw new Error(`${url.href} was not received: the server responded with status ${response.status}.`);
-  const chunks: Uint8Array<ArrayBuffer>[] = [];
-  let bytes = 0;
-  const reader = response.body.getReader();
-  for (let part = await reader.read(); !part.done; part = await reader.read()) {
-    chunks.push(part.value);
-    bytes += part.value.length;
-    if (bytes > kMostBytes) {
-      await reader.cancel();
-      throw tooLarge(name);
-    }
-    told(bytes);
-  }
-  return new File(chunks, name);
-}
+// A file that the user has, or the address of one.
+export type FileOrAddress = File | URL;
+export const nameOf = (file: FileOrAddress): string =>
+  file instanceof URL ? decodeURIComponent(file.pathname.slice(file.pathname.lastIndexOf('/') + 1)) : file.name;
 
 const hasFiles = (event: DragEvent): boolean => event.dataTransfer?.types.includes('Files') ?? false;
 

@@ -5,7 +5,7 @@ import { watchBanner } from './banner';
 import { ClipControls } from './clip';
 import { type Dataset, fetchStatistics, listDatasets, type Listing, streamUrl } from '../package/src/datasets';
 import { element, input, onClick } from './dom';
-import { download, Files, watchFiles } from './files';
+import { type FileOrAddress, Files, nameOf, watchFiles } from './files';
 import { bytes } from './format';
 import { Handles } from './handles';
 import { type Command, listKeys, watchKeys } from './keyboard';
@@ -69,7 +69,7 @@ class Page {
 
   // What the address asks for. listing: if it was requested already.
   begin(listing?: Promise<Listing>): Promise<void> {
-    return kFile === null ? this.load(listing) : this.loadFile(kFile);
+    return kFile === null ? this.load(listing) : this.openFile(new URL(kFile, document.baseURI), {});
   }
 
   // Opens the data set that the address names, or else the first.
@@ -200,31 +200,34 @@ class Page {
     if (status.value.dataset === dataset) status.set({ statistics });
   }
 
-  // The file at an address is all that there is to see then: its server need not be one of ours.
-  private async loadFile(address: string): Promise<void> {
-    const tell = (notice: string) => status.set({ notice });
-    try {
-      const file = await download(address, (received) => tell(`Receiving ${address}: ${bytes(received)}…`));
-      await this.openFile(file, {});
-    } catch (error) {
-      status.set({ notice: null, error: textOf(error) });
-    }
-  }
-
   // change: of the view, with it.
-  private async openFile(file: File, change: Partial<ViewState> = kReset): Promise<void> {
-    const notice = `Reading ${file.name}…`;
-    status.set({ notice, error: null });
+  private async openFile(file: FileOrAddress, change: Partial<ViewState> = kReset): Promise<void> {
+    let notice: string | null = null;
+    const tell = (text: string | null) => {
+      if (status.value.notice === notice) status.set({ notice: text });
+      notice = text;
+    };
+    const name = nameOf(file);
+    status.set({ notice: null, error: null });
+    tell(`Reading ${name}…`);
+    let isShown = false;
+    let isMissing = false; // some of what is shown
+    const told = (received: number, size: number | null) => {
+      isMissing = size !== null && received < size;
+      tell(isShown && !isMissing ? null : `Receiving ${name}: ${bytes(received)}${size === null ? '' : ` of ${bytes(size)}`}…`);
+    };
+    const failed = (error: Error) => tell(`Only coarse scales are shown: ${textOf(error)}`);
     try {
       const old = this.files.datasets;
       const ofServer = (status.value.datasets ?? []).filter((dataset) => !old.includes(dataset));
-      const dataset = await this.files.open(file, ofServer.map(({ name }) => name));
+      const dataset = await this.files.open(file, ofServer.map(({ name }) => name), { told, failed });
       status.set({ datasets: [...ofServer, ...this.files.datasets] });
       this.open(dataset, change);
+      isShown = true;
+      if (!isMissing) tell(null);
     } catch (error) {
+      tell(null);
       status.set({ error: textOf(error) });
-    } finally {
-      if (status.value.notice === notice) status.set({ notice: null });
     }
   }
 

@@ -52,9 +52,12 @@ export type Request =
 
 // To the worker of a file, and its answer to the first, which is loading. Each port is that of a session.
 export type LocalRequest =
-  | { type: 'load'; file: Blob; name: string; wasmUrl: string | null } // name: the data set's; wasmUrl: of local.wasm; null: from where it lies beside the worker
+  | { type: 'load'; file: Blob | string; name: string; wasmUrl: string | null } // file: or its address; name: the data set's; wasmUrl: of local.wasm; null: from where it lies beside the worker
   | { type: 'connect'; port: MessagePort };
-export type LocalReply = { type: 'loaded'; description: string } | { type: 'error'; text: string };
+export type LocalReply =
+  | { type: 'received'; received: number; size: number | null } // of a file at an address, bytes; also after 'loaded'; size: null if not known
+  | { type: 'loaded'; description: string } // there is something to see; the rest may follow
+  | { type: 'error'; text: string }; // after 'loaded': the rest cannot be had
 
 export interface View {
   camera: Pose & { viewport: [number, number] }; // viewport: device pixels

@@ -1,7 +1,7 @@
 // How fine a preview of a range may be so that a step of it is done in time: chosen from how long the last ones took.
 // The finest levels of the mesh are left out, and each has about half of its updates.
 
-const kStepMs = 40; // for the worker's part of a step; uploading and drawing take about as long again
+const kStepMs = 30; // for the worker's part of a step; uploading and drawing take about as long again
 const kFirstMsPerUpdate = 0.0008; // until a step was measured
 const kMostLevels = 15; // five scales
 

@@ -3,8 +3,13 @@
 
 // A returned text is an error; an empty one means success.
 export interface LocalDataSet {
-  inbox(bytes: number): Uint8Array; // to be filled with the file; valid until the next call of any function
-  load(name: string): string; // reads the inbox; name: the file's without its extension
+  inbox(bytes: number): Uint8Array; // to be filled with bytes of the file; valid until the next call of any function
+  begin(name: string, fileBytes: number): string; // the inbox has the file's first 64 KiB, or all; name: the file's without its extension
+  coarseCount(): number; // how many times more and more of the data set can be loaded before all of it
+  firstBytes(i: number): number; // what is needed for that: bytes at the file's beginning
+  lastBytes(i: number): number; // and at its end; the same for all i
+  loadCoarse(i: number): string; // reads these from the inbox, the first ones first
+  load(): string; // reads all of the file from the inbox
   describe(): string; // JSON, as a server's /api/datasets/NAME
   delete(): void;
 }
@@ -12,7 +17,8 @@ export interface LocalSession {
   inbox(bytes: number): Uint8Array; // to be filled with one message; valid until the next call of any function
   receive(): void; // handles the message in the inbox
   step(): ArrayBuffer | null; // works for a while, and returns a message if there is one
-  isIdle(): boolean; // nothing is left to do before the next message
+  grow(): void; // more of the data set was loaded
+  isIdle(): boolean; // nothing is left to do before the next message, or before the data set grows
   delete(): void;
 }
 export interface Local {

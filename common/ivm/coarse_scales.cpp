@@ -1,0 +1,93 @@
+#include "common/ivm/coarse_scales.h"
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+#include "common/codec/coding_rate.h"
+#include "common/diamond/domain.h"
+#include "common/diamond/grid.h"
+#include "common/ivm/every_range.h"
+#include "common/ivm/value_file.h"
+#include "common/ivm/value_page.h"
+#include "common/ivm/value_streams.h"
+
+namespace intervale {
+namespace {
+
+bool lies_within(const StreamPlace& place, std::size_t bytes) { return place.bytes <= bytes && place.offset <= bytes - place.bytes; }
+
+// The dims of a field's record. They are not checked.
+Grid grid_of(std::span<const std::byte> record) {
+  Grid grid;
+  std::memcpy(grid.dims.data(), record.data(), sizeof grid.dims);
+  return grid;
+}
+
+Result<std::vector<std::byte>> read_part(std::ifstream& in, std::uint64_t first, std::uint64_t bytes) {
+  std::vector<std::byte> part(std::size_t(bytes), std::byte(0));
+  in.seekg(std::streamoff(first));
+  in.read(reinterpret_cast<char*>(part.data()), std::streamsize(part.size()));
+  if (!in) return fail("could not be read to its end");
+  return part;
+}
+
+}  // namespace
+
+Result<std::vector<CoarseScales>> coarse_scales(std::span<const std::byte> start, std::uint64_t file_bytes) {
+  const auto scope = scope_of(start, file_bytes);
+  if (!scope) return tl::unexpected(scope.error());
+  std::vector<CoarseScales> scales;
+  if (*scope != FileScope::every_range) return scales;
+  const auto place = [&](StreamType type) { return place_of(type, start, file_bytes, *scope).value_or(StreamPlace()); };
+  const StreamPlace field = place(StreamType::field), index = place(StreamType::page_index), pages = place(StreamType::pages);
+  if (place(StreamType::channels).bytes != 0 || !lies_within(field, start.size()) || !lies_within(index, start.size())) return scales;
+  if (field.bytes < sizeof(Grid::dims)) return scales;
+  const Grid grid = grid_of(start.subspan(std::size_t(field.offset)));
+  const auto has_samples = [](std::int32_t samples) { return samples >= kMinSide && samples <= kMaxSide; };
+  if (!std::all_of(grid.dims.begin(), grid.dims.end(), has_samples) || grid.sample_count() > kMostSamples ||
+      grid.sample_count() > most_coded_bits(pages.bytes) + kRootVertices)
+    return scales;
+  const std::vector<std::uint64_t> lengths = page_lengths(start.subspan(std::size_t(index.offset), std::size_t(index.bytes)));
+  const Domain domain(grid.dims);
+  for (int finest = domain.levels() - 1; finest > 0; --finest) {
+    const SupercubeSet set = all_diamonds(domain, serial, finest);
+    const std::size_t count = pages_of(set).size();
+    if (count >= lengths.size()) break;
+    CoarseScales next{finest, pages.offset, file_bytes - pages.offset - pages.bytes};
+    for (std::size_t page = 0; page < count; ++page) next.first_bytes += std::min(lengths[page], file_bytes);
+    if (next.first_bytes > pages.offset + pages.bytes) break;
+    if (count == 1) scales.clear();  // the first page has this scale, too
+    scales.push_back(next);
+  }
+  return scales;
+}
+
+Result<IntervalVolume> decode_coarse(const FileEnds& file, const CoarseScales& scales, std::string name, const ParallelFor& parallel) {
+  auto values = decode_coarse_values(file, std::move(name), scales.finest, parallel);
+  if (!values) return tl::unexpected(values.error());
+  return of_every_range(std::move(*values).take(), parallel);
+}
+
+Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path, const ParallelFor& parallel) {
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = in ? std::streamoff(in.tellg()) : -1;
+  if (size < 0) return fail("could not be read");
+  const auto bytes = std::uint64_t(size);
+  const auto start = read_part(in, 0, std::min<std::uint64_t>(bytes, kStartBytes));
+  if (!start) return tl::unexpected(start.error());
+  const auto scales = coarse_scales(*start, bytes);
+  if (!scales) return tl::unexpected(scales.error());
+  if (scales->empty()) return nullptr;
+  const CoarseScales& coarsest = scales->front();
+  const auto first = read_part(in, 0, coarsest.first_bytes);
+  if (!first) return tl::unexpected(first.error());
+  const auto last = read_part(in, bytes - coarsest.last_bytes, coarsest.last_bytes);
+  if (!last) return tl::unexpected(last.error());
+  auto volume = decode_coarse({*first, *last, bytes}, coarsest, path.stem().string(), parallel);
+  if (!volume) return tl::unexpected(volume.error());
+  return std::make_shared<const IntervalVolume>(std::move(*volume));
+}
+
+}  // namespace intervale

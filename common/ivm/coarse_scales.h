@@ -1,0 +1,47 @@
+// The coarse scales of a data set of every range, read before the rest of its file is there.
+//
+// Pages lie in the file from coarse to fine, and none needs a finer one (FORMAT.md). So the beginning of a file, and the
+// few kilobytes after its pages, are the data set as far as to some scale: each scale more takes about eight times as
+// much. Errors and descriptions are those of the whole data set.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/ivm/interval_volume.h"
+#include "common/ivm/ivm_container.h"
+#include "common/util/parallel.h"
+#include "common/util/result.h"
+
+namespace intervale {
+
+// What is needed of a file for the scale `finest` and all coarser ones: its first and its last bytes.
+struct CoarseScales {
+  int finest = 0;
+  std::uint64_t first_bytes = 0, last_bytes = 0;
+};
+
+// The first bytes of a file that coarse_scales() needs to have of all but the largest.
+inline constexpr std::size_t kStartBytes = 64 << 10;
+
+// What can be had of a file before all of it, from the coarsest on: the scales of the first page, and then each further one
+// but the finest. None of a data set of one range, one with channels, one that is a single page, and where `start` ends
+// within the index of the pages. start: the file's first bytes, kStartBytes or all. Fails if they begin no .ivm file of so
+// many bytes.
+[[nodiscard]] Result<std::vector<CoarseScales>> coarse_scales(std::span<const std::byte> start, std::uint64_t file_bytes);
+
+// These scales, with as many bytes at both ends as they need: as of_every_range() makes them, but not whole
+// (IntervalVolume::is_whole()). Fails as decode_volume().
+[[nodiscard]] Result<IntervalVolume> decode_coarse(const FileEnds& file, const CoarseScales& scales, std::string name,
+                                                   const ParallelFor& parallel = serial);
+
+// The first of these of a file, by its first and last bytes. nullptr: it has none. The name is the file's.
+[[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path,
+                                                                               const ParallelFor& parallel = serial);
+
+}  // namespace intervale

@@ -1,0 +1,119 @@
+// Large files of every range are served by their coarse scales at first.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "common/ivm/value_file.h"
+#include "server/builder/value_builder.h"
+#include "server/builder/value_steps.h"
+#include "server/serve/catalogue_watcher.h"
+#include "tests/support/analytic_fields.h"
+#include "tests/support/page_damage.h"
+#include "tests/support/serving.h"
+#include "tests/support/temp_dir.h"
+
+namespace intervale::large_files {
+namespace {
+
+using ::testing::HasSubstr;
+using protocol::CloseCode;
+
+// Noise of four bytes a sample, in two scales of pages.
+const std::vector<std::byte>& large() {
+  static const std::vector<std::byte> file = [] {
+    constexpr std::array<std::int32_t, 3> kDims{70, 68, 67};
+    std::mt19937 random(1);
+    std::vector<float> samples(std::size_t(kDims[0]) * kDims[1] * kDims[2]);
+    for (float& v : samples) v = std::ldexp(float(random()), -32);
+    Volume volume = testing::volume_of_type(SampleType::f32, kDims, samples);
+    const auto format = choose_value_format(volume, 0);
+    return encode_values(build_value_volume(volume, *format));
+  }();
+  return file;
+}
+
+std::filesystem::path write(const TempDir& folder, const std::vector<std::byte>& bytes) {
+  return folder.file("large.ivm", std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+struct LargeFiles : ::testing::Test {
+  TempDir folder;
+  Memory memory;
+};
+
+TEST_F(LargeFiles, AreOpenedByTheirCoarseScales) {
+  const auto file = write(folder, large());
+  for (const auto& input : {file, file.parent_path()}) {
+    CatalogueWatcher watcher({input}, memory);
+    const auto volume = watcher.load().value().find("large");
+    ASSERT_TRUE(volume);
+    EXPECT_FALSE(volume->is_whole());
+    EXPECT_LT(volume->size(), 50'000U);
+    const auto more = watcher.complete();
+    ASSERT_TRUE(more && *more);
+    const auto whole = (*more)->find("large");
+    EXPECT_TRUE(whole->is_whole());
+    EXPECT_EQ(whole->description(), volume->description());
+    const auto last = watcher.complete();
+    EXPECT_TRUE(last && !*last);
+    EXPECT_FALSE(watcher.poll());
+  }
+}
+
+TEST_F(LargeFiles, AreReadWholeAtOnceWhereThatIsAsked) {
+  const auto file = write(folder, large());
+  EXPECT_TRUE(CatalogueWatcher({file}, memory, true).load().value().find("large")->is_whole()) << "damage would be tolerated";
+  Memory little(std::uint64_t(1) << 30);
+  EXPECT_TRUE(CatalogueWatcher({file}, little).load().value().find("large")->is_whole()) << "it has to fit";
+}
+
+TEST_F(LargeFiles, WhatIsFoundDamagedLaterIsTold) {
+  std::vector<std::byte> bytes = large();
+  testing::damage_page(bytes, testing::page_count(bytes) - 1);
+  const auto file = write(folder, bytes);
+  CatalogueWatcher named({file}, memory);
+  ASSERT_TRUE(named.load());
+  const auto failed = named.complete();
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error().message, HasSubstr("is damaged"));
+  CatalogueWatcher folders({file.parent_path()}, memory);
+  ASSERT_TRUE(folders.load().value().find("large"));
+  const auto rest = folders.complete();
+  ASSERT_TRUE(rest && *rest);
+  EXPECT_FALSE((*rest)->find("large"));
+  EXPECT_FALSE(*folders.complete());
+  bytes = large();
+  testing::damage_page(bytes, 0);
+  write(folder, bytes);
+  EXPECT_FALSE(CatalogueWatcher({file}, memory).load());
+}
+
+TEST_F(LargeFiles, ASessionGoesOnWithTheRest) {
+  const auto server = start();
+  CatalogueWatcher watcher({write(folder, large())}, server->memory());
+  auto coarse = watcher.load().value();
+  const std::uint64_t some = coarse.find("large")->size(), all = coarse.find("large")->description().updates;
+  const std::uint64_t hash = coarse.find("large")->description().content_hash;
+  server->offer(std::move(coarse));
+  RawClient client(server->port());
+  client.send(protocol::Open{"large", "test", protocol::kMaxWindow});
+  protocol::View view{1, {}};
+  view.shown = {{{-1, 2}}, Refine::uniform};
+  view.early = true;
+  client.send(view);
+  EXPECT_EQ(client.expect<protocol::Opened>().description.updates, all);
+  std::uint64_t updates = 0;
+  while (updates < some) updates += client.expect<protocol::Batch>().updates;
+  EXPECT_EQ(updates, some);
+  RawClient other(server->port());
+  other.send(protocol::Open{"large", "test", protocol::kMinCredit, hash});
+  EXPECT_EQ(other.end().code, unsigned(CloseCode::going_away)) << "it may have updates that are not there yet";
+  server->offer(std::move(*watcher.complete().value()));
+  EXPECT_EQ(updates + client.stream_to_end(), all);
+}
+
+}  // namespace
+}  // namespace intervale::large_files

@@ -1,0 +1,210 @@
+// The beginning of a file is the data set as far as to some scale; a session that has begun with it ends as any other.
+#include "common/ivm/coarse_scales.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "client/core/client_session.h"
+#include "common/ivm/extraction.h"
+#include "common/ivm/load_volume.h"
+#include "common/ivm/value_file.h"
+#include "common/mesh/mesh_digest.h"
+#include "common/parallel/all_cores.h"
+#include "common/ranges/extract_meshes.h"
+#include "protocol/codec.h"
+#include "protocol/session/local_worker.h"
+#include "protocol/session/session_state.h"
+#include "server/builder/value_builder.h"
+#include "tests/support/value_fields.h"
+
+namespace intervale::coarse_scaless {
+namespace {
+
+using Dims = std::array<std::int32_t, 3>;
+using SharedVolume = std::shared_ptr<const IntervalVolume>;
+using Bytes = std::vector<std::byte>;
+
+Bytes file_of(const Dims& dims, unsigned seed) {
+  Volume volume = testing::random_value_field(dims, seed).volume;
+  const testing::ValueField field = testing::random_value_field(dims, seed);
+  return encode_values(build_value_volume(volume, field.format), on_all_cores);
+}
+
+std::vector<CoarseScales> scales_of(const Bytes& file) {
+  const auto scales = coarse_scales(std::span(file).first(std::min(file.size(), kStartBytes)), file.size());
+  EXPECT_TRUE(scales) << scales.error().message;
+  return scales ? *scales : std::vector<CoarseScales>();
+}
+
+FileEnds ends_of(const Bytes& file, const CoarseScales& scales) {
+  return {std::span(file).first(scales.first_bytes), std::span(file).last(scales.last_bytes), file.size()};
+}
+
+SharedVolume coarse(const Bytes& file, const CoarseScales& scales) {
+  auto volume = decode_coarse(ends_of(file, scales), scales, "made", on_all_cores);
+  EXPECT_TRUE(volume) << volume.error().message;
+  return std::make_shared<const IntervalVolume>(std::move(*volume));
+}
+
+SharedVolume whole(const Bytes& file) { return std::make_shared<const IntervalVolume>(decode_volume(file, "made", on_all_cores).value()); }
+
+// Of several pages, in two scales that can be had before the rest; and of one that is a page by itself.
+const Bytes& large() {
+  static const Bytes file = file_of({134, 130, 129}, 1);
+  return file;
+}
+
+TEST(CoarseScales, AreTheSameUpdatesAsThoseOfTheWholeFile) {
+  for (const Bytes& file : {large(), file_of({70, 67, 66}, 0), file_of({300, 60, 20}, 4)}) {
+    const SharedVolume all = whole(file);
+    EXPECT_TRUE(all->is_whole());
+    std::uint32_t before = 0;
+    for (const CoarseScales& scales : scales_of(file)) {
+      const SharedVolume some = coarse(file, scales);
+      EXPECT_FALSE(some->is_whole());
+      EXPECT_GT(some->size(), before);
+      before = some->size();
+      EXPECT_EQ(some->description(), all->description());
+      ASSERT_LE(some->set().supercubes(), all->set().supercubes());
+      EXPECT_TRUE(std::ranges::equal(some->set().occupancy(), all->set().occupancy().first(some->set().supercubes())));
+      for (UpdateIndex i{0}; i < some->size(); ++i) {
+        ASSERT_EQ(some->key(i), all->key(i));
+        ASSERT_EQ(some->error(i), all->error(i));
+      }
+      EXPECT_EQ(some->set().of_scale(scales.finest - 1)[0], some->set().bricks().size()) << "no finer scales";
+    }
+    EXPECT_GT(before, 0U);
+  }
+}
+
+TEST(CoarseScales, TheirMeshIsThatOfTheWholeFileWhereNothingFinerIsWanted) {
+  const SharedVolume all = whole(large());
+  for (const CoarseScales& scales : scales_of(large())) {
+    const SharedVolume some = coarse(large(), scales);
+    Lod lod;
+    for (UpdateIndex i{some->size()}; i < all->size(); ++i) lod.error = std::max(lod.error, double(all->error(i)));
+    const ShownRanges shown{{{-0.4, 0.3}, Refine::boundary}};
+    const auto one = extract_meshes(some, shown, lod, {}, on_all_cores), other = extract_meshes(all, shown, lod, {}, on_all_cores);
+    ASSERT_TRUE(one && other);
+    EXPECT_GT((*one)[0].mesh.tets.size(), 0U);
+    EXPECT_EQ(mesh_digest((*one)[0].mesh), mesh_digest((*other)[0].mesh));
+  }
+}
+
+TEST(CoarseScales, AreFewOfTheBytes) {
+  const std::vector<CoarseScales> scales = scales_of(large());
+  ASSERT_EQ(scales.size(), 2U);
+  EXPECT_LT(scales[0].first_bytes + scales[0].last_bytes, large().size() / 20);
+  EXPECT_LT(scales[1].first_bytes + scales[1].last_bytes, large().size() / 4);
+  EXPECT_TRUE(scales_of(file_of({9, 7, 5}, 0)).empty()) << "a single page";
+}
+
+TEST(CoarseScales, RefuseWhatIsDamagedCutShortOrNoFile) {
+  const Bytes file = file_of({70, 67, 66}, 0);
+  const CoarseScales scales = scales_of(file).front();
+  for (std::size_t i = 0; i < scales.first_bytes; i += i < 700 ? 3 : 1997) {
+    Bytes changed = file;
+    changed[i] ^= std::byte(1 << i % 8);
+    EXPECT_FALSE(decode_coarse(ends_of(changed, scales), scales, "changed")) << "byte " << i;
+  }
+  for (std::size_t i = 1; i <= scales.last_bytes; i += 5) {
+    Bytes changed = file;
+    changed[file.size() - i] ^= std::byte(1);
+    EXPECT_FALSE(decode_coarse(ends_of(changed, scales), scales, "changed")) << "byte " << i << " from the end";
+  }
+  CoarseScales less = scales;
+  --less.first_bytes;
+  EXPECT_FALSE(decode_coarse(ends_of(file, less), scales, "short"));
+  less = scales;
+  --less.last_bytes;
+  EXPECT_FALSE(decode_coarse(ends_of(file, less), scales, "short"));
+  EXPECT_FALSE(decode_coarse({std::span(file), std::span(file), file.size()}, scales, "long"));
+  EXPECT_FALSE(coarse_scales(std::span(file).first(kStartBytes), file.size() - 1));
+  EXPECT_FALSE(coarse_scales(std::span(file).first(20), file.size()));
+  EXPECT_FALSE(coarse_scales({}, 0));
+  EXPECT_TRUE(scales_of(Bytes(file.begin(), file.end())).size() == 1);
+  const auto within = coarse_scales(std::span(file).first(600), file.size());
+  EXPECT_TRUE(within && within->empty()) << "the index is not there";
+}
+
+// A client and the sending side, which has begun with coarse scales.
+struct GrowingSession {
+  explicit GrowingSession(SharedVolume volume) : found(std::move(volume)) { client.connected({}); }
+
+  // Until nothing is left to do, or so many messages were sent to the client.
+  void run(int messages = 1 << 20) {
+    while (messages > 0) {
+      for (const auto& bytes : client.take_messages()) {
+        const auto message = protocol::decode_client_message(bytes);
+        ASSERT_TRUE(message);
+        const auto fault = server.receive(*message);
+        ASSERT_FALSE(fault) << fault->text;
+      }
+      const auto message = server.next();
+      if (!message) {
+        if (server.has_work() || (server.waits() && worker.work())) continue;
+        return;
+      }
+      ASSERT_TRUE(client.receive(protocol::encode(*message), {}));
+      --messages;
+    }
+  }
+
+  SharedVolume found;
+  LocalWorker worker;
+  SessionState server{[this](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return found; }, worker};
+  ClientSession client{{.dataset = "made", .client = "test"}};
+};
+
+ViewRequest view_of(const Range& range, double pixels) {
+  ViewRequest view;
+  view.lod.camera = Camera{.eye = {150, 130, 125}, .look_at = {33, 32, 32}, .viewport = {640, 480}, .pixel_error = pixels};
+  view.shown = {{range}, Refine::boundary};
+  view.early = true;
+  return view;
+}
+
+TEST(CoarseScales, ASessionThatBeginsWithThemEndsWithTheMeshOfTheWholeFile) {
+  const Bytes file = file_of({70, 67, 66}, 1);
+  const SharedVolume all = whole(file);
+  std::vector<SharedVolume> growing;
+  for (const CoarseScales& scales : scales_of(file)) growing.push_back(coarse(file, scales));
+  ASSERT_EQ(growing.size(), 1U);
+  growing.push_back(all);
+  for (const bool uses_camera : {true, false}) {
+    ViewRequest view = view_of({1.25, kInf}, 1);
+    if (!uses_camera) view.lod = {.error_percent = 2};
+    GrowingSession at_once(all);
+    ASSERT_TRUE(at_once.client.look(view));
+    at_once.run();
+    ASSERT_EQ(at_once.client.state(), ClientSession::State::idle);
+    for (const int messages : {1, 1 << 20}) {
+      GrowingSession session(growing[0]);
+      ASSERT_TRUE(session.client.look(view));
+      std::uint64_t before = 0;
+      for (const SharedVolume& volume : growing) {
+        session.found = volume;
+        session.run(volume == all ? 1 << 20 : messages);
+        if (messages == 1) continue;  // that the data set was opened is the first
+        EXPECT_GT(session.client.mesh()->updates(), before) << "each scale more shows more";
+        before = session.client.mesh()->updates();
+        EXPECT_EQ(session.client.state() == ClientSession::State::idle, volume == all) << "Done comes from the whole data set";
+      }
+      EXPECT_EQ(session.client.state(), ClientSession::State::idle);
+      EXPECT_EQ(session.client.mesh()->description().updates, all->size());
+      ViewRequest rest = view;  // what is sent by estimates may differ, but not all of it
+      rest.lod = {.error = 0};
+      for (GrowingSession* each : {&session, &at_once}) {
+        ASSERT_TRUE(each->client.look(rest));
+        each->run();
+      }
+      EXPECT_EQ(mesh_digest(session.client.mesh()->mesh()), mesh_digest(at_once.client.mesh()->mesh()));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace intervale::coarse_scaless
