@@ -18,8 +18,8 @@
 namespace intervale::large_files {
 namespace {
 
-using ::testing::HasSubstr;
 using protocol::CloseCode;
+using ::testing::HasSubstr;
 
 // Noise of four bytes a sample, in two scales of pages.
 const std::vector<std::byte>& large() {
