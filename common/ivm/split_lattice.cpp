@@ -10,6 +10,7 @@ SplitLattice::Tables SplitLattice::make_tables() {
     const std::array<int, 3> c{int(type & 3), int(type >> 2 & 3), int(type >> 4 & 3)};
     const auto point = [&c](Offset to) { return Point(point_of(c[0] + to.x, c[1] + to.y, c[2] + to.z)); };
     t.centre[slot] = point({});
+    for (std::size_t axis = 0; axis < 3; ++axis) t.at[axis][std::size_t(c[axis])] |= std::uint64_t(1) << slot;
     for (std::size_t v = 0; v < kMaxVertices; ++v) t.vertex[slot][v] = point(row.vertex[v < row.vertices ? v : 0]);
     for (std::size_t k = 0; k < kMaxParents; ++k) {
       const Offset to = row.parent[k < row.parents ? k : 0];
@@ -155,6 +156,7 @@ void SplitLattice::move_to(const SlotGroup& group) {
 }
 
 std::uint64_t SplitLattice::splittable(std::uint64_t slots) {
+  border_ = 0;
   const std::uint64_t ready = is_interior_ ? splittable_inside(slots) : splittable_at_border(slots);
   for (const unsigned n : {3u, 5u, 6u}) {
     if ((ready & tables_.users[n]) != 0) load_neighbour(finder_, place_, n, -1, keys_);
@@ -183,9 +185,10 @@ std::uint64_t SplitLattice::splittable_at_border(std::uint64_t slots) {
     squeezed[0][std::size_t(i)] = on_axis(0, p.x);
     squeezed[1][std::size_t(i)] = on_axis(1, p.y);
     squeezed[2][std::size_t(i)] = on_axis(2, p.z);
+    for (std::size_t axis = 0; axis < 3; ++axis) border_ |= squeezed[axis][std::size_t(i)] != 0 ? t.at[axis][std::size_t(i)] : 0;
   }
-  std::uint64_t ready = 0;
-  for (const Slot slot : set_bits<Slot>(slots)) {
+  std::uint64_t ready = splittable_inside(slots & ~border_);
+  for (const Slot slot : set_bits<Slot>(slots & border_)) {
     const unsigned type = kTypeOfSlot[slot];
     const DiamondType& row = diamond_type(type);
     const std::array<unsigned, 3> here{squeezed[0][type & 3], squeezed[1][type >> 2 & 3], squeezed[2][type >> 4 & 3]};

@@ -45,7 +45,7 @@ class SplitLattice {
       keys[v] = keys_[vertex[v]];
       span.add(keys[v]);
     }
-    if (is_interior_) return span;
+    if ((border_ >> slot & 1) == 0) return span;
     replace_missing(slot, keys);
     return span_of<Class>(keys);
   }
@@ -66,7 +66,8 @@ class SplitLattice {
     std::array<std::array<Point, kMaxParents>, kSlots> parent{};
     std::array<std::array<std::uint8_t, kMaxParents>, kSlots> parent_vertex{};  // its local number
     std::array<std::uint64_t, 8> behind{}, ahead{};
-    std::array<std::uint64_t, 8> users{};  // by neighbour behind: slots of diamonds with a vertex in it
+    std::array<std::array<std::uint64_t, 4>, 3> at{};  // by axis and coordinate of the centre: slots
+    std::array<std::uint64_t, 8> users{};              // by neighbour behind: slots of diamonds with a vertex in it
   };
   [[nodiscard]] static Tables make_tables();
   [[nodiscard]] static const Tables& tables();
@@ -98,7 +99,8 @@ class SplitLattice {
   SupercubePlace place_;  // of the supercube
   bool is_interior_ = false;
   ParentTable::Words parents_{};               // split slots of classes 0 and 1
-  std::array<std::uint32_t, kSlots> exist_{};  // at the border, by slot: the vertices that exist, a bit each
+  std::uint64_t border_ = 0;                   // slots of diamonds that reach the border of the box, or beyond
+  std::array<std::uint32_t, kSlots> exist_{};  // of those: the vertices that exist, a bit each
   Keys keys_{};
 };
 
