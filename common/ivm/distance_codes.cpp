@@ -12,7 +12,7 @@ namespace {
 // Codes an octave, the code of a ratio of 1, and the code without a bound. Both near and far ratios go from 2^-12 to
 // 2^20.
 constexpr int kNearSteps = 6, kNearOne = 72, kNoBound = 191;
-constexpr int kFarSteps = 2, kFarOne = 216, kFirstFar = 192, kNoBoundFar = 255;
+constexpr int kFarSteps = 2, kFarOne = 216, kNoBoundFar = 255;
 
 constexpr int kDistanceSteps = 8;  // an octave
 
@@ -41,8 +41,6 @@ ErrorToDistance ErrorToDistance::farther(ErrorToDistance a, ErrorToDistance b, i
   const int near = b.code_ == kNoBoundFar ? kNoBound : kNearOne + kSteps * (b.code_ - kFarOne);
   return ErrorToDistance(std::uint8_t(std::clamp<int>(near, a.code_, kNoBound)));
 }
-
-bool ErrorToDistance::is_far() const { return code_ >= kFirstFar; }
 
 float ErrorToDistance::ratio(float unit) const {
   if (code_ == 0) return 0;

@@ -21,10 +21,11 @@ class ErrorToDistance {
   // The least code by which errors of diamonds of this scale move surfaces as far as by each of both, with their bounds.
   static ErrorToDistance farther(ErrorToDistance a, ErrorToDistance b, int scale);
   [[nodiscard]] std::uint8_t code() const { return code_; }
-  [[nodiscard]] bool is_far() const;
+  [[nodiscard]] bool is_far() const { return code_ >= kFirstFar; }
   [[nodiscard]] float ratio(float unit) const;  // the largest float where no bound is known
 
  private:
+  static constexpr int kFirstFar = 192;
   std::uint8_t code_ = 0;
 };
 

@@ -60,22 +60,15 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick) const {
   b.weight_ = weight_of(region, b.scale_, b.pixels_, b.is_exact_);
   b.is_seen_ = !is_hidden(region);
   b.bound_ = 1;
-  b.bound_ = b.bound(step, all.object_error, all.slope);
+  b.bound_ = b.bound({.step = step, .object_error = all.object_error, .slope = all.slope});
   return b;
 }
 
-Ranking::Rank Ranking::Brick::bound(unsigned step, float object_error, unsigned slope) const {
-  if (bound_ == 0 || step < ranking_->least_step_) return 0;
-  if (!ranking_->screen_) return Rank(step + 1);
-  const float pixels = object_error * pixels_;
-  return pixels > ranking_->pixel_error_ ? rank_of(ranking_->importance_of(pixels, slope, weight_), is_seen_) : Rank(0);
-}
-
-Ranking::BrickBounds::Bound Ranking::BrickBounds::operator()(BrickIndex brick, unsigned step, float object_error, unsigned slope) {
+Ranking::BrickBounds::Bound Ranking::BrickBounds::operator()(BrickIndex brick, const Left& left) {
   const Ranking& r = ranking_;
   if (!r.screen_ || r.roi_) {
     const Brick b = r.of_brick(brick);
-    return {b.bound(step, object_error, slope), r.screen_ ? b.pixels(object_error) : 0, true};
+    return {b.bound(left), r.screen_ ? b.pixels(left.object_error) : 0, true};
   }
   constexpr std::size_t kBlock = ScreenError::Regions::kBlock;
   const std::size_t i = brick % kBlock;
@@ -84,11 +77,12 @@ Ranking::BrickBounds::Bound Ranking::BrickBounds::operator()(BrickIndex brick, u
     now_ = r.screen_->bounds(r.volume_.brick_regions(), block_);
     if (r.ahead_) soon_ = r.ahead_->bounds(r.volume_.brick_regions(), block_);
   }
-  const float pixels = std::clamp(object_error * now_.pixels[i], kLeastImportance, kMostImportance);
-  if (step < r.least_step_ || !(pixels > r.pixel_error_)) return {0, pixels, true};
+  const float pixels = std::clamp(left.object_error * now_.pixels[i], kLeastImportance, kMostImportance);
+  if (left.step < r.least_step_ || !(pixels > r.pixel_error_)) return {0, pixels, true};
   const int scale = scale_of_key(r.volume_.set().bricks()[brick].key);
   double weight = r.whole_weight(scale, double(now_.pixels[i])) * double(now_.share[i]);
   if (r.ahead_) weight = std::max(weight, r.whole_weight(scale, double(soon_.pixels[i])) * double(soon_.share[i]));
+  const unsigned slope = left.slope_of_wanted(now_.pixels[i], r.pixel_error_);
   return {rank_of(r.importance_of(pixels, slope, clamp_weight(weight)), true), pixels, false};
 }
 

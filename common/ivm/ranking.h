@@ -92,13 +92,36 @@ class Ranking {
     bool is_seen_ = true;
   };
 
+  // Upper bounds over updates that are left. slope: of those whose object errors are above the limit; slope_below: of the
+  // others. While these are hardly wanted, with object errors of at most kHardly times what is wanted, they come last, however
+  // steep they are.
+  struct Left {
+    static constexpr float kHardly = 1.7F;
+    unsigned step = 0;
+    float object_error = 0;
+    unsigned slope = 0;
+    float limit = 0;
+    unsigned slope_below = 0;
+    // pixels: of one world unit, at most. pixel_error: what is above is wanted.
+    [[nodiscard]] unsigned slope_of_wanted(float pixels, float pixel_error) const {
+      return limit * pixels > kHardly * pixel_error ? std::max(slope, slope_below) : slope;
+    }
+  };
+
   // Ranks the supercubes of one brick.
   class Brick {
    public:
-    // No lower than the rank of any update here; the same, if only updates with no higher error step or slope and no larger
-    // object error remain.
+    // No lower than the rank of any update here; the same, if only these remain.
     [[nodiscard]] Rank bound() const { return bound_; }
-    [[nodiscard]] Rank bound(unsigned step, float object_error, unsigned slope) const;
+    [[nodiscard]] Rank bound(const Left& left) const {
+      if (bound_ == 0 || left.step < ranking_->least_step_) return 0;
+      if (!ranking_->screen_) return Rank(left.step + 1);
+      const float pixels = left.object_error * pixels_;
+      if (!(pixels > ranking_->pixel_error_)) return 0;
+      return rank_of(ranking_->importance_of(pixels, left.slope_of_wanted(pixels_, ranking_->pixel_error_), weight_), is_seen_);
+    }
+    // With a camera: about the largest object error that is not wanted here.
+    [[nodiscard]] float unwanted() const { return ranking_->pixel_error_ / pixels_; }
     [[nodiscard]] Supercube supercube(SupercubeIndex supercube, SupercubeKey key) const;
     // With a camera: no less than the deviation in pixels of any update here whose object error is no larger, or 2^100.
     // Above 0.
@@ -123,13 +146,13 @@ class Ranking {
    public:
     // ranking: must outlive it.
     explicit BrickBounds(const Ranking& ranking) : ranking_(ranking) {}
-    // Of its updates with no higher error step or slope and no larger object error.
     struct Bound {
       Rank rank = 0;
       float pixels = 0;       // as Brick::pixels(); 0 without a camera
       bool is_exact = false;  // Brick::bound() is the same
     };
-    [[nodiscard]] Bound operator()(BrickIndex brick, unsigned step, float object_error, unsigned slope);
+    // Of its updates that are left.
+    [[nodiscard]] Bound operator()(BrickIndex brick, const Left& left);
 
    private:
     const Ranking& ranking_;

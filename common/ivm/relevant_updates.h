@@ -83,6 +83,11 @@ class RelevantUpdates {
   [[nodiscard]] float object_error(ErrorToDistance to_distance, int scale, unsigned step) const {
     return std::min(error_[step] * factor_[to_distance.code()], reach_ * (to_distance.is_far() ? kMaxFarDeviation : float(1 << scale)));
   }
+  // The greatest distance that has a code and is no larger.
+  [[nodiscard]] std::uint8_t code_below(float distance) const {
+    return std::uint8_t(std::upper_bound(distance_of_.begin() + 1, distance_of_.end(), distance) - distance_of_.begin() - 1);
+  }
+  [[nodiscard]] float distance(std::uint8_t code) const { return distance_of_[code]; }
   [[nodiscard]] bool has_distances() const { return known_.distances; }  // of updates
   [[nodiscard]] bool has_slopes() const { return known_.slopes; }
   [[nodiscard]] bool may_be_far() const { return known_.far; }

@@ -1,6 +1,8 @@
 #include "common/selection/stream_plan.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <boost/unordered/unordered_flat_map.hpp>
 #include <boost/unordered/unordered_flat_set.hpp>
 
@@ -12,6 +14,7 @@ namespace intervale {
 namespace {
 
 constexpr std::uint32_t kFindVisits = 1 << 12;  // finding what a brick needs takes as long as so many visits
+constexpr std::uint32_t kBrickVisits = 32;      // and looking at a brick's bounds, as so many
 
 }  // namespace
 
@@ -70,38 +73,11 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
     Pending& pending = pending_[b];
     const RelevantUpdates::Bound& bound = relevant_->bound(b);
     const unsigned all = set.updates(b), left = bound.updates == 0 ? 0 : all - sent_.count(set.bricks()[b].first, all);
-    pending.unsent = std::uint16_t(std::min<unsigned>(bound.updates, left));
-    pending.error_step = bound.error_step;
-    pending.slope = bound.slope;
-    pending.object_error = Up16(bound.object_error);
+    pending.set_unsent(std::min<unsigned>(bound.updates, left));
+    pending.raise_to({bound.error_step, 0, bound.slope, 0}, bound.object_error);
   }
   highest_steps_ = SparseArray<std::uint16_t>(set.supercubes());
   highest_distances_ = SparseArray<std::uint8_t>(relevant_->has_distances() ? set.supercubes() : 0);
-}
-
-StreamPlan::InBrick StreamPlan::in_brick(BrickIndex brick, SupercubeIndex s) const {
-  return {relevant_->brick(brick), s - volume_->set().bricks()[brick].first_supercube};
-}
-
-StreamPlan::Highest StreamPlan::of_update(const InBrick& in, UpdateIndex i, int before) const {
-  return {std::uint8_t(volume_->error_step(i)), in.needs.distance(in.number, before), in.needs.slope(in.number, before)};
-}
-
-StreamPlan::Highest StreamPlan::of_relevant(const InBrick& in) {
-  return {in.needs.error_step(in.number), in.needs.distance(in.number), in.needs.slope(in.number)};
-}
-
-StreamPlan::Highest StreamPlan::highest(const InBrick& in, SupercubeIndex s) const {
-  const auto steps = highest_steps_.find(s);
-  if (!steps) return of_relevant(in);
-  const std::uint8_t distance = relevant_->has_distances() ? highest_distances_.find(s).value_or(0) : std::uint8_t(0);
-  return {std::uint8_t(*steps >> 8), distance, std::uint8_t(*steps)};
-}
-
-void StreamPlan::set_highest(const InBrick& in, SupercubeIndex s, Highest to) {
-  if (!highest_steps_.find(s) && to == of_relevant(in)) return;
-  highest_steps_.set(s, std::uint16_t(to.error_step << 8 | to.slope));
-  if (relevant_->has_distances()) highest_distances_.set(s, to.distance);
 }
 
 void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* ahead) {
@@ -112,67 +88,6 @@ void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* a
   }
   ranking_.emplace(*volume_, *relevant_, lod, hidden, ahead);
   rank_bricks();
-}
-
-// Bricks are ranked by bounds that are found fast. Those that come first are ranked again, as well as can be.
-void StreamPlan::rank_bricks() {
-  Ranking::BrickBounds bounds(*ranking_);
-  for (BrickIndex b{0}; b < pending_.size(); ++b) {
-    Pending& w = pending_[b];
-    if (w.unsent == 0) continue;
-    const auto bound = bounds(b, w.error_step, float(w.object_error), w.slope);
-    w.pixels = Up16(bound.pixels);
-    is_loose_[b] = !bound.is_exact;
-    set_pending(b, std::max(bound.rank, budget_ ? Rank(1) : Rank(0)), w.unsent);
-  }
-  begin_band();
-}
-
-void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
-  const Pending& w = pending_[brick];
-  is_loose_[brick] = false;
-  const Rank exact = ranking.bound(w.error_step, float(w.object_error), w.slope);
-  set_pending(brick, std::min(w.rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), w.wanted);
-}
-
-void StreamPlan::set_pending(BrickIndex brick, Rank rank, unsigned wanted) {
-  Pending& w = pending_[brick];
-  if (w.unsent == 0) rank = 0;
-  wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, w.unsent);
-  wanted_count_ += wanted - std::uint64_t(w.wanted);
-  pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(w.rank != 0);
-  w.rank = rank;
-  w.wanted = std::uint16_t(wanted);
-}
-
-void StreamPlan::begin_band() {
-  next_brick_ = std::uint32_t(pending_.size());
-  Rank top = 0;
-  for (std::uint32_t next = next_brick_; next != 0; --next) {  // coarse ones have high ranks, so that few others are refined
-    const BrickIndex b(next - 1);
-    if (pending_[b].rank > top && is_loose_[b]) refine(b, ranking_->of_brick(b));
-    top = std::max(top, pending_[b].rank);
-  }
-  band_ = top == 0 ? Rank(0) : ranking_->band_below(top);
-}
-
-StreamPlan::Remaining StreamPlan::remaining() const {
-  Rank top = 0;
-  for (const Pending& w : pending_) top = std::max(top, w.rank);
-  Remaining remaining{wanted_count_, 0, 0};
-  if (top == 0) return remaining;
-  if (!ranking_->has_camera()) {
-    remaining.error = ranking_->error(top);
-    return remaining;
-  }
-  unsigned error_step = 0;
-  for (const Pending& w : pending_) {
-    if (w.rank == 0) continue;
-    error_step = std::max(error_step, unsigned(w.error_step));
-    remaining.pixels = std::max(remaining.pixels, double(float(w.pixels)));
-  }
-  remaining.error = volume_->error_steps()[error_step];
-  return remaining;
 }
 
 // Adds an update after its missing ancestors. around: of its supercube; those of the ancestors are cached in the
@@ -226,7 +141,7 @@ void StreamPlan::put(const SlotGroup& updates, BatchBuilder& builder) {
   builder.put(updates, count);
   sent_count_ += count;
   Pending& w = pending_[updates.brick];
-  w.unsent = std::uint16_t(w.unsent - count);
+  w.set_unsent(w.unsent - count);
   if (w.wanted > w.unsent) set_pending(updates.brick, w.rank, w.unsent);
 }
 
@@ -239,63 +154,62 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   const SupercubeSet& set = volume_->set();
   const Ranking::Brick ranking = ranking_->of_brick(brick);
   if (is_loose_[brick]) refine(brick, ranking);
-  if (pending_[brick].rank < band_) return true;
+  Pending& pending = pending_[brick];
+  if (pending.rank < band_) return true;
   if (!relevant_->is_found(brick)) builder.visited += kFindVisits;
   const BrickNeeds& needs = relevant_->brick(brick);
+  std::array<Highest, kBrick> highest = highest_of(brick, needs);
+  if (ranking_->has_camera()) move_limit(brick, ranking, highest);
+  const int scale = scale_of_key(set.bricks()[brick].key);
+  const Rank least = budget_ ? Rank(1) : Rank(0);  // ancestors in the budget come last
   Unsent rest;
   float object_error = 0;
   bool full = false;
-  InBrick in{needs, 0};
+  InBrick in{needs, 0, scale, relevant_->distance(pending.limit)};
+  builder.visited += kBrickVisits;
   set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     if (full) return;
+    const std::size_t n = in.number++;
+    const Highest& all = highest[n];
+    const float farthest = relevant_->object_error(needs.to_distance(n), scale, all.error_step, all.distance);
+    const Rank bound = std::max(ranking.bound({all.error_step, farthest, all.slope}), least);
+    const std::uint64_t occupancy = set.occupancy()[s], relevant = needs.slots(n, occupancy);
+    if (bound < band_ && ranking_->has_camera()) {  // most of them: what was sent is not even looked up
+      rest.raise({bound, bound == 0 ? 0 : unsigned(std::popcount(relevant)), all});
+      object_error = std::max(object_error, farthest);
+      return;
+    }
     ++builder.visited;
     const UpdateIndex first = set.first(brick, s);
-    const std::uint64_t occupancy = set.occupancy()[s], relevant = needs.slots(in.number, occupancy);
     const std::uint64_t unsent = ~sent_.some(first, unsigned(std::popcount(occupancy))) & extract_bits(relevant, occupancy);
-    if (unsent != 0) {
-      const auto here = visit_supercube(ranking, in, {key, brick, s, {}, first}, unsent, builder);
-      full = !here;
-      if (full) return;
-      rest.rank = std::max(rest.rank, here->rank);
-      rest.wanted += here->wanted;
-      rest.unsent += here->unsent;
-      rest.highest.raise(here->highest);
-      object_error = std::max(
-          object_error, relevant_->object_error(needs.to_distance(in.number), scale_of_key(key), here->highest.error_step, here->highest.distance));
-    }
-    ++in.number;
+    if (unsent == 0) return;
+    const auto here = visit_supercube(ranking, {needs, n, scale, in.limit}, {key, brick, s, {}, first}, unsent, all, builder);
+    full = !here;
+    if (full) return;
+    rest.raise(*here);
+    object_error = std::max(object_error, relevant_->object_error(needs.to_distance(n), scale, here->highest.error_step, here->highest.distance));
   });
   if (full) return false;
-  pending_[brick].unsent = std::uint16_t(std::min<unsigned>(pending_[brick].unsent, rest.unsent));
-  set_pending(brick, rest.rank, rest.wanted);
-  pending_[brick].error_step = rest.highest.error_step;
-  pending_[brick].slope = rest.highest.slope;
-  pending_[brick].object_error = Up16(object_error);
-  if (ranking_->has_camera()) pending_[brick].pixels = Up16(ranking.pixels(object_error));
+  // What was not looked up may have been sent; but bounds do not grow.
+  pending.set_unsent(std::min<unsigned>(pending.unsent, needs.updates()));
+  set_pending(brick, rest.rank, std::min<unsigned>(pending.wanted, rest.wanted));
+  pending.lower_to(rest.highest, object_error);
+  if (ranking_->has_camera()) pending.pixels = Up16(ranking.pixels(float(pending.object_error)));
   return true;
 }
 
 // Adds the updates of a supercube that belong to the band, if it may have any. first: its first update. unsent: a bit
-// for each of its updates, in their order. nullopt if the batch is full first.
+// for each of its updates, in their order. highest: of those. nullopt if the batch is full first.
 std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Brick& brick, const InBrick& in, const Place& first,
-                                                              std::uint64_t unsent, BatchBuilder& builder) {
+                                                              std::uint64_t unsent, const Highest& highest, BatchBuilder& builder) {
   const SupercubeIndex s = first.supercube;
   const std::uint64_t occupancy = volume_->set().occupancy()[s];
   const auto count = unsigned(std::popcount(occupancy));
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
-  Unsent rest{.unsent = unsigned(std::popcount(unsent)), .highest = highest(in, s)};
+  Unsent rest{.highest = highest};
   if (candidates == 0) return rest;
-  // Ancestors in the budget come last.
-  const Rank least = budget_ ? Rank(1) : Rank(0);
-  const Highest& all = rest.highest;
-  const float object_error = relevant_->object_error(in.needs.to_distance(in.number), scale_of_key(first.key), all.error_step, all.distance);
-  if (const Rank most = std::max(brick.bound(all.error_step, object_error, all.slope), least); most < band_) {
-    rest.rank = most;
-    rest.wanted = most == 0 ? 0 : unsigned(std::popcount(candidates));
-    return rest;
-  }
   const Ranking::Supercube ranking = brick.supercube(s, first.key);
-  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.distance, rest.highest.slope), least);
+  const Rank bound = std::max(ranking.bound(highest.error_step, highest.distance, highest.slope), budget_ ? Rank(1) : Rank(0));
   if (bound < band_) {
     rest.rank = bound;
     rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
@@ -305,7 +219,6 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   rest = {};
   if (!add_band(ranking, in, first, candidates, builder, rest)) return {};
   const std::uint64_t others = unsent & ~candidates, relevant = in.needs.slots(in.number, occupancy);
-  rest.unsent += unsigned(std::popcount(others));
   auto number = set_bits(others).begin();
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(others, occupancy))) {
     rest.highest.raise(of_update(in, first.index + *number, count_below(relevant, slot)));
@@ -330,7 +243,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
     const Highest own = of_update(in, first + *number, count_below(relevant, slot));
     ++number;
-    float importance = ranking.importance(own.error_step, own.distance, own.slope);
+    float importance = ranking.importance(own.error_step, own.distance, std::max(own.slope, own.slope_below));
     if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;
     importance = std::max(importance, least);
     const bool is_in_it = importance > 0 && importance >= in_band;
@@ -341,7 +254,6 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
   }
   rest.highest = highest;
   rest.wanted = wanted;
-  rest.unsent = unsigned(std::popcount(candidates) - std::popcount(in_it.slots));
   rest.rank = ranking.rank(greatest);
   if (in_it.slots == 0 || add_all(in_it, builder)) return true;
   builder.around.move_to(place.key);  // the batch is nearly full: one at a time

@@ -9,11 +9,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/diamond/split_set.h"
@@ -129,36 +131,58 @@ class StreamPlan {
     explicit Up16(float value) : bits(std::uint16_t((bits_as<std::uint32_t>(value) + 0xffff) >> 16)) {}
     explicit operator float() const { return bits_as<float>(std::uint32_t(bits) << 16); }
   };
-  // The unsent relevant updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
-  struct Pending {
-    Rank rank = 0;             // of those that are wanted; 0: there are none
-    std::uint16_t unsent = 0;  // at most so many
-    std::uint16_t wanted = 0;  // bound on the number of those that are wanted
-    std::uint8_t error_step = 0, slope = 0;
-    Up16 object_error;
-    Up16 pixels;  // on the camera's screen; 0 without one
-  };
-  void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
-  // Upper bounds on the error steps, distances and slopes of unsent updates.
+  // Upper bounds on the error steps, distances and slopes of unsent updates. slope_below: of those whose object errors are
+  // not above the brick's limit; the other slope may be of any.
   struct Highest {
-    std::uint8_t error_step = 0, distance = 0, slope = 0;
+    std::uint8_t error_step = 0, distance = 0, slope = 0, slope_below = 0;
     void raise(const Highest& other) {
       error_step = std::max(error_step, other.error_step);
       distance = std::max(distance, other.distance);
       slope = std::max(slope, other.slope);
+      slope_below = std::max(slope_below, other.slope_below);
     }
     friend bool operator==(const Highest&, const Highest&) = default;
   };
+  // The unsent relevant updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
+  struct Pending {
+    Rank rank = 0;                  // of those that are wanted; 0: there are none
+    std::uint16_t unsent : 12 = 0;  // at most so many
+    std::uint16_t slope : 4 = 0;
+    std::uint16_t wanted : 12 = 0;  // bound on the number of those that are wanted
+    std::uint16_t slope_below : 4 = 0;
+    std::uint8_t error_step = 0;
+    std::uint8_t limit = 0;  // a code: `slope` is of those whose object errors are above its distance
+    Up16 object_error;
+    Up16 pixels;  // on the camera's screen; 0 without one
+    void set_unsent(unsigned count) { unsent = count & 0xfffU; }
+    void raise_to(const Highest& highest, float object_error);
+    void lower_to(const Highest& highest, float object_error);
+  };
+  static_assert(sizeof(Pending) == 12);
+  [[nodiscard]] Ranking::Left left(const Pending& pending) const {
+    return {pending.error_step, float(pending.object_error), pending.slope, relevant_->distance(pending.limit), pending.slope_below};
+  }
   // A supercube, and what its brick needs.
   struct InBrick {
     const BrickNeeds& needs;
     std::size_t number = 0;  // of the supercube in the brick
+    int scale = 0;
+    float limit = 0;  // of the brick
   };
+  void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
   [[nodiscard]] InBrick in_brick(BrickIndex brick, SupercubeIndex s) const;
   // before: relevant updates of the supercube with lower numbers.
-  [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, int before) const;
+  [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, int before) const {
+    Highest own{std::uint8_t(volume_->error_step(i)), in.needs.distance(in.number, before), in.needs.slope(in.number, before)};
+    const float error = relevant_->object_error(in.needs.to_distance(in.number), in.scale, own.error_step, own.distance);
+    if (error <= in.limit) std::swap(own.slope, own.slope_below);
+    return own;
+  }
   [[nodiscard]] static Highest of_relevant(const InBrick& in);
   [[nodiscard]] Highest highest(const InBrick& in, SupercubeIndex s) const;
+  static constexpr std::size_t kBrick = 64;  // most supercubes of one
+  [[nodiscard]] std::array<Highest, kBrick> highest_of(BrickIndex brick, const BrickNeeds& needs) const;
+  void move_limit(BrickIndex brick, const Ranking::Brick& ranking, std::array<Highest, kBrick>& highest);
   void set_highest(const InBrick& in, SupercubeIndex s, Highest to);
   void rank_bricks();
   // Lowers a loose rank to that which Ranking::of_brick() tells.
@@ -167,12 +191,17 @@ class StreamPlan {
   // Upper bounds over updates that were visited and not sent.
   struct Unsent {
     Rank rank = 0;
-    unsigned wanted = 0, unsent = 0;
+    unsigned wanted = 0;
     Highest highest;
+    void raise(const Unsent& other) {
+      rank = std::max(rank, other.rank);
+      wanted += other.wanted;
+      highest.raise(other.highest);
+    }
   };
   bool visit_brick(BrickIndex brick, BatchBuilder& builder);
   std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const InBrick& in, const Place& first, std::uint64_t unsent,
-                                        BatchBuilder& builder);
+                                        const Highest& highest, BatchBuilder& builder);
   bool add_band(const Ranking::Supercube& ranking, const InBrick& in, const Place& place, std::uint64_t candidates, BatchBuilder& builder,
                 Unsent& rest);
   bool add_with_ancestors(const Place& place, SetNeighbours& around, BatchBuilder& builder);
@@ -187,8 +216,8 @@ class StreamPlan {
   SplitSet sent_;
   std::vector<Pending> pending_;  // by brick
   std::vector<bool> is_loose_;    // by brick: its rank may be much too high; see refine()
-  // Highest of supercubes, where it is not that of their relevant updates: error step * 256 + slope; and distance, if
-  // distances are known.
+  // Highest of supercubes, where it is not that of their relevant updates: error step * 256 + slope_below * 16 + slope; and
+  // distance, if distances are known.
   SparseArray<std::uint16_t> highest_steps_;
   SparseArray<std::uint8_t> highest_distances_;
   std::vector<SentChannel> channels_;         // of the data set

@@ -16,9 +16,9 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   if (added == 0) return true;
   sent_.insert(first, occupancy, added);
   sent_count_ += std::uint64_t(std::popcount(added));
-  std::uint16_t& unsent = pending_[found->brick].unsent;
+  Pending& pending = pending_[found->brick];
   const InBrick in = in_brick(found->brick, found->supercube);
-  unsent = std::uint16_t(unsent - std::popcount(added & in.needs.slots(in.number, occupancy)));
+  pending.set_unsent(pending.unsent - unsigned(std::popcount(added & in.needs.slots(in.number, occupancy))));
   return true;
 }
 
@@ -34,7 +34,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   }
   SetNeighbours around(set);
   const auto sent_slots = [this](const SetFinder::Found& found) { return found.occupancy == 0 ? 0 : sent_.slots(found.first, found.occupancy); };
-  merge_finest_first(groups, around, sent_slots, [&](const SlotGroup& g, Slot slot) {
+  merge_finest_first(groups, around, sent_slots, [&](const SlotGroup&, Slot slot) {
     const SetFinder::Found& here = around.at(kHere);
     const UpdateIndex i = here.index(slot);
     sent_.erase(i);
@@ -49,12 +49,9 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const std::uint64_t relevant = in.needs.slots(in.number, here.occupancy);
     if ((relevant >> slot & 1) == 0) return;
     Pending& pending = pending_[here.brick];
-    ++pending.unsent;
+    pending.set_unsent(pending.unsent + 1);
     const Highest again = of_update(in, i, count_below(relevant, slot));
-    pending.error_step = std::max(pending.error_step, again.error_step);
-    pending.slope = std::max(pending.slope, again.slope);
-    pending.object_error = Up16(std::max(float(pending.object_error), relevant_->object_error(in.needs.to_distance(in.number), scale_of_key(g.key),
-                                                                                              again.error_step, again.distance)));
+    pending.raise_to(again, relevant_->object_error(in.needs.to_distance(in.number), in.scale, again.error_step, again.distance));
     Highest highest = this->highest(in, here.supercube);
     highest.raise(again);
     set_highest(in, here.supercube, highest);

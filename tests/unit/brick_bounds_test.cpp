@@ -1,6 +1,7 @@
 // Bounds that are found for many bricks at once: never too low, and seldom much too high.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -21,7 +22,7 @@ class BrickBounds : public ::testing::TestWithParam<unsigned> {
     std::vector<Ranking::Rank> ranks;
     for (BrickIndex b{0}; b < volume_.set().bricks().size(); ++b) {
       const float object_error = relevant.bound(b).object_error;
-      const auto all = bounds(b, relevant.bound(b).error_step, object_error, relevant.bound(b).slope);
+      const auto all = bounds(b, {relevant.bound(b).error_step, object_error, relevant.bound(b).slope});
       ranks.push_back(all.rank);
       const Ranking::Brick brick = ranking.of_brick(b);
       if (ranking.has_camera()) {
@@ -29,10 +30,17 @@ class BrickBounds : public ::testing::TestWithParam<unsigned> {
       }
       // Of what remains
       const unsigned step = unsigned(random_()) % (relevant.bound(b).error_step + 1), slope = unsigned(random_()) % (relevant.bound(b).slope + 1);
-      const auto some = bounds(b, step, object_error / 2, slope);
+      const auto some = bounds(b, {step, object_error / 2, slope});
       ASSERT_LE(some.rank, all.rank);
       if (some.is_exact) {
-        ASSERT_EQ(some.rank, brick.bound(step, object_error / 2, slope));
+        ASSERT_EQ(some.rank, brick.bound({step, object_error / 2, slope}));
+      }
+      // Steep ones that are hardly wanted come last; those that may be wanted more count.
+      const unsigned steeper = unsigned(random_()) % (relevant.bound(b).slope + 1);
+      ASSERT_EQ(bounds(b, {step, object_error, slope, 0, steeper}).rank, bounds(b, {step, object_error, slope}).rank);
+      if (ranking.has_camera()) {
+        const float far = 2 * Ranking::Left::kHardly * brick.unwanted();
+        ASSERT_EQ(brick.bound({step, object_error, slope, far, steeper}), brick.bound({step, object_error, std::max(slope, steeper)}));
       }
     }
     testing::for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ASSERT_LE(rank, ranks[p.brick]); });
