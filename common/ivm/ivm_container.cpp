@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "common/util/atomic_file.h"
 #include "common/util/bits.h"
@@ -169,7 +170,7 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
 
 }  // namespace
 
-std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
+ContainerFrame make_frame(FileScope scope, const Streams& streams, std::uint64_t pages_bytes) {
   std::uint32_t types = types_of(scope);
   for (const int type : set_bits(kSometimes)) {
     if (streams[StreamType(type)].empty()) types &= ~bit_of(StreamType(type));
@@ -185,18 +186,31 @@ std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
   for (const int type : set_bits(types)) {
     const auto& bytes = streams[StreamType(type)];
     const bool is_pages = StreamType(type) == StreamType::pages;
-    const Entry e{std::uint32_t(type), (kNotNeeded >> type & 1) != 0 ? kOptional : 0, header.file_bytes, bytes.size(),
+    const Entry e{std::uint32_t(type), (kNotNeeded >> type & 1) != 0 ? kOptional : 0, header.file_bytes, is_pages ? pages_bytes : bytes.size(),
                   is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size())};
     entries.push_back(e);
-    header.file_bytes += bytes.size();
+    header.file_bytes += e.bytes;
   }
   append<Entry>(file, entries);
   header.content_hash = hash_of_contents(entries);
   std::memcpy(file.data(), &header, sizeof header);
   header.checksum = head_checksum(file);
   std::memcpy(file.data(), &header, sizeof header);
-  file.reserve(header.file_bytes);
-  for (const int type : set_bits(types)) append<std::byte>(file, streams[StreamType(type)]);
+  ContainerFrame frame{std::move(file), {}, 0, header.file_bytes};
+  for (const int type : set_bits(types)) {
+    if (StreamType(type) != StreamType::pages)
+      append<std::byte>(type < int(StreamType::pages) ? frame.before : frame.after, streams[StreamType(type)]);
+  }
+  frame.pages_at = frame.before.size();
+  return frame;
+}
+
+std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
+  ContainerFrame frame = make_frame(scope, streams, streams[StreamType::pages].size());
+  std::vector<std::byte> file = std::move(frame.before);
+  file.reserve(frame.file_bytes);
+  append<std::byte>(file, streams[StreamType::pages]);
+  append<std::byte>(file, frame.after);
   return file;
 }
 

@@ -83,6 +83,14 @@ struct FileEnds {
   std::uint64_t file_bytes = 0;
 };
 
+// What is around the pages of a file, whose stream of pages is left out and will have so many bytes.
+struct ContainerFrame {
+  std::vector<std::byte> before, after;
+  std::uint64_t pages_at = 0;    // where in the file the pages begin
+  std::uint64_t file_bytes = 0;  // of all
+};
+[[nodiscard]] ContainerFrame make_frame(FileScope scope, const Streams& streams, std::uint64_t pages_bytes);
+
 // A file from outside: its header, table and checksums are in order, and it has the streams of its scope; optional ones
 // of an unknown type are skipped, once their checksums were checked. Pages have checksums of their own, which whoever
 // reads them must check. value_table, update_slopes and the streams of channels are empty if the file has none.

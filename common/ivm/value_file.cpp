@@ -113,12 +113,18 @@ std::uint64_t least_values(const Grid& grid, int finest) {
 
 bool is_value_file(const std::filesystem::path& path) { return scope_of(path) == FileScope::every_range; }
 
+Streams encode_field(const ValueVolume::Parts& parts) {
+  Streams streams;
+  append_field(streams, parts, parts.description.is_exact);
+  append_labels(streams, parts.description.labels);
+  append_statistics(parts.description, streams[StreamType::histogram], streams[StreamType::volumes]);
+  return streams;
+}
+
 std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel, KeptPages* kept) {
   const FieldDescription& d = volume.description();
-  Streams streams;
-  append_values(streams, volume.parts(), d.is_exact, parallel, kept);
-  append_labels(streams, d.labels);
-  append_statistics(d, streams[StreamType::histogram], streams[StreamType::volumes]);
+  Streams streams = encode_field(volume.parts());
+  append_pages(volume.parts(), streams[StreamType::page_index], streams[StreamType::pages], parallel, {kept, 0});
   append_channels(streams, d.grid, volume.set(), d.channels, volume.parts().channel_keys, parallel, kept);
   return make_container(FileScope::every_range, streams);
 }

@@ -26,6 +26,9 @@ namespace intervale {
 // encode_ivm().
 [[nodiscard]] std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel = serial, KeptPages* kept = nullptr);
 
+// All streams but those of pages, of their index and of channels. Of the parts, description and weights.
+[[nodiscard]] Streams encode_field(const ValueVolume::Parts& parts);
+
 // The inverse, for bytes from outside: checks every checksum, and that the bytes can hold as many values as they claim
 // before it allocates. `parallel`, room and faults: as of decode_ivm(); what of_every_range() takes is included.
 [[nodiscard]] Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,

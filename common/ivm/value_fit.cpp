@@ -9,52 +9,31 @@
 namespace intervale {
 namespace {
 
-__extension__ using Wide = __int128;
-
-// The normal equations of one class and scale, in whole numbers: their sums do not depend on the order of the terms.
-struct NormalEquations {
-  std::array<std::array<Wide, kPredictors>, kPredictors> product{};
-  std::array<Wide, kPredictors> target{};
-
-  void add(const PredictorValues& values, ValueKey key) {
-    const std::int64_t difference = 16 * std::int64_t(key) - values.spine;
-    for (std::size_t i = 0; i < kPredictors; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) product[i][j] += Wide(values.difference[i]) * values.difference[j];
-      target[i] += Wide(values.difference[i]) * difference;
+// Cholesky's method, with a little added to the diagonal, so that predictors that agree share the weight.
+PredictorWeights solved(const NormalEquations& equations) {
+  double trace = 1;
+  for (std::size_t i = 0; i < kPredictors; ++i) trace += double(equations.product[i][i]);
+  std::array<std::array<double, kPredictors>, kPredictors> root{};
+  std::array<double, kPredictors> x{};
+  for (std::size_t i = 0; i < kPredictors; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = double(equations.product[i][j]) + (i == j ? 1e-6 * trace : 0);
+      for (std::size_t k = 0; k < j; ++k) sum -= root[i][k] * root[j][k];
+      root[i][j] = i == j ? std::sqrt(sum) : sum / root[j][j];
     }
+    x[i] = double(equations.target[i]);
+    for (std::size_t k = 0; k < i; ++k) x[i] -= root[i][k] * x[k];
+    x[i] /= root[i][i];
   }
-  void add(const NormalEquations& other) {
-    for (std::size_t i = 0; i < kPredictors; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) product[i][j] += other.product[i][j];
-      target[i] += other.target[i];
-    }
+  PredictorWeights weights{};
+  for (std::size_t i = kPredictors; i-- > 0;) {
+    for (std::size_t k = i + 1; k < kPredictors; ++k) x[i] -= root[k][i] * x[k];
+    x[i] /= root[i][i];
+    constexpr double kMost = 4 * 256;
+    weights[i] = std::int16_t(std::lround(std::clamp(x[i] * 256, -kMost, kMost)));
   }
-  // Cholesky's method, with a little added to the diagonal, so that predictors that agree share the weight.
-  [[nodiscard]] PredictorWeights solve() const {
-    double trace = 1;
-    for (std::size_t i = 0; i < kPredictors; ++i) trace += double(product[i][i]);
-    std::array<std::array<double, kPredictors>, kPredictors> root{};
-    std::array<double, kPredictors> x{};
-    for (std::size_t i = 0; i < kPredictors; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) {
-        double sum = double(product[i][j]) + (i == j ? 1e-6 * trace : 0);
-        for (std::size_t k = 0; k < j; ++k) sum -= root[i][k] * root[j][k];
-        root[i][j] = i == j ? std::sqrt(sum) : sum / root[j][j];
-      }
-      x[i] = double(target[i]);
-      for (std::size_t k = 0; k < i; ++k) x[i] -= root[i][k] * x[k];
-      x[i] /= root[i][i];
-    }
-    PredictorWeights weights{};
-    for (std::size_t i = kPredictors; i-- > 0;) {
-      for (std::size_t k = i + 1; k < kPredictors; ++k) x[i] -= root[k][i] * x[k];
-      x[i] /= root[i][i];
-      constexpr double kMost = 4 * 256;
-      weights[i] = std::int16_t(std::lround(std::clamp(x[i] * 256, -kMost, kMost)));
-    }
-    return weights;
-  }
-};
+  return weights;
+}
 
 constexpr std::uint32_t kMostFitted = 1 << 20;  // diamonds of a scale; of more, those of a quarter of the supercubes
 
@@ -100,25 +79,56 @@ ByClass equations_of(const PagedValues& values, BlockLattice& lattice, const Bri
 
 }  // namespace
 
-ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel) {
-  const std::vector<BrickRun> blocks = blocks_of(values.set);
-  const auto scale_of_block = [&values](const BrickRun& block) { return scale_of_key(values.set.bricks()[block.first].key); };
+void NormalEquations::add(const PredictorValues& values, ValueKey key) {
+  const std::int64_t difference = 16 * std::int64_t(key) - values.spine;
+  for (std::size_t i = 0; i < kPredictors; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) product[i][j] += Wide(values.difference[i]) * values.difference[j];
+    target[i] += Wide(values.difference[i]) * difference;
+  }
+}
+
+void NormalEquations::add(const NormalEquations& other) {
+  for (std::size_t i = 0; i < kPredictors; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) product[i][j] += other.product[i][j];
+    target[i] += other.target[i];
+  }
+}
+
+void WeightSums::add(const PagedValues& values, std::span<const BrickRun> blocks, std::span<const std::uint32_t, kMaxLevels> all,
+                     const ParallelFor& parallel) {
+  const auto scale_of_block = [&values](const BrickRun& block) { return std::size_t(scale_of_key(values.set.bricks()[block.first].key)); };
   std::vector<ByClass> found(blocks.size());
   parallel(blocks.size(), [&](std::size_t i) {
     BlockLattice lattice(values);
-    const bool is_large = diamonds_of_scale(values.set, scale_of_block(blocks[i])) > kMostFitted;
+    const bool is_large = all[scale_of_block(blocks[i])] > kMostFitted;
     found[i] = equations_of(values, lattice, blocks[i], is_large ? kQuarter : ~std::uint64_t(0));
   });
-  std::array<ByClass, kMaxLevels> sums{};
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    ByClass& sum = sums[std::size_t(scale_of_block(blocks[i]))];
+    ByClass& sum = of[scale_of_block(blocks[i])];
     for (std::size_t cls = 0; cls < 3; ++cls) sum[cls].add(found[i][cls]);
   }
+}
+
+void WeightSums::add(const WeightSums& other) {
+  for (std::size_t scale = 0; scale < kMaxLevels; ++scale) {
+    for (std::size_t cls = 0; cls < 3; ++cls) of[scale][cls].add(other.of[scale][cls]);
+  }
+}
+
+ValueWeights WeightSums::solve() const {
   ValueWeights weights;
   for (std::size_t scale = 0; scale < kMaxLevels; ++scale) {
-    for (std::size_t cls = 0; cls < 3; ++cls) weights.of[scale][cls] = sums[scale][cls].solve();
+    for (std::size_t cls = 0; cls < 3; ++cls) weights.of[scale][cls] = solved(of[scale][cls]);
   }
   return weights;
+}
+
+ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel) {
+  std::array<std::uint32_t, kMaxLevels> all{};
+  for (int scale = 0; scale < kMaxLevels; ++scale) all[std::size_t(scale)] = diamonds_of_scale(values.set, scale);
+  WeightSums sums;
+  sums.add(values, blocks_of(values.set), all, parallel);
+  return sums.solve();
 }
 
 }  // namespace intervale

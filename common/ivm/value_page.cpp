@@ -144,23 +144,40 @@ bool decode_page(const DecodedValues& to, const ValuePage& page, std::span<const
   return pages->code(page) && coder.is_spent();
 }
 
-std::vector<ValuePage> pages_of(const SupercubeSet& set) {
+std::vector<std::size_t> page_starts(std::span<const BlockSize> blocks) {
   int coarse = kMaxLevels;  // scales from this one on are in the first page
-  while (coarse > 0 && first_of(set, set.of_scale(coarse - 1)[1]) <= kPageValuesMost) --coarse;
-  std::vector<ValuePage> pages;
+  std::uint64_t coarser = 0;
+  for (std::size_t next = 0; coarse > 0; --coarse) {
+    while (next < blocks.size() && blocks[next].scale >= coarse - 1) coarser += blocks[next++].diamonds;
+    if (coarser > kPageValuesMost) break;
+  }
+  std::vector<std::size_t> starts;
   int scale_before = kMaxLevels;
   std::uint32_t values = 0;  // in the last page
-  for (const BrickRun& block : blocks_of(set)) {
-    const int scale = std::min(scale_of_key(set.bricks()[block.first].key), coarse);
-    const std::uint32_t more = first_of(set, block.end) - first_of(set, block.first);
-    if (scale != scale_before || (scale < coarse && values + more > kPageValuesMost)) {
-      pages.emplace_back();
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const int scale = std::min(blocks[i].scale, coarse);
+    if (scale != scale_before || (scale < coarse && values + blocks[i].diamonds > kPageValuesMost)) {
+      starts.push_back(i);
       values = 0;
     }
-    pages.back().push_back(block);
-    values += more;
+    values += blocks[i].diamonds;
     scale_before = scale;
   }
+  return starts;
+}
+
+std::vector<ValuePage> pages_of(const SupercubeSet& set) {
+  const std::vector<BrickRun> blocks = blocks_of(set);
+  std::vector<BlockSize> sizes;
+  sizes.reserve(blocks.size());
+  for (const BrickRun& block : blocks)
+    sizes.push_back({scale_of_key(set.bricks()[block.first].key), first_of(set, block.end) - first_of(set, block.first)});
+  std::vector<std::size_t> starts = page_starts(sizes);
+  std::vector<ValuePage> pages;
+  pages.reserve(starts.size());
+  starts.push_back(blocks.size());
+  for (std::size_t i = 0; i + 1 < starts.size(); ++i)
+    pages.emplace_back(blocks.begin() + std::ptrdiff_t(starts[i]), blocks.begin() + std::ptrdiff_t(starts[i + 1]));
   return pages;
 }
 

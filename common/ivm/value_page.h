@@ -4,6 +4,8 @@
 // coarser scales, so a page can be decoded as soon as the coarser pages are.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -24,6 +26,13 @@ inline constexpr std::uint32_t kPageValuesMost = 1 << 18;  // in a page of more 
 // fit; each further one has blocks of one scale.
 [[nodiscard]] std::vector<ValuePage> pages_of(const SupercubeSet& set);
 
+// The same, from the numbers of diamonds of all blocks, in their order: with which block each page begins.
+struct BlockSize {
+  int scale = 0;
+  std::uint32_t diamonds = 0;
+};
+[[nodiscard]] std::vector<std::size_t> page_starts(std::span<const BlockSize> blocks);
+
 // The bytes of a page: the keys of its diamonds, and their error levels if the data set has them. Needs 2 MB.
 [[nodiscard]] std::vector<std::uint8_t> encode_page(const PagedValues& values, const ValuePage& page);
 
@@ -35,5 +44,26 @@ inline constexpr std::uint32_t kPageValuesMost = 1 << 18;  // in a page of more 
 // The least-squares coefficients that predict the values best, by class and scale. Set, keys and description are known;
 // the weights are not read. Of very many diamonds of a scale, a quarter is enough. The same for any number of threads.
 [[nodiscard]] ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel = serial);
+
+// The normal equations of one class and scale, in whole numbers: their sums do not depend on the order of the terms.
+struct NormalEquations {
+  __extension__ using Wide = __int128;
+  std::array<std::array<Wide, kPredictors>, kPredictors> product{};  // the lower triangle
+  std::array<Wide, kPredictors> target{};
+
+  void add(const PredictorValues& values, ValueKey key);
+  void add(const NormalEquations& other);
+};
+
+// The same from parts of the values, whose sums are added in any order: they are whole numbers.
+struct WeightSums {
+  // blocks: some of the set. all: the diamonds of each scale, whether or not they are in this set.
+  void add(const PagedValues& values, std::span<const BrickRun> blocks, std::span<const std::uint32_t, kMaxLevels> all,
+           const ParallelFor& parallel = serial);
+  void add(const WeightSums& other);
+  [[nodiscard]] ValueWeights solve() const;
+
+  std::array<std::array<NormalEquations, 3>, kMaxLevels> of{};  // by scale and class
+};
 
 }  // namespace intervale

@@ -26,9 +26,6 @@ struct FieldRecord {
   std::int64_t first;
   std::uint32_t last, corners[kRootVertices], is_exact;
 };
-struct PageRecord {
-  std::uint64_t bytes, checksum;
-};
 static_assert(sizeof(FieldRecord) == 176 && sizeof(PageRecord) == 16, "no padding");
 
 FieldRecord record_of(const PagedValues& v, bool is_exact) {
@@ -119,12 +116,16 @@ Result<std::vector<StoredPage>> take_stored(std::span<const std::byte>& index, s
 
 }  // namespace
 
-void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel, KeptPages* kept) {
+void append_field(Streams& streams, const PagedValues& values, bool is_exact) {
   const FieldRecord field = record_of(values, is_exact);
   append(streams[StreamType::field], std::span(&field, 1));
   if (values.format.table) append<std::uint8_t>(streams[StreamType::value_table], encode_value_table(*values.format.table));
   const auto scales = std::size_t(Domain(values.grid.dims).levels());
   append(streams[StreamType::weights], std::span<const PredictorWeights>(&values.weights.of[0][0], scales * 3));
+}
+
+void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel, KeptPages* kept) {
+  append_field(streams, values, is_exact);
   append_pages(values, streams[StreamType::page_index], streams[StreamType::pages], parallel, {kept, 0});
 }
 
@@ -144,12 +145,14 @@ void append_pages(const PagedValues& values, std::vector<std::byte>& index, std:
     if (kept.by != nullptr) kept.by->keep(name, coded[page]);
   });
   for (auto& page : coded) {
-    const PageRecord record{page.size(), XXH3_64bits(page.data(), page.size())};
+    const PageRecord record = record_of(page);
     append(index, std::span(&record, 1));
     append<std::uint8_t>(to, page);
     page = {};
   }
 }
+
+PageRecord record_of(std::span<const std::uint8_t> page) { return {page.size(), XXH3_64bits(page.data(), page.size())}; }
 
 void append_labels(Streams& streams, const Labels& labels) {
   for (const std::string* text : {&labels.unit, &labels.field, &labels.field_unit, &labels.space}) {

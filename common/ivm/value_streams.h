@@ -20,6 +20,9 @@ namespace intervale {
 // whichever of their pages were kept; kept may be null.
 void append_values(Streams& streams, const PagedValues& values, bool is_exact, const ParallelFor& parallel, KeptPages* kept);
 
+// The same, without the pages and their index.
+void append_field(Streams& streams, const PagedValues& values, bool is_exact);
+
 // The inverse, of bytes from outside. read_field() sets and checks grid, format, corners, max_error and is_exact.
 [[nodiscard]] Result<void> read_field(const Container& file, FieldDescription& to);
 [[nodiscard]] Result<void> read_field(const Container& file, Description& to);
@@ -31,6 +34,12 @@ void append_labels(Streams& streams, const Labels& labels);
 // Sets keys and error levels, which have no elements at first, and grow with what is decoded. All the rest is known. faults:
 // takes damaged pages, whose keys and levels are any; null: they are an error, as the first page always is.
 [[nodiscard]] Result<void> read_pages(const Container& file, const DecodedValues& to, const ParallelFor& parallel, PageFaults* faults);
+
+// What the index has of a page.
+struct PageRecord {
+  std::uint64_t bytes = 0, checksum = 0;
+};
+[[nodiscard]] PageRecord record_of(std::span<const std::uint8_t> page);
 
 // Pages that are kept, if `by` is not null: of which values they are (PageName::values).
 struct PageKeeping {

@@ -9,9 +9,7 @@
 #include "common/diamond/supercube_neighbours.h"
 
 namespace intervale {
-namespace {
 
-// The slots of a supercube's diamonds that have an update.
 std::uint64_t updated_slots(const Domain& domain, int scale, Vertex position) {
   if (is_interior(domain, scale, position)) return (std::uint64_t(1) << kSlots) - 1;
   const std::int32_t most = 1 << domain.levels();
@@ -24,17 +22,38 @@ std::uint64_t updated_slots(const Domain& domain, int scale, Vertex position) {
   return slots;
 }
 
+namespace {
+
 // Calls visit(position) for those supercubes of a scale that may have diamonds in the box.
 template <class Visit>
 void for_each_supercube(const Domain& domain, int scale, const Visit& visit) {
-  // A diamond reaches h from its centre.
-  const auto positions = [&](std::int32_t last) { return std::min(last + (1 << scale), 1 << domain.levels()) >> (scale + 2); };
-  const Vertex last{positions(domain.last().x), positions(domain.last().y), positions(domain.last().z)};
+  const Vertex last = last_supercube(domain, scale);
   for (Vertex p; p.z <= last.z; ++p.z) {
     for (p.y = 0; p.y <= last.y; ++p.y) {
       for (p.x = 0; p.x <= last.x; ++p.x) visit(p);
     }
   }
+}
+
+// The diamonds of those supercubes of scales from `finest` on that are wanted.
+template <class Wanted>
+SupercubeSet diamonds_of(const Domain& domain, int finest, const Wanted& wanted, const ParallelFor& parallel) {
+  std::vector<std::pair<SupercubeKey, std::uint64_t>> found;
+  for (int scale = finest; scale < domain.levels(); ++scale) {
+    for_each_supercube(domain, scale, [&](Vertex p) {
+      if (p.x == 0) may_stop(parallel);
+      if (!wanted(scale, p)) return;
+      if (const std::uint64_t slots = updated_slots(domain, scale, p)) found.emplace_back(supercube_key(scale, p), slots);
+    });
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<SupercubeKey> keys;
+  std::vector<std::uint64_t> occupancy;
+  for (const auto& [key, slots] : found) {
+    keys.push_back(key);
+    occupancy.push_back(slots);
+  }
+  return {keys, std::move(occupancy)};
 }
 
 }  // namespace
@@ -62,22 +81,19 @@ ErrorLevel ValueVolume::level_of_error(double max_error, double error) {
   return ErrorLevel(std::clamp(kErrorLevels - 1 + exponent - int(ratio == 0.5), 1, kErrorLevels - 1));
 }
 
+Vertex last_supercube(const Domain& domain, int scale) {
+  // A diamond reaches h from its centre.
+  const auto positions = [&](std::int32_t last) { return std::min(last + (1 << scale), 1 << domain.levels()) >> (scale + 2); };
+  return {positions(domain.last().x), positions(domain.last().y), positions(domain.last().z)};
+}
+
 SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel, int finest) {
-  std::vector<std::pair<SupercubeKey, std::uint64_t>> found;
-  for (int scale = finest; scale < domain.levels(); ++scale) {
-    for_each_supercube(domain, scale, [&](Vertex p) {
-      if (p.x == 0) may_stop(parallel);
-      if (const std::uint64_t slots = updated_slots(domain, scale, p)) found.emplace_back(supercube_key(scale, p), slots);
-    });
-  }
-  std::sort(found.begin(), found.end());
-  std::vector<SupercubeKey> keys;
-  std::vector<std::uint64_t> occupancy;
-  for (const auto& [key, slots] : found) {
-    keys.push_back(key);
-    occupancy.push_back(slots);
-  }
-  return {keys, std::move(occupancy)};
+  return diamonds_of(
+      domain, finest, [](int, Vertex) { return true; }, parallel);
+}
+
+SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int scale, Vertex position)>& wanted, const ParallelFor& parallel) {
+  return diamonds_of(domain, 0, wanted, parallel);
 }
 
 std::uint32_t count_diamonds(const Domain& domain) {

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -95,6 +96,14 @@ class ValueVolume {
 [[nodiscard]] SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel = serial, int finest = 0);
 // How many there are of all scales: less than 2^32.
 [[nodiscard]] std::uint32_t count_diamonds(const Domain& domain);
+
+// The same, of supercubes that are wanted.
+[[nodiscard]] SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int scale, Vertex position)>& wanted,
+                                         const ParallelFor& parallel = serial);
+
+// The slots of one supercube that all_diamonds() has, a bit each. position: from 0 to last_supercube(); others have none.
+[[nodiscard]] std::uint64_t updated_slots(const Domain& domain, int scale, Vertex position);
+[[nodiscard]] Vertex last_supercube(const Domain& domain, int scale);
 
 // How many diamonds of a set are of scale 1 or coarser; they have the first numbers.
 [[nodiscard]] std::uint32_t coarse_diamonds(const SupercubeSet& set);

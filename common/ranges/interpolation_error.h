@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <span>
 #include <type_traits>
@@ -61,7 +62,32 @@ struct Extremes {
   static constexpr std::int32_t kSide = 8;
   std::array<std::int32_t, 3> size{};
   std::vector<std::array<T, 2>> block;
+  bool is_partial = false;  // some blocks are left out: their least sample is greater than their largest
 
+  // Of some blocks, a bit each; the samples of the others are not read.
+  Extremes(const Field<T>& field, const ParallelFor& parallel, const std::vector<bool>& some)
+      : size{field.last.x / kSide + 1, field.last.y / kSide + 1, field.last.z / kSide + 1},
+        block(some.size(), {std::numeric_limits<T>::max(), std::numeric_limits<T>::lowest()}),
+        is_partial(true) {
+    parallel(std::size_t(size[2]), [&](std::size_t slice) {
+      const auto k = std::int32_t(slice);
+      for (std::int32_t j = 0; j < size[1]; ++j) {
+        for (std::int32_t i = 0; i < size[0]; ++i) {
+          std::array<T, 2>& of_block = at(i, j, k);
+          if (!some[std::size_t(&of_block - block.data())]) continue;
+          const std::int32_t end = std::min((i + 1) * kSide, field.last.x + 1);
+          for (std::int32_t z = k * kSide; z <= std::min(k * kSide + kSide - 1, field.last.z); ++z) {
+            for (std::int32_t y = j * kSide; y <= std::min(j * kSide + kSide - 1, field.last.y); ++y) {
+              const T* const row = &field.samples[field.index({0, y, z})];
+              for (std::int32_t x = i * kSide; x < end; ++x) of_block = {std::min(of_block[0], row[x]), std::max(of_block[1], row[x])};
+            }
+          }
+        }
+      }
+    });
+  }
+
+  // Of all.
   Extremes(const Field<T>& field, const ParallelFor& parallel)
       : size{field.last.x / kSide + 1, field.last.y / kSide + 1, field.last.z / kSide + 1},
         block(std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2])) {
@@ -129,7 +155,7 @@ class Tetrahedron {
   // bounding box meets + rows and samples of the blocks whose extremes allow more than that).
   [[nodiscard]] double error(const Extremes<T>& extremes, double known) const {
     constexpr std::int64_t side = Extremes<T>::kSide;
-    if (high_[0] - low_[0] < 2 * side && high_[1] - low_[1] < 2 * side && high_[2] - low_[2] < 2 * side)
+    if (!extremes.is_partial && high_[0] - low_[0] < 2 * side && high_[1] - low_[1] < 2 * side && high_[2] - low_[2] < 2 * side)
       return std::max(known, error_in(low_, high_));
     double worst = known;
     const I3 from{p0_.x, p0_.y, p0_.z};
@@ -149,6 +175,7 @@ class Tetrahedron {
               gradient_[0] * (double(low[0]) + half) + gradient_[1] * (double(low[1]) + half) + gradient_[2] * (double(low[2]) + half);
           const double least = f0_ + std::max(least_, middle - spread), most = f0_ + std::min(most_, middle + spread);
           const auto [least_sample, most_sample] = extremes.at(std::int32_t(i), std::int32_t(j), std::int32_t(k));
+          if (least_sample > most_sample) continue;  // left out
           if (std::max(double(most_sample) - least, most - double(least_sample)) + rounding <= worst) continue;
           if (!meets(low, side - 1)) continue;
           worst = std::max(worst, error_in(low, {low[0] + side - 1, low[1] + side - 1, low[2] + side - 1}));

@@ -21,6 +21,8 @@ class AtomicFile {
   // Appends, with a buffer of 1 MiB. Errors name the path and the system's reason ("No space left on device").
   Result<void> write(std::span<const std::byte> bytes);
   Result<void> commit();
+  // Where it is until then; others may write there, too, in places of their own. Empty: the output is no regular file.
+  [[nodiscard]] const std::filesystem::path& temporary() const { return beside_; }
 
  private:
   AtomicFile(std::filesystem::path path, std::filesystem::path beside, int descriptor);

@@ -45,7 +45,7 @@ Vertex centre_from(Vertex corner, Slot slot, int scale) {
 }
 
 template <class T>
-void find_in_brick(const KeyAt<T>& key, const Domain& domain, const SupercubeSet& set, BrickIndex brick, ValueKeys& keys) {
+void find_in_brick(const KeyAt<T>& key, const Domain& domain, const SupercubeSet& set, BrickIndex brick, ValueKeys& keys, const SlotFilter& wanted) {
   const int scale = scale_of_key(set.bricks()[brick].key);
   std::array<std::size_t, kSlots> offset{};  // by slot, between samples
   for (Slot slot{0}; slot < kSlots; ++slot) offset[slot] = key.index(centre_from({}, slot, scale));
@@ -54,9 +54,12 @@ void find_in_brick(const KeyAt<T>& key, const Domain& domain, const SupercubeSet
     const int furthest = 3 << scale;
     const bool is_inside = domain.contains({corner.x + furthest, corner.y + furthest, corner.z + furthest});
     const std::size_t first = is_inside ? key.index(corner) : 0;
+    const std::uint64_t some = wanted ? wanted(name) : ~std::uint64_t(0);
+    if (some == 0) return;
     UpdateIndex next = set.first(brick, supercube);
     for (const Slot slot : set_bits<Slot>(set.occupancy()[supercube])) {
       const UpdateIndex i = next++;
+      if ((some >> std::uint32_t(slot) & 1) == 0) continue;
       keys.set(i, is_inside ? key.of(first + offset[slot]) : key(centre_from(corner, slot, scale)));
     }
   });
@@ -65,11 +68,15 @@ void find_in_brick(const KeyAt<T>& key, const Domain& domain, const SupercubeSet
 }  // namespace
 
 void find_keys(const Volume& volume, const ValueFormat& format, const SupercubeSet& set, ValueKeys& keys) {
-  const Domain domain(volume.grid.dims);
-  visit_samples(volume, [&]<class T>(std::span<const T> samples) {
+  find_keys({volume.type, volume.grid.dims, volume.bytes}, format, set, keys, {});
+}
+
+void find_keys(const SampleView& view, const ValueFormat& format, const SupercubeSet& set, ValueKeys& keys, const SlotFilter& wanted) {
+  const Domain domain(view.dims);
+  visit_samples(view.type, view.bytes, [&]<class T>(std::span<const T> samples) {
     const KeyAt<T> key(samples, domain, format);
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(set.bricks().size()),
-                      [&](std::uint32_t brick) { find_in_brick(key, domain, set, BrickIndex(brick), keys); });
+                      [&](std::uint32_t brick) { find_in_brick(key, domain, set, BrickIndex(brick), keys, wanted); });
   });
 }
 

@@ -119,8 +119,9 @@ class TetShares {
 template <class T>
 class CellSums {
  public:
-  CellSums(std::span<const T> samples, const std::array<std::int32_t, 3>& dims, std::span<const double> positions)
-      : samples_(samples), row_(dims[0]), slice_(row_ * dims[1]), dims_(dims), positions_(positions), places_(positions) {
+  // wanted: in which cells; empty: in all
+  CellSums(std::span<const T> samples, const std::array<std::int32_t, 3>& dims, std::span<const double> positions, const CellFilter& wanted)
+      : samples_(samples), row_(dims[0]), slice_(row_ * dims[1]), dims_(dims), positions_(positions), places_(positions), wanted_(wanted) {
     stride_ = std::max<std::uint64_t>(kOneCell, std::uint64_t(double(samples.size()) / double(kCells) * double(kOneCell)));
     for (const double p : positions) scaled_.push_back(p * kScale);
     scaled_.resize(positions.size() + TetShares::kLanes, std::numeric_limits<double>::infinity());
@@ -130,6 +131,12 @@ class CellSums {
     tbb::enumerable_thread_specific<Sums> all(positions_.size());
     tbb::parallel_for(tbb::blocked_range<std::int32_t>(0, dims_[2] - 1, kSlices), [&](const auto& slices) {
       Sums& sums = all.local();
+      if (wanted_) {
+        for (std::int32_t z = slices.begin(); z < slices.end(); ++z) {
+          for (std::int32_t y = 0; y + 1 < dims_[1]; ++y) add_wanted(y, z, sums);
+        }
+        return;
+      }
       std::vector<PlaceCode> codes(std::size_t(2 * slice_));  // of two slices: of even z first
       encode(slices.begin(), codes);
       for (std::int32_t z = slices.begin(); z < slices.end(); ++z) {
@@ -174,13 +181,30 @@ class CellSums {
       const auto x = std::ptrdiff_t(place >> 32);
       std::array<PlaceCode, 8> k{};
       for (int i = 0; i < 8; ++i) k[i] = code[x + coded[x & 1][i]];
-      const bool undivided = std::all_of(k.begin() + 1, k.end(), [&k](PlaceCode other) { return other == k[0]; });
-      if (undivided) {
-        sums.whole[k[0] >> 1] += kCellTets.size();
-        if ((k[0] & 1) != 0) sums.constant[k[0] >> 1] += kCellTets.size();
-      } else {
-        add_cell(k, values + x, corners[x & 1], sums);
-      }
+      add_coded(k, values + x, corners[x & 1], sums);
+    }
+  }
+
+  // The same, of wanted cells. The samples of the others may not be known.
+  void add_wanted(std::int32_t y, std::int32_t z, Sums& sums) const {
+    const std::array<std::array<std::ptrdiff_t, 8>, 2> corners{cell_corners({0, y, z}, row_, slice_), cell_corners({1, y, z}, row_, slice_)};
+    const T* const values = &samples_[std::size_t(z * slice_ + y * row_)];
+    for (std::uint64_t place = first_cell(y, z); std::ptrdiff_t(place >> 32) + 1 < row_; place += stride_) {
+      const auto x = std::ptrdiff_t(place >> 32);
+      if (!wanted_({std::int32_t(x), y, z})) continue;
+      std::array<PlaceCode, 8> k{};
+      for (int i = 0; i < 8; ++i) k[i] = places_.of(double(values[x + corners[x & 1][i]]));
+      add_coded(k, values + x, corners[x & 1], sums);
+    }
+  }
+
+  void add_coded(const std::array<PlaceCode, 8>& k, const T* values, const std::array<std::ptrdiff_t, 8>& corners, Sums& sums) const {
+    const bool undivided = std::all_of(k.begin() + 1, k.end(), [&k](PlaceCode other) { return other == k[0]; });
+    if (undivided) {
+      sums.whole[k[0] >> 1] += kCellTets.size();
+      if ((k[0] & 1) != 0) sums.constant[k[0] >> 1] += kCellTets.size();
+    } else {
+      add_cell(k, values, corners, sums);
     }
   }
 
@@ -212,11 +236,15 @@ class CellSums {
   std::span<const double> positions_;
   std::vector<double> scaled_;  // the positions, and infinities up to a multiple of TetShares's lanes
   Places places_;
+  const CellFilter& wanted_;
 };
 
-VolumeTable table_at(const Volume& volume, std::vector<double> positions) {
-  const Sums sums =
-      visit_samples(volume, [&]<class T>(std::span<const T> samples) { return CellSums<T>(samples, volume.grid.dims, positions).run(); });
+VolumeTable table_at(const SampleShare& share, std::vector<double> positions) {
+  Sums sums = visit_samples(share.view.type, share.view.bytes,
+                            [&]<class T>(std::span<const T> samples) { return CellSums<T>(samples, share.view.dims, positions, share.cells).run(); });
+  if (share.sum) {
+    for (auto* part : {&sums.whole, &sums.part, &sums.constant}) share.sum(*part);
+  }
   const auto tets = double(std::accumulate(sums.whole.begin(), sums.whole.end(), std::uint64_t(0)));
   VolumeTable table{std::move(positions), {}, {}};
   std::uint64_t whole = 0;
@@ -232,16 +260,22 @@ VolumeTable table_at(const Volume& volume, std::vector<double> positions) {
 }  // namespace
 
 VolumeTable make_volume_table(const Volume& volume) {
+  const auto [least, greatest] = sample_range(volume);
+  return make_volume_table({{volume.type, volume.grid.dims, volume.bytes}, least, greatest, {}, {}, {}});
+}
+
+VolumeTable make_volume_table(const SampleShare& share) {
   // A tolerance well below that of the result: it holds for the estimate.
   constexpr double kTolerance = 0.3 * kVolumeTolerance;
   constexpr std::size_t kPoints = 1 << 19, kMostPoints = kPoints << 4;
-  const auto [least, greatest] = sample_range(volume);
   for (std::size_t points = kPoints;; points *= 4) {
-    const std::vector<DistributionPoint> estimate = estimate_volumes(volume, least, greatest, points, kTolerance);
+    std::vector<double> values = values_in_cells(share.view, points, share.cells);
+    if (share.join) share.join(values);
+    const std::vector<DistributionPoint> estimate = estimate_volumes(std::move(values), share.least, share.greatest, kTolerance);
     std::vector<double> positions;
     positions.reserve(estimate.size());
     for (const DistributionPoint& p : estimate) positions.push_back(p.value);
-    VolumeTable table = table_at(volume, std::move(positions));
+    VolumeTable table = table_at(share, std::move(positions));
     // Where the estimate differs in what lies between two positions, it may also differ in how that is distributed.
     bool is_close = true;
     for (std::size_t j = 1; j < estimate.size(); ++j) {

@@ -23,9 +23,8 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kMostExact = std::size_t(1) << 16;  // values of an exact format that is chosen unasked
-constexpr int kDefaultBits = 11;                          // 2^11 steps or more where nothing else is asked for
-constexpr double kMostSteps = 0x1p53;                     // from 0: whole numbers that a double distinguishes
+constexpr int kDefaultBits = 11;       // 2^11 steps or more where nothing else is asked for
+constexpr double kMostSteps = 0x1p53;  // from 0: whole numbers that a double distinguishes
 
 using Indices = tbb::blocked_range<std::size_t>;
 
@@ -137,43 +136,50 @@ ValueFormat format_of_numbers(double least, double greatest) {
   return {SampleType::f32, 0, number(least), ValueKey(number(greatest) - number(least))};
 }
 
-template <class T>
-Result<ValueFormat> exact_format(SampleType type, std::span<const T> samples, double least, double greatest) {
-  if (type == SampleType::f32) return format_of_numbers(least, greatest);
-  std::vector<double> values = all_distinct(samples);
-  if constexpr (std::is_floating_point_v<T>) {
+Result<ValueFormat> exact_format(SampleType type, const SampleSummary& samples) {
+  if (type == SampleType::f32) return format_of_numbers(samples.range.least, samples.range.greatest);
+  auto all = samples.all();
+  if (!all) return tl::unexpected(all.error());
+  std::vector<double> values = std::move(*all);
+  if (is_float(type)) {
     if (const auto found = find_exact_format(type, values, std::numeric_limits<ValueKey>::max() - 1)) return *found;
   }
   if (values.size() > std::numeric_limits<ValueKey>::max()) return fail("the samples have more than 2^32 - 1 different values, and no exact step");
   return format_of_table(type, std::move(values));
 }
 
-template <class T>
-Result<ValueFormat> choose(SampleType type, std::span<const T> samples, std::optional<double> step, const SampleRange& range) {
-  const auto [least, greatest] = range;
-  if constexpr (std::is_integral_v<T>) {
+}  // namespace
+
+Result<ValueFormat> choose_value_format(SampleType type, const SampleSummary& samples, std::optional<double> step) {
+  const auto [least, greatest] = samples.range;
+  if (!is_float(type)) {
     if (step && *step != 0 && *step != 1) {
       return misuse(std::string("samples of type ") + name_of(type) + " are stored exactly: the step may be 0 or 1, not " + text_of(*step));
     }
-    if (greatest - least >= double(std::numeric_limits<ValueKey>::max())) return exact_format(type, samples, least, greatest);
+    if (greatest - least >= double(std::numeric_limits<ValueKey>::max())) return exact_format(type, samples);
     return ValueFormat{type, 1, std::int64_t(least), ValueKey(greatest - least)};
-  } else {
-    if (step && !(*step >= 0 && std::isfinite(*step))) {
-      return misuse("the step is 0 (exact) or a finite number greater than 0, not " + text_of(*step));
-    }
-    if (step && *step > 0) return format_of_step(type, *step, least, greatest);
-    if (const auto values = few_distinct(samples); !values.empty()) {
-      if (const auto found = find_exact_format(type, values, ValueKey(kMostExact - 1))) return *found;
-    }
-    if (step) return exact_format(type, samples, least, greatest);
-    return format_of_step(type, default_step(type, least, greatest), least, greatest);
   }
+  if (step && !(*step >= 0 && std::isfinite(*step))) return misuse("the step is 0 (exact) or a finite number greater than 0, not " + text_of(*step));
+  if (step && *step > 0) return format_of_step(type, *step, least, greatest);
+  if (const auto values = samples.few(); !values.empty()) {
+    if (const auto found = find_exact_format(type, values, ValueKey(kMostExact - 1))) return *found;
+  }
+  if (step) return exact_format(type, samples);
+  return format_of_step(type, default_step(type, least, greatest), least, greatest);
 }
 
-}  // namespace
-
 Result<ValueFormat> choose_value_format(const Volume& volume, std::optional<double> step) {
-  return visit_samples(volume, [&](auto samples) { return choose(volume.type, samples, step, sample_range(volume)); });
+  const auto all = [&]() -> Result<std::vector<double>> { return visit_samples(volume, [](auto samples) { return all_distinct(samples); }); };
+  return choose_value_format(volume.type, {sample_range(volume), [&] { return few_distinct_samples(volume); }, all}, step);
+}
+
+std::vector<double> few_distinct_samples(const Volume& volume) {
+  return visit_samples(volume, []<class T>(std::span<const T> samples) -> std::vector<double> {
+    if constexpr (std::is_floating_point_v<T>)
+      return few_distinct(samples);
+    else
+      return {};
+  });
 }
 
 std::vector<ValueKey> keys_of(const Volume& volume, const ValueFormat& format) {

@@ -1,6 +1,8 @@
 // Chooses the whole numbers that represent a field's values, and converts samples to them.
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <optional>
 #include <type_traits>
 #include <vector>
@@ -8,6 +10,7 @@
 #include "common/patch/value_format.h"
 #include "common/patch/volume.h"
 #include "common/util/result.h"
+#include "server/builder/sample_range.h"
 
 namespace intervale {
 
@@ -33,6 +36,17 @@ namespace intervale {
 // samples span more than 2^32 of it, lie more than 2^53 of it from 0, or have a type that does not distinguish its
 // multiples. Fails if a table would need more than 2^32 - 1 values.
 [[nodiscard]] Result<ValueFormat> choose_value_format(const Volume& volume, std::optional<double> step);
+
+// What the choice asks of samples that are not all in one place.
+struct SampleSummary {
+  SampleRange range;
+  std::function<std::vector<double>()> few;          // the distinct ones of floats, ascending; none if they are more than kMostExact
+  std::function<Result<std::vector<double>>()> all;  // the distinct ones, ascending
+};
+inline constexpr std::size_t kMostExact = std::size_t(1) << 16;  // values of an exact format that is chosen unasked
+[[nodiscard]] Result<ValueFormat> choose_value_format(SampleType type, const SampleSummary& samples, std::optional<double> step);
+// SampleSummary::few of a volume.
+[[nodiscard]] std::vector<double> few_distinct_samples(const Volume& volume);
 
 // The key of a sample. format: chosen for its volume.
 template <class T>

@@ -37,18 +37,21 @@ std::uint64_t mixed(std::uint64_t x) {  // the finaliser of SplitMix64
   return x ^ x >> 31;
 }
 
-// Values of F at points that are spread evenly over the box, at least `count`, ascending.
+// Values of F at points that are spread evenly over the box, at least `count`; wanted: in which cells.
 template <class T>
-std::vector<double> values_at_points(std::span<const T> samples, const std::array<std::int32_t, 3>& dims, std::size_t count) {
+std::vector<double> values_at_points(std::span<const T> samples, const std::array<std::int32_t, 3>& dims, std::size_t count,
+                                     const CellFilter& wanted) {
   const std::array<std::uint64_t, 3> cells{std::uint64_t(dims[0] - 1), std::uint64_t(dims[1] - 1), std::uint64_t(dims[2] - 1)};
   const std::uint64_t all = cells[0] * cells[1] * cells[2] * kCellTets.size(), some = std::min<std::uint64_t>(all, count);
   const std::size_t each = (count + some - 1) / some;  // points in a tetrahedron
-  std::vector<double> values(some * each);
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  std::vector<double> values(some * each, kNone);
   tbb::parallel_for(std::uint64_t(0), some, [&](std::uint64_t i) {
     // Any one of the i-th of `some` equal parts of all tetrahedra.
     const auto begin = std::uint64_t(double(all) * double(i) / double(some)), end = std::uint64_t(double(all) * double(i + 1) / double(some));
     const std::uint64_t number = std::min(all - 1, begin + (end > begin ? mixed(i) % (end - begin) : 0)), cell = number / kCellTets.size();
     const Vertex first{std::int32_t(cell % cells[0]), std::int32_t(cell / cells[0] % cells[1]), std::int32_t(cell / cells[0] / cells[1])};
+    if (wanted && !wanted(first)) return;
     const std::ptrdiff_t row = dims[0], slice = row * dims[1];
     const auto corners = cell_corners(first, row, slice);
     const T* const start = &samples[std::size_t(first.x + first.y * row + first.z * slice)];
@@ -60,7 +63,7 @@ std::vector<double> values_at_points(std::span<const T> samples, const std::arra
       values[n] = constant ? f[0] : w[0] * f[0] + w[1] * f[1] + w[2] * f[2] + w[3] * f[3];
     }
   });
-  tbb::parallel_sort(values.begin(), values.end());
+  if (wanted) std::erase(values, kNone);
   return values;
 }
 
@@ -103,8 +106,8 @@ class Cone {
 
 // Joseph O'Rourke, An on-line algorithm for fitting straight lines between data ranges, 1981. Here lines begin and end
 // on the distribution; each ends at the last point that it can reach before the first one that it cannot.
-std::vector<DistributionPoint> estimate_volumes(const Volume& volume, double least, double greatest, std::size_t count, double tolerance) {
-  const std::vector<double> values = visit_samples(volume, [&](auto samples) { return values_at_points(samples, volume.grid.dims, count); });
+std::vector<DistributionPoint> estimate_volumes(std::vector<double> values, double least, double greatest, double tolerance) {
+  tbb::parallel_sort(values.begin(), values.end());
   const std::vector<DistributionPoint> points = distribution_of(values, least, greatest);
   std::vector<DistributionPoint> chosen{points[0]};
   Cone cone(points[0], tolerance);
@@ -117,6 +120,10 @@ std::vector<DistributionPoint> estimate_volumes(const Volume& volume, double lea
   }
   if (points.size() > 1) chosen.push_back(points.back());
   return chosen;
+}
+
+std::vector<double> values_in_cells(const SampleView& view, std::size_t count, const CellFilter& wanted) {
+  return visit_samples(view.type, view.bytes, [&](auto samples) { return values_at_points(samples, view.dims, count, wanted); });
 }
 
 }  // namespace intervale

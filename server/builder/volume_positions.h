@@ -2,11 +2,15 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
-#include "common/patch/volume.h"
+#include "common/diamond/diamond.h"
+#include "server/builder/sample_view.h"
 
 namespace intervale {
+
+using CellFilter = std::function<bool(Vertex first)>;  // a cell, by its sample with the least coordinates; empty: all
 
 // A point of the distribution of F over the box: the shares of {F < value} and {F <= value}, 0 to 1.
 struct DistributionPoint {
@@ -17,9 +21,12 @@ struct DistributionPoint {
 // to `below` of the next. Jumps larger than twice the tolerance lie at points. The first point is the least sample, the
 // last one the greatest (the same if there is only one value).
 //
-// The distribution is estimated from F at `count` points of the box or up to twice as many, in as many tetrahedra or in
-// all. least, greatest: of all samples. O(count log count); independent of the number of threads.
-[[nodiscard]] std::vector<DistributionPoint> estimate_volumes(const Volume& volume, double least, double greatest, std::size_t count,
-                                                              double tolerance);
+// values: those of values_in_cells(), of all cells, in any order. least, greatest: of all samples. O(count log count);
+// independent of the number of threads.
+[[nodiscard]] std::vector<DistributionPoint> estimate_volumes(std::vector<double> values, double least, double greatest, double tolerance);
+
+// F at `count` points of the box or up to twice as many, in as many tetrahedra or in all; of these, the ones in cells that
+// are wanted; the samples of other cells are not read.
+[[nodiscard]] std::vector<double> values_in_cells(const SampleView& view, std::size_t count, const CellFilter& wanted = {});
 
 }  // namespace intervale
