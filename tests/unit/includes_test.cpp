@@ -21,7 +21,7 @@ const std::map<std::string, int> kLayers{
     {"client/core", 10},   {"client/net", 11},        {"client/view", 11},      {"client/program", 12},   {"client/local", 11},  //
     {"client/cli", 13},    {"client/load", 13},       {"client/web/core", 13},  {"client/web/local", 13}, {"client/api", 12},    //
     {"server/volume", 10}, {"server/readers", 11},    {"server/builder", 11},   {"server/serve", 12},     {"server/cli", 13},
-    {"server/api", 12},    {"server/scratch", 2},     {"server/resume", 12},  //
+    {"server/api", 12},    {"server/scratch", 2},     {"server/resume", 12},    {"server/cluster", 12},   {"server/mpi", 14},  //
 };
 
 // The folder of the table that a file lies in: the longest that is a prefix of its path. Empty if there is none.

@@ -1,0 +1,26 @@
+// A file that several ranks write at once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+
+#include "common/util/result.h"
+#include "server/cluster/ranks.h"
+
+namespace intervale {
+
+struct SharedPiece {
+  std::uint64_t offset = 0;  // in the file
+  std::span<const std::byte> bytes;
+};
+
+// Writes all pieces of all ranks to a temporary file beside the path, which rank 0 makes and renames once they are there.
+// The folder is one that all ranks see. Fails on all ranks, and leaves nothing behind, if it does on one. writes: called with
+// the temporary file as long as there is one, then with an empty path.
+[[nodiscard]] Result<void> write_shared_file(Ranks& ranks, const std::filesystem::path& path, std::span<const SharedPiece> pieces,
+                                             const std::function<void(const std::filesystem::path&)>& writes);
+
+}  // namespace intervale
