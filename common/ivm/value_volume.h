@@ -97,7 +97,7 @@ class ValueVolume {
 // How many there are of all scales: less than 2^32.
 [[nodiscard]] std::uint32_t count_diamonds(const Domain& domain);
 
-// The same, of supercubes that are wanted.
+// All diamonds as of all_diamonds(), of those supercubes that are wanted.
 [[nodiscard]] SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int scale, Vertex position)>& wanted,
                                          const ParallelFor& parallel = serial);
 

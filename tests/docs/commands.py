@@ -26,6 +26,7 @@ INSTALLS = "installs packages"
 BUILDS = "builds the whole project"
 RUNS_TESTS = "runs the tests, of which this is one"
 NEEDS_DOCKER = "needs a docker engine and takes minutes; deploy/image tests the image, deploy/check this configuration"
+NEEDS_CLUSTER = "needs a cluster; deploy/check checks this job"
 NO_SUCH_HOST = "there is no such host; tests/e2e/remote_test.cpp reads files of one"
 NOT_RUN = {
     "deploy/demo": "installs packages and builds; .ci/run runs it",
@@ -54,6 +55,10 @@ NOT_RUN = {
     "INTERVALE_DATA=$PWD/data docker compose -f deploy/compose.yaml up -d --build": NEEDS_DOCKER,
     "INTERVALE_DATA=$PWD/data docker compose -f deploy/compose.yaml --profile observe up -d": NEEDS_DOCKER,
     "docker compose -f deploy/compose.yaml build": NEEDS_DOCKER,
+    "docker build -f deploy/mpi.Dockerfile -t intervale-mpi .": NEEDS_DOCKER,
+    "sbatch --nodes=8 deploy/slurm/build.sbatch /shared/volume.nrrd /shared/every.ivm": NEEDS_CLUSTER,
+    "kubectl create -k deploy/k8s/build": NEEDS_CLUSTER,
+    "mpirun -n 4 intervale build volume.nrrd -o every.ivm --memory 4GiB": "needs Open MPI; tests/e2e/mpi_test.cpp runs it",
     "docker compose -f deploy/compose.yaml up -d --no-deps server-a": NEEDS_DOCKER,
     "docker compose -f deploy/compose.yaml up -d --no-deps server-b": NEEDS_DOCKER,
     "intervale serve https://data.example.org/scans/scan.ivm": NO_SUCH_HOST,
