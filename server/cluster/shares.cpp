@@ -38,6 +38,7 @@ Shares::Shares(const Domain& domain, int ranks) : last_(domain.last()) {
     }
   }
   std::vector<BlockSize> blocks;
+  blocks.reserve(sizes.size());
   for (const auto& [block, diamonds] : sizes) blocks.push_back({scale_of_key(block << kBlockBits), diamonds});
   std::vector<std::size_t> starts = page_starts(blocks);
   starts.push_back(blocks.size());
@@ -77,7 +78,7 @@ void Shares::share_pages(int ranks, bool finest, const std::vector<std::uint64_t
   for (std::size_t page = 0; page < pages_.size(); ++page) all += is_meant(page) ? diamonds_of_page[page] : 0;
   for (std::size_t page = 0; page < pages_.size(); ++page) {
     if (!is_meant(page)) continue;
-    pages_[page].rank = int(double(before + diamonds_of_page[page] / 2) / double(all) * ranks);
+    pages_[page].rank = int((double(before) + double(diamonds_of_page[page]) / 2) / double(all) * ranks);
     before += diamonds_of_page[page];
   }
 }
