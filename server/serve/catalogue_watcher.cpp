@@ -76,7 +76,6 @@ Read read(const fs::path& path, const std::string& name, const Memory& memory, s
 }  // namespace
 
 Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
-  const ScratchMemory::Scope scope(memory_.data_memory());
   const ParallelFor parallel = serial_until(std::move(stop));
   for (const fs::path& input : inputs_) {
     std::error_code ignored;
@@ -88,6 +87,7 @@ Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
     if (volume) continue;
     if (auto loaded = load_file(path, volume, parallel); !loaded) return tl::unexpected(loaded.error());
   }
+  const ScratchMemory::Scope scope(memory_.data_memory());
   if (auto loaded = remote_.load(parallel); !loaded) return tl::unexpected(loaded.error());
   return catalogue(true);
 }
@@ -95,6 +95,7 @@ Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
 // All of a named file.
 Result<void> CatalogueWatcher::load_file(const fs::path& path, Catalogue::Volume& volume, const ParallelFor& parallel) {
   spdlog::debug("reads {}", path.string());
+  const ScratchMemory::Scope scope(memory_.data_memory());
   PageFaults faults;
   auto loaded = catching(path.string() + ": ", [&] {
     auto read = load_volume(path, parallel, tolerates_damage_ ? &faults : nullptr);
@@ -107,19 +108,17 @@ Result<void> CatalogueWatcher::load_file(const fs::path& path, Catalogue::Volume
   return {};
 }
 
-// What a large file begins with. nullptr: it is to be read whole, which also tells what is wrong with it.
+// What a large file begins with, in memory. nullptr: it is to be read whole, which also tells what is wrong with it.
 Catalogue::Volume CatalogueWatcher::load_coarse(const fs::path& path, const ParallelFor& parallel) {
   if (tolerates_damage_ || memory_.room() != ~std::uint64_t(0)) return nullptr;
   std::error_code ignored;
   if (const auto size = fs::file_size(path, ignored); ignored || size < kLargeFile) return nullptr;
   auto volume = catching("", [&] { return load_coarse_volume(path, parallel); });
-  if (!volume || !protocol::check_sendable((*volume)->description())) return nullptr;
-  complete_in_data_memory(**volume, memory_, parallel);
+  if (!volume || *volume == nullptr || !protocol::check_sendable((*volume)->description())) return nullptr;
   return counted(memory_, Memory::Holder::datasets, std::move(*volume));
 }
 
 Result<std::optional<Catalogue>> CatalogueWatcher::complete(std::stop_token stop) {
-  const ScratchMemory::Scope scope(memory_.data_memory());
   const ParallelFor parallel = serial_until(std::move(stop));
   for (auto& [path, volume] : files_) {
     if (volume->is_whole()) continue;
@@ -164,6 +163,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
   const std::uint64_t room = memory_.room();
   try {
     if (room <= file.too_little) throw NoRoom();
+    const ScratchMemory::Scope scope(memory_.data_memory());
     PageFaults faults;
     auto volume = read(path, name, memory_, room, parallel, tolerates_damage_ ? &faults : nullptr);
     file.too_little = 0;
@@ -184,9 +184,11 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
 }
 
 std::optional<Catalogue> CatalogueWatcher::poll(std::stop_token stop) {
-  const ScratchMemory::Scope scope(memory_.data_memory());
   const ParallelFor parallel = serial_until(std::move(stop));
-  bool changed = remote_.poll(parallel);
+  bool changed = [&] {
+    const ScratchMemory::Scope scope(memory_.data_memory());
+    return remote_.poll(parallel);
+  }();
   std::map<fs::path, File> found;
   for (const fs::path& input : inputs_) {
     const bool is_file = std::any_of(files_.begin(), files_.end(), [&input](const auto& named) { return named.first == input; });
