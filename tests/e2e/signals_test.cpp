@@ -34,17 +34,22 @@ std::vector<std::string> serving(const std::filesystem::path& folder) {
   return {program("intervale"), "serve", folder, "--listen", "127.0.0.1:0", "--log-level", "debug"};
 }
 
+// Before anything is served, if files are read whole at once; and while they are served by their coarse scales.
 TEST(Signals, AreHeardWhileFilesAreReadAtTheStart) {
   const TempDir folder;
   for (const char* name : {"a.ivm", "b.ivm", "c.ivm"}) std::filesystem::create_symlink(large_file(), folder / name);
-  Process server(serving(folder.path()));
-  ASSERT_TRUE(server.wait_for("reads "));
-  const auto begun = Clock::now();
-  server.signal(SIGTERM);
-  const Finished finished = server.wait();
-  EXPECT_LT(Clock::now() - begun, kHeard);
-  EXPECT_EQ(finished.status, 0);
-  EXPECT_EQ(finished.err.find("serving"), std::string::npos) << finished.err;
+  for (const bool is_whole : {true, false}) {
+    std::vector<std::string> command = serving(folder.path());
+    if (is_whole) command.emplace_back("--tolerate-damage");
+    Process server(command);
+    ASSERT_TRUE(server.wait_for("reads "));
+    const auto begun = Clock::now();
+    server.signal(SIGTERM);
+    const Finished finished = server.wait();
+    EXPECT_LT(Clock::now() - begun, kHeard);
+    EXPECT_EQ(finished.status, 0);
+    EXPECT_EQ(finished.err.find("serving") == std::string::npos, is_whole) << finished.err;
+  }
 }
 
 TEST(Signals, AreHeardWhileAFileThatAppearsIsRead) {
