@@ -2,6 +2,7 @@
 export { axes, fitted, kFov, orbited, panned, type Pose, projected, rayThrough, rolled, zoomed } from './camera.js';
 export { kRangeColors, kSurfaceColors, kSurfaces, type SurfaceName } from './colors.js';
 export { boxVolume, type ChannelInfo, type Dataset, fetchStatistics, listDatasets, type Listing, type Statistics, streamUrl } from './datasets.js';
+export { type Told } from './file_source.js';
 export { type Frame, frameOf } from './frame.js';
 export { LocalDataset, type LocalOptions } from './local_dataset.js';
 export { addressOf, describe, LiveMesh, type LiveMeshEvents, type LiveMeshOptions, surfacesOf, updatesIn, viewOf, type Wanted } from './live_mesh.js';
