@@ -1,8 +1,6 @@
 #include "server/builder/field_hierarchy.h"
 
-#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,13 +19,12 @@
 #include "server/builder/error_steps.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/relevance.h"
+#include "server/builder/shared_error.h"
 #include "server/builder/supercube_family.h"
 #include "server/builder/value_steps.h"
 
 namespace intervale {
 namespace {
-
-constexpr int kShared = 5;  // diamonds of this scale and coarser are few and large: their tetrahedra are shared out among threads
 
 // The samples around a diamond, by local vertex.
 using Around = std::array<double, kMaxVertices + 1>;
@@ -95,18 +92,6 @@ unsigned children_in_set(SetNeighbours& neighbours, Slot slot) {
   return some;
 }
 
-// The error of one diamond, its tetrahedra shared out among threads.
-template <class T>
-double error_in_parallel(const DiamondErrors<T>& error_of, const Diamond& d, const BorderShape& shape) {
-  return tbb::parallel_reduce(
-      tbb::blocked_range<int>(0, d.row->tets, 1), 0.0,
-      [&](const auto& tets, double worst) {
-        for (int i = tets.begin(); i != tets.end(); ++i) worst = std::max(worst, error_of(d, shape, 1u << i));
-        return worst;
-      },
-      [](double a, double b) { return std::max(a, b); });
-}
-
 }  // namespace
 
 FieldHierarchy::FieldHierarchy(const Volume& volume, const BuildOptions& options)
@@ -138,7 +123,7 @@ void FieldHierarchy::measure_errors(const std::function<void(double)>& progress,
           for (const Slot slot : set_bits<Slot>(set_.occupancy()[s])) {
             const Diamond d = diamonds.diamond(slot);
             const BorderShape& shape = diamonds.shape(slot);
-            errors_[next++] = round_up(scale < kShared ? error_of(d, shape) : error_in_parallel(error_of, d, shape));
+            errors_[next++] = round_up(shared_error(error_of, d, shape));
           }
         });
       });

@@ -1,9 +1,7 @@
 // Weiss and De Floriani 2008, sections 4 and 6, as in field_hierarchy.cpp.
 #include "server/cluster/rank_errors.h"
 
-#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -17,13 +15,13 @@
 #include "common/ranges/interpolation_error.h"
 #include "common/util/bits.h"
 #include "common/util/round_up.h"
+#include "server/builder/shared_error.h"
 #include "server/builder/supercube_family.h"
 
 namespace intervale {
 namespace {
 
 constexpr int kWholeMost = 3;  // the coarsest scale whose diamonds reach no further than Shares::kHalo
-constexpr int kManyTets = 5;   // diamonds of this scale and coarser are few: their tetrahedra are shared out among threads
 
 void raise(float& error, float to) {
   std::atomic_ref<float> at(error);
@@ -190,20 +188,9 @@ class Measure {
     tbb::parallel_for<std::uint32_t>(begin, end, [&](std::uint32_t brick) {
       for_each_in_brick(BrickIndex(brick), [&](UpdateIndex i, const Diamond& d, const BorderShape& shape) {
         if (!is_met(d)) return;
-        const double error = scale < kManyTets ? error_of(d, shape) : by_tetrahedra(error_of, d, shape);
-        raise(errors_.coarse[i], round_up(error));
+        raise(errors_.coarse[i], round_up(shared_error(error_of, d, shape)));
       });
     });
-  }
-
-  static double by_tetrahedra(const DiamondErrors<T>& error_of, const Diamond& d, const BorderShape& shape) {
-    return tbb::parallel_reduce(
-        tbb::blocked_range<int>(0, d.row->tets, 1), 0.0,
-        [&](const auto& tets, double worst) {
-          for (int i = tets.begin(); i != tets.end(); ++i) worst = std::max(worst, error_of(d, shape, 1u << i));
-          return worst;
-        },
-        [](double a, double b) { return std::max(a, b); });
   }
 
   const RankField& field_;

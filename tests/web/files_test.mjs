@@ -165,7 +165,7 @@ test('a file that is lost on its way is told of, and what has arrived stays', as
   const { address } = await serveRanges(Promise.resolve(false));
   const mine = await serve(folder, 0, '--connect-origin', address);
   const { page, errors, close } = await open(browser, `${mine.url}?file=${address}/large.ivm#data=large&range=100,180`, kSmall);
-  assert.match(await bannerOf(page, 'it changed while it was read'), /^Only coarse scales are shown: large\.ivm: /);
+  assert.match(await bannerOf(page, 'its server responded with status 404'), /^Only coarse scales are shown: large\.ivm: /);
   await page.waitForFunction(() => window.intervale.live.progress?.triangles > 100);
   assert.deepEqual(errors.filter((error) => !/404/.test(error)), []);
   await close();

@@ -68,13 +68,14 @@ class UrlSource implements FileSource {
       const response = await fetch(this.url, { headers: { Range: `bytes=${first}-${end - 1}` } }).catch(() => null);
       const bytes = response?.status === 206 ? await response.arrayBuffer().catch(() => null) : null;
       const tag = response?.headers.get('ETag') ?? null;
-      if (response && !isTemporary(response.status) && (response.status !== 206 || (this.tag !== null && tag !== null && tag !== this.tag)))
-        throw new Error('it changed while it was read.');
+      if (response?.status === 206 && this.tag !== null && tag !== null && tag !== this.tag) throw new Error('it changed while it was read.');
       if (bytes?.byteLength === end - first) {
         this.told((this.received += bytes.byteLength), this.size);
         return new Uint8Array(bytes);
       }
-      if (attempt === kAttempts) throw new Error(response ? `its server responded with status ${response.status}.` : 'the connection was lost.');
+      if (response && response.status !== 206 && (attempt === kAttempts || !isTemporary(response.status)))
+        throw new Error(`its server responded with status ${response.status} on the way.`);
+      if (attempt === kAttempts) throw new Error('the connection was lost.');
       await new Promise((resolve) => setTimeout(resolve, kPauseMs * 2 ** (attempt - 1)));
     }
   }
