@@ -247,7 +247,11 @@ TEST(ReadRemote, RefusesAnswersThatLie) {
     FileServer server(contents());
     server.misbehave(lie.tell);
     EXPECT_NE(complaint(server), "no error");
-    EXPECT_LE(server.requests().size(), 6u) << "it is not asked again";
+    // Requests that were on their way when the lie was told are answered; none is made a second time.
+    std::set<std::string> asked;
+    for (const FileRequest& request : server.requests()) {
+      EXPECT_TRUE(asked.insert(request.header("range")).second) << request.header("range") << " is asked for again";
+    }
   }
 }
 
