@@ -49,11 +49,14 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   return grant(open.credit);
 }
 
-// Whether there is more of a data set that was not whole. The description, which has a hash of the contents, stays.
-bool SessionState::grow() {
+// Whether there is more of a data set that was not whole. The description, which has a hash of the contents, stays: what
+// is found under the name with another one, or not at all, has not the rest.
+tl::expected<bool, Fault> SessionState::grow() {
   if (volume_->is_whole()) return false;
   const auto found = find_(dataset_);
-  if (!found || (*found)->size() <= volume_->size() || (*found)->description() != volume_->description()) return false;
+  if (!found || (*found)->description() != volume_->description())
+    return tl::unexpected(Fault{CloseCode::going_away, "the rest of the data set could not be read"});
+  if ((*found)->size() <= volume_->size()) return false;
   const StreamPlan before(std::move(*plan_));
   volume_ = *found;
   plan_.emplace(volume_);
@@ -202,7 +205,9 @@ bool SessionState::is_searching() {
 std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payload) {
   if (!opened()) return {};
   if (!std::exchange(opened_was_sent_, true)) return protocol::Opened{volume_->description(), {}, resumed_};
-  if (grow()) return {};  // what follows is has_work()
+  const auto has_grown = grow();
+  if (!has_grown) return has_grown.error();
+  if (*has_grown) return {};  // what follows is has_work()
   if (!has_work()) return {};
   const bool is_ahead = view_ == ViewState::ahead;
   waits_ = false;

@@ -30,7 +30,8 @@ class SessionState {
   // Handles a client's message. A fault ends the session: call nothing afterwards.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
-  // The next message to send. nullopt: none now; call again if has_work(). max_payload bounds a batch's payload. With
+  // The next message to send. nullopt: none now; call again if has_work(). A fault ends the session, as that of receive():
+  // the rest of a data set that was not whole is not to be had. max_payload bounds a batch's payload. With
   // has_work() a call takes some milliseconds at most; with less than the default, a fifth of a millisecond and what it
   // takes to code the batch.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
@@ -62,7 +63,7 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
   std::optional<protocol::Fault> on(const protocol::Have& have);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
-  bool grow();
+  tl::expected<bool, protocol::Fault> grow();
   bool begin_view();
   [[nodiscard]] bool is_searching();
   bool estimate();

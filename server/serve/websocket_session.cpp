@@ -299,7 +299,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       } else {
         message = state_.next();
       }
-      if (message) {
+      if (message && std::holds_alternative<Fault>(*message)) {
+        fault_ = std::get<Fault>(*std::move(message));
+      } else if (message) {
         if (!co_await send(*message)) co_return abort_connection();
         stalled_since_ = Clock::now();
         if (const auto* batch = std::get_if<protocol::Batch>(&*message)) {

@@ -115,5 +115,26 @@ TEST_F(LargeFiles, ASessionGoesOnWithTheRest) {
   EXPECT_EQ(updates + client.stream_to_end(), all);
 }
 
+TEST_F(LargeFiles, ASessionEndsWhereTheRestIsDamagedOrAnotherFile) {
+  const auto server = start();
+  std::vector<std::byte> damaged = large();
+  testing::damage_page(damaged, testing::page_count(damaged) - 1);
+  for (const bool is_replaced : {false, true}) {
+    const auto file = write(folder, damaged);
+    CatalogueWatcher watcher({file.parent_path()}, server->memory());
+    server->offer(watcher.load().value());
+    RawClient client(server->port());
+    client.send(protocol::Open{"large", "test", protocol::kMaxWindow});
+    client.send(protocol::View{1, {}});
+    EXPECT_TRUE(client.expect<protocol::Opened>().description.updates > 0);
+    if (is_replaced) std::filesystem::copy_file(buckyball(), file, std::filesystem::copy_options::overwrite_existing);
+    server->offer(std::move(*watcher.complete().value()));
+    const auto end = client.end();
+    EXPECT_EQ(end.code, unsigned(CloseCode::going_away));
+    ASSERT_TRUE(end.fault);
+    EXPECT_EQ(end.fault->text, "the rest of the data set could not be read");
+  }
+}
+
 }  // namespace
 }  // namespace intervale::large_files
