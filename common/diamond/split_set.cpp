@@ -33,14 +33,14 @@ std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return extract_p
 
 }  // namespace
 
-void SplitSet::insert_bits(std::uint32_t w, std::uint64_t bits) {
-  for (std::size_t chunk = std::size_t(w) * 2; bits != 0; ++chunk, bits >>= 32) {
+void SplitSet::insert_bits(std::size_t w, std::uint64_t bits) {
+  for (std::size_t chunk = w * 2; bits != 0; ++chunk, bits >>= 32) {
     if (const auto added = std::uint32_t(bits)) chunks_.update(chunk, [added](std::uint32_t had) { return had | added; });
   }
 }
 
-void SplitSet::erase_bits(std::uint32_t w, std::uint64_t bits) {
-  for (std::size_t chunk = std::size_t(w) * 2; bits != 0; ++chunk, bits >>= 32) {
+void SplitSet::erase_bits(std::size_t w, std::uint64_t bits) {
+  for (std::size_t chunk = w * 2; bits != 0; ++chunk, bits >>= 32) {
     if (const auto had = chunks_.find(chunk)) chunks_.set(chunk, *had & ~std::uint32_t(bits));
   }
 }
@@ -75,14 +75,14 @@ std::uint64_t SplitSet::deposit(std::uint64_t bits, std::uint64_t mask) {
 
 void SplitSet::insert(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {
   const std::uint64_t bits = extract(slots, occupancy);
-  const unsigned shift = first % 64;
+  const auto shift = unsigned(first % 64);
   insert_bits(first / 64, bits << shift);
   if (shift != 0 && bits >> (64 - shift) != 0) insert_bits(first / 64 + 1, bits >> (64 - shift));
 }
 
 void SplitSet::erase(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {
   const std::uint64_t bits = extract(slots, occupancy);
-  const unsigned shift = first % 64;
+  const auto shift = unsigned(first % 64);
   erase_bits(first / 64, bits << shift);
   if (shift != 0 && bits >> (64 - shift) != 0) erase_bits(first / 64 + 1, bits >> (64 - shift));
 }

@@ -13,11 +13,11 @@ namespace intervale {
 // A set of updates, by number: 32 bits for each 32 updates of which one was in it once, and a little more (SparseArray).
 class SplitSet {
  public:
-  explicit SplitSet(std::uint32_t size = 0) : chunks_(size / 32 + 4) {}
+  explicit SplitSet(std::size_t size = 0) : chunks_(size / 32 + 4) {}
   [[nodiscard]] bool contains(UpdateIndex i) const { return chunks_.get(i / 32) >> (i % 32) & 1; }
   // Which of `count` updates from `first` on are in it, a bit each; count in [1, 64].
   [[nodiscard]] std::uint64_t some(UpdateIndex first, unsigned count) const {
-    return chunks_.bits(first / 32, first % 32) & (~std::uint64_t(0) >> (64 - count));
+    return chunks_.bits(first / 32, unsigned(first % 32)) & (~std::uint64_t(0) >> (64 - count));
   }
   // Whether none of `count` updates from `first` on was ever in it, as far as chunks tell; count at least 1.
   [[nodiscard]] bool is_untouched(UpdateIndex first, unsigned count) const { return !chunks_.uses_any(first / 32, (first + count - 1) / 32 + 1); }
@@ -42,8 +42,8 @@ class SplitSet {
   friend bool operator==(const SplitSet& a, const SplitSet& b);
 
  private:
-  void insert_bits(std::uint32_t w, std::uint64_t bits);
-  void erase_bits(std::uint32_t w, std::uint64_t bits);
+  void insert_bits(std::size_t w, std::uint64_t bits);
+  void erase_bits(std::size_t w, std::uint64_t bits);
   SparseArray<std::uint32_t> chunks_;  // of 32 updates each
 };
 

@@ -59,7 +59,8 @@ Vertex position_of_key(SupercubeKey key) {
 
 Vertex centre_of(SupercubeKey key, Slot slot) { return centre_of(scale_of_key(key), position_of_key(key), slot); }
 
-SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy) : occupancy_(std::move(occupancy)) {
+SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy, UpdateIndex first)
+    : occupancy_(std::move(occupancy)), size_(first) {
   assert(keys.size() == occupancy_.size() && "one word for each supercube");
   first_in_brick_.reserve(keys.size());
   for (SupercubeIndex s{0}; s < keys.size(); ++s) {
@@ -67,7 +68,7 @@ SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::
     if (bricks_.empty() || bricks_.back().key != brick) bricks_.push_back({brick, 0, s, UpdateIndex(size_)});
     bricks_.back().mask |= std::uint64_t(1) << (keys[s] & 63);
     first_in_brick_.push_back(std::uint16_t(size_ - bricks_.back().first));
-    size_ += std::uint32_t(std::popcount(occupancy_[s]));
+    size_ += std::size_t(std::popcount(occupancy_[s]));
   }
   bricks_.shrink_to_fit();
   directory_.assign(bricks_.size() + bricks_.size() / 2 + 1, 0);
@@ -125,7 +126,7 @@ Place SupercubeSet::place(UpdateIndex index) const {
   const auto brick = BrickIndex(std::upper_bound(bricks_.begin(), bricks_.end(), index, after) - bricks_.begin() - 1);
   SupercubeIndex s = bricks_[brick].first_supercube;
   std::uint64_t mask = bricks_[brick].mask;
-  std::uint32_t skip = index - bricks_[brick].first;
+  auto skip = std::uint32_t(index - bricks_[brick].first);
   for (; skip >= std::uint32_t(std::popcount(occupancy_[s])); ++s, mask &= mask - 1) skip -= std::uint32_t(std::popcount(occupancy_[s]));
   std::uint64_t word = occupancy_[s];
   for (; skip > 0; --skip) word &= word - 1;

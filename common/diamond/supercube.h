@@ -41,10 +41,13 @@ using SupercubeKey = std::uint64_t;
   return {coordinate(position.x, type), coordinate(position.y, type >> 2), coordinate(position.z, type >> 4)};
 }
 
-// Numbers in a set: of a diamond, a brick and a supercube.
-using UpdateIndex = Index<struct UpdateTag>;
+// Numbers in a set: of a diamond, a brick and a supercube. That of a diamond is as wide as the size of an array: 64 bits,
+// and 32 in a browser. It is only computed, from the number of its supercube: arrays and sets know it by their own order.
+using UpdateIndex = Index<struct UpdateTag, std::size_t>;
 using BrickIndex = Index<struct BrickTag>;
 using SupercubeIndex = Index<struct SupercubeTag>;
+inline constexpr std::uint64_t kMostSupercubes = 0xfffffffe;  // in a set
+inline constexpr std::uint64_t kMostUpdates = sizeof(UpdateIndex) > 4 ? kMostSupercubes* kSlots : 0xffffffff;
 
 struct Place {
   SupercubeKey key = 0;
@@ -82,8 +85,10 @@ void for_each_finest_first(std::span<const SlotGroup> groups, Visit&& visit) {
 class SupercubeSet {
  public:
   SupercubeSet() = default;
-  // keys strictly ascending; occupancy not 0 and within kSlots bits, one for each key. Fewer than 2^32 diamonds.
-  SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy);
+  // keys strictly ascending; occupancy not 0 and within kSlots bits, one for each key. At most kMostSupercubes of them, and
+  // kMostUpdates diamonds. first: the number of the first one, as if others came before; size() is the number after the
+  // last one.
+  SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::uint64_t> occupancy, UpdateIndex first = UpdateIndex());
 
   struct Brick {
     SupercubeKey key = 0;    // the supercubes' keys with the lowest six bits 0
@@ -94,7 +99,7 @@ class SupercubeSet {
 
   [[nodiscard]] std::span<const Brick> bricks() const { return bricks_; }
   [[nodiscard]] std::size_t supercubes() const { return occupancy_.size(); }
-  [[nodiscard]] std::uint32_t size() const { return size_; }
+  [[nodiscard]] std::size_t size() const { return size_; }                               // diamonds
   [[nodiscard]] std::span<const std::uint64_t> occupancy() const { return occupancy_; }  // by supercube
   [[nodiscard]] std::size_t memory_bytes() const;
 
@@ -157,7 +162,7 @@ class SupercubeSet {
   }
   // The number of a brick's diamonds.
   [[nodiscard]] unsigned updates(BrickIndex brick) const {
-    return (brick + 1 < bricks_.size() ? std::uint32_t(bricks_[brick + 1].first) : size_) - bricks_[brick].first;
+    return unsigned((brick + 1 < bricks_.size() ? std::size_t(bricks_[brick + 1].first) : size_) - bricks_[brick].first);
   }
   // The number of a supercube's first diamond.
   [[nodiscard]] UpdateIndex first(BrickIndex brick, SupercubeIndex supercube) const { return bricks_[brick].first + first_in_brick_[supercube]; }
@@ -173,7 +178,7 @@ class SupercubeSet {
   std::vector<std::uint16_t> first_in_brick_;  // at most 63 * 56
   std::vector<std::uint32_t> directory_;       // open addressing: brick number + 1, 0 for an empty place
   std::array<BrickIndex, kMaxLevels + 2> scale_begin_{};
-  std::uint32_t size_ = 0;
+  std::size_t size_ = 0;
 };
 
 }  // namespace intervale

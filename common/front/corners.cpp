@@ -42,7 +42,7 @@ void place_corner(FrontState& state, const CornerSides& sides, const DiamondPart
   block->split |= std::uint64_t(1) << slot;
   block->shown = block->counts = block->split;
   block->set_side(slot, side);
-  Split split{std::uint32_t(side) << Split::kSideBit, state.points};
+  Split split{std::uint32_t(side) << Split::kSideBit, PointId(state.points)};
   for (const int e : set_bits(parts.edges)) {
     const Links::Edge edge = links.edge[std::size_t(e)];
     if (edge.owner != corner) continue;

@@ -18,6 +18,7 @@ namespace intervale {
 // A point of the mesh: a cut, or a centre inside the range. It stays the same until the front forgets splits
 // (FrontState::point_generation).
 using PointId = std::uint32_t;
+inline constexpr std::size_t kMostPoints = 0xffffffff;  // of a front
 
 // A split, as bits: 2 v for a cut of alpha on the edge from the centre to local vertex v, 2 v + 1 for one of beta;
 // above them the centre's side.

@@ -177,7 +177,7 @@ class Reclassification {
     std::vector<PointId> base;
     base.reserve(placed.size());
     for (const Placed& piece : placed) {
-      base.push_back(state_.points);
+      base.push_back(PointId(state_.points));
       state_.points += piece.points;
       state_.shown_count += piece.shown;
       state_.tet_count += std::uint64_t(piece.tets);

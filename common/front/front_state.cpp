@@ -25,12 +25,12 @@ std::size_t FrontState::memory_bytes() const {
 
 void FrontState::pack() {
   std::deque<Block> kept;
-  PointId kept_points = 0;
+  std::size_t kept_points = 0;
   const auto pack_points = [&](Block& block) {
     block.placed.keep(block.placed.slots() & block.shown);
     for (const Slot slot : set_bits<Slot>(block.placed.slots())) {
       Split s = block.placed[slot];
-      s.first = kept_points;
+      s.first = PointId(kept_points);
       kept_points += s.points();
       block.placed.set(slot, s);
     }

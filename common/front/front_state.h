@@ -82,9 +82,9 @@ struct FrontState {
   FrontValues values;
   // The first has the domain's corners but (0, 0, 0), as diamonds of scale `levels`
   std::deque<Block> blocks;
-  BlockIndex index;    // of blocks
-  Block origin;        // the domain's corner (0, 0, 0): slot 0
-  PointId points = 0;  // PointIds that were given
+  BlockIndex index;        // of blocks
+  Block origin;            // the domain's corner (0, 0, 0): slot 0
+  std::size_t points = 0;  // PointIds that were given; beyond kMostPoints they begin anew, and there is no mesh
   std::uint64_t tet_count = 0, split_count = 0, shown_count = 0;
   std::uint64_t point_generation = 0;  // how often points got other numbers
 };

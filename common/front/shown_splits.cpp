@@ -60,7 +60,7 @@ std::int64_t ShownSplits::place_points(FrontCursor& at, const Place& place) {
   const std::uint32_t bits = at.context().cut_bits(side) | std::uint32_t(side) << Split::kSideBit;
   Split split = block.split_at(place.slot);
   if (!block.placed.has(place.slot) || split.bits != bits) {
-    split = {bits, state_.points};
+    split = {bits, PointId(state_.points)};
     state_.points += split.points();
     block.place(place.slot, split);
   }

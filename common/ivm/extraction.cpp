@@ -66,6 +66,7 @@ Result<std::vector<Extraction>> extract(const IntervalVolume& volume, const Rele
   std::vector<Extraction> each;
   each.reserve(fronts.size());
   for (Front& front : fronts) {
+    if (front.state().points > kMostPoints) return fail("the mesh has more than 2^32 - 1 vertices: choose a larger error or a smaller region");
     const std::uint64_t updates = front.shown_count();
     each.push_back({std::move(front), updates});
   }

@@ -43,7 +43,7 @@ class IntervalVolume {
     SurfaceErrors surface;            // by supercube, and by number of the update
     std::shared_ptr<const FieldStatistics> statistics = {};
     std::vector<std::uint64_t> left = {};  // by supercube: the slots whose values are known, closed under parents; empty: all
-    std::uint32_t finer = 0;               // updates of finer scales that are still to come
+    std::size_t finer = 0;                 // updates of finer scales that are still to come
   };
   // Fails where sizes or ranges of the parts do not match; validate() checks the meaning.
   static Result<IntervalVolume> assemble(Parts parts);
@@ -51,7 +51,7 @@ class IntervalVolume {
   [[nodiscard]] const Description& description() const { return description_; }
   [[nodiscard]] const Domain& domain() const { return domain_; }
   [[nodiscard]] const SupercubeSet& set() const { return set_; }
-  [[nodiscard]] std::uint32_t size() const { return set_.size(); }
+  [[nodiscard]] std::size_t size() const { return set_.size(); }
   // Whether it has all updates of the data set. Otherwise finer scales are still to come (coarse_scales.h): the whole data
   // set gives its updates the same numbers, and has the same description.
   [[nodiscard]] bool is_whole() const { return description_.updates == set_.size(); }

@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -126,7 +125,7 @@ Result<RangeRecord> read_range(const Container& file, Description& d) {
   if (r.errors > std::uint32_t(kMaxErrorSteps)) return fail("the number of errors is out of range");
   if (r.updates > most_coded_bits(std::min(file[StreamType::pages].size(), file[StreamType::error_steps].size())))
     return fail("the file claims more values than it can hold");
-  if (r.updates > std::numeric_limits<std::uint32_t>::max()) return fail("more updates than this program can read");
+  if (r.updates > kMostUpdates || r.supercubes > kMostSupercubes) return fail("more updates than this program can read");
   if (r.bricks > r.supercubes || r.supercubes > r.updates || r.updates > r.supercubes * kSlots || r.coefficients > r.updates * kMostCuts)
     return fail("the counts contradict each other");
   // An update's key, its bounds, its error step and what that is decoded with, its slope; what makes the set, and its supercubes.

@@ -69,7 +69,7 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const RelevantUp
   }
   // A counting sort over the coarse to fine order.
   constexpr std::size_t kRanks = std::numeric_limits<Ranking::Rank>::max() + std::size_t(1);
-  std::vector<std::uint32_t> begin(kRanks + 1, 0);
+  std::vector<std::size_t> begin(kRanks + 1, 0);
   for (UpdateIndex i{0}; i < volume.size(); ++i) {
     if (updates.contains(i)) ++begin[kRanks - ranks[i]];
   }

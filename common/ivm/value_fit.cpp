@@ -50,10 +50,10 @@ constexpr std::uint64_t kQuarter = [] {
 
 using ByClass = std::array<NormalEquations, 3>;
 
-std::uint32_t diamonds_of_scale(const SupercubeSet& set, int scale) {
+std::size_t diamonds_of_scale(const SupercubeSet& set, int scale) {
   const auto [begin, end] = set.of_scale(scale);
-  const std::uint32_t first_after = end < set.bricks().size() ? std::uint32_t(set.bricks()[end].first) : set.size();
-  return begin == end ? 0 : first_after - std::uint32_t(set.bricks()[begin].first);
+  const std::size_t first_after = end < set.bricks().size() ? std::size_t(set.bricks()[end].first) : set.size();
+  return begin == end ? 0 : first_after - set.bricks()[begin].first;
 }
 
 // supercubes: of each brick, those that are taken
@@ -94,7 +94,7 @@ void NormalEquations::add(const NormalEquations& other) {
   }
 }
 
-void WeightSums::add(const PagedValues& values, std::span<const BrickRun> blocks, std::span<const std::uint32_t, kMaxLevels> all,
+void WeightSums::add(const PagedValues& values, std::span<const BrickRun> blocks, std::span<const std::size_t, kMaxLevels> all,
                      const ParallelFor& parallel) {
   const auto scale_of_block = [&values](const BrickRun& block) { return std::size_t(scale_of_key(values.set.bricks()[block.first].key)); };
   std::vector<ByClass> found(blocks.size());
@@ -124,7 +124,7 @@ ValueWeights WeightSums::solve() const {
 }
 
 ValueWeights fit_weights(const PagedValues& values, const ParallelFor& parallel) {
-  std::array<std::uint32_t, kMaxLevels> all{};
+  std::array<std::size_t, kMaxLevels> all{};
   for (int scale = 0; scale < kMaxLevels; ++scale) all[std::size_t(scale)] = diamonds_of_scale(values.set, scale);
   WeightSums sums;
   sums.add(values, blocks_of(values.set), all, parallel);

@@ -9,8 +9,8 @@
 namespace intervale {
 namespace {
 
-std::uint32_t first_of(const SupercubeSet& set, BrickIndex brick) {
-  return brick < set.bricks().size() ? std::uint32_t(set.bricks()[brick].first) : set.size();
+std::size_t first_of(const SupercubeSet& set, BrickIndex brick) {
+  return brick < set.bricks().size() ? std::size_t(set.bricks()[brick].first) : set.size();
 }
 
 // What a coder works on, as values to be read.
@@ -171,7 +171,7 @@ std::vector<ValuePage> pages_of(const SupercubeSet& set) {
   std::vector<BlockSize> sizes;
   sizes.reserve(blocks.size());
   for (const BrickRun& block : blocks)
-    sizes.push_back({scale_of_key(set.bricks()[block.first].key), first_of(set, block.end) - first_of(set, block.first)});
+    sizes.push_back({scale_of_key(set.bricks()[block.first].key), std::uint32_t(first_of(set, block.end) - first_of(set, block.first))});
   std::vector<std::size_t> starts = page_starts(sizes);
   std::vector<ValuePage> pages;
   pages.reserve(starts.size());

@@ -58,7 +58,7 @@ struct NormalEquations {
 // The same from parts of the values, whose sums are added in any order: they are whole numbers.
 struct WeightSums {
   // blocks: some of the set. all: the diamonds of each scale, whether or not they are in this set.
-  void add(const PagedValues& values, std::span<const BrickRun> blocks, std::span<const std::uint32_t, kMaxLevels> all,
+  void add(const PagedValues& values, std::span<const BrickRun> blocks, std::span<const std::size_t, kMaxLevels> all,
            const ParallelFor& parallel = serial);
   void add(const WeightSums& other);
   [[nodiscard]] ValueWeights solve() const;

@@ -96,16 +96,16 @@ SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int sc
   return diamonds_of(domain, 0, wanted, parallel);
 }
 
-std::uint32_t count_diamonds(const Domain& domain) {
-  std::uint32_t count = 0;
+std::size_t count_diamonds(const Domain& domain) {
+  std::size_t count = 0;
   for (int scale = 0; scale < domain.levels(); ++scale)
-    for_each_supercube(domain, scale, [&](Vertex p) { count += std::uint32_t(std::popcount(updated_slots(domain, scale, p))); });
+    for_each_supercube(domain, scale, [&](Vertex p) { count += std::size_t(std::popcount(updated_slots(domain, scale, p))); });
   return count;
 }
 
-std::uint32_t coarse_diamonds(const SupercubeSet& set) {
+std::size_t coarse_diamonds(const SupercubeSet& set) {
   const auto [first, end] = set.of_scale(0);
-  return first == end ? set.size() : std::uint32_t(set.bricks()[first].first);
+  return first == end ? set.size() : std::size_t(set.bricks()[first].first);
 }
 
 }  // namespace intervale

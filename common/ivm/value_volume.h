@@ -33,7 +33,9 @@ namespace intervale {
 using ErrorLevel = std::uint8_t;
 inline constexpr int kErrorLevels = 32;
 
-inline constexpr std::uint64_t kMostSamples = 0x7fffffff;  // of a field; so that numbers of diamonds have 32 bits
+// Of a field, 4096 x 4096 x 4096: so that there are no more than kMostSupercubes, whatever the sides. In a browser numbers of
+// diamonds have 32 bits.
+inline constexpr std::uint64_t kMostSamples = sizeof(UpdateIndex) > 4 ? std::uint64_t(1) << 36 : 0x7fffffff;
 
 // What is known of a field besides its values.
 struct FieldDescription {
@@ -66,7 +68,7 @@ class ValueVolume {
     std::vector<ErrorLevel> error_levels;        // by number; of all diamonds of scale 1 and coarser, which come first
     std::vector<ChannelKeys> channel_keys = {};  // by channel of the description, and component
     std::vector<std::uint64_t> left = {};        // as in IntervalVolume::Parts
-    std::uint32_t finer = 0;                     // diamonds of finer scales than the set has: it has those of all others
+    std::size_t finer = 0;                       // diamonds of finer scales than the set has: it has those of all others
   };
   explicit ValueVolume(Parts parts);
 
@@ -94,8 +96,8 @@ class ValueVolume {
 // All diamonds of a domain that have an update, of the scale `finest` and coarser: those that exist, and whose split is
 // not a no-op. `parallel` may stop it.
 [[nodiscard]] SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel = serial, int finest = 0);
-// How many there are of all scales: less than 2^32.
-[[nodiscard]] std::uint32_t count_diamonds(const Domain& domain);
+// How many there are of all scales.
+[[nodiscard]] std::size_t count_diamonds(const Domain& domain);
 
 // All diamonds as of all_diamonds(), of those supercubes that are wanted.
 [[nodiscard]] SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int scale, Vertex position)>& wanted,
@@ -106,6 +108,6 @@ class ValueVolume {
 [[nodiscard]] Vertex last_supercube(const Domain& domain, int scale);
 
 // How many diamonds of a set are of scale 1 or coarser; they have the first numbers.
-[[nodiscard]] std::uint32_t coarse_diamonds(const SupercubeSet& set);
+[[nodiscard]] std::size_t coarse_diamonds(const SupercubeSet& set);
 
 }  // namespace intervale

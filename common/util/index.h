@@ -8,13 +8,16 @@
 namespace intervale {
 
 // A number of one kind of things; Tag names the kind. It becomes a plain integer implicitly, so that it indexes arrays,
-// shifts and compares; an integer or another kind's number becomes one only explicitly, or not at all.
+// shifts and compares, but never one of fewer bits; an integer or another kind's number becomes one only explicitly, or
+// not at all.
 template <class Tag, std::unsigned_integral Rep = std::uint32_t>
 class Index {
  public:
   constexpr Index() = default;  // 0
   constexpr explicit Index(std::integral auto value) : value_(Rep(value)) {}
   constexpr operator Rep() const { return value_; }
+  template <std::integral T>
+  constexpr explicit operator T() const requires(sizeof(T) < sizeof(Rep)) = delete;
 
   constexpr Index& operator++() {
     ++value_;

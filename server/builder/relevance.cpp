@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -313,18 +312,14 @@ Relevance find_relevant(const Volume& volume, const Range& range, Refine refine,
   }
   std::vector<SupercubeKey> keys;
   std::vector<std::uint64_t> occupancy;
-  std::uint64_t updates = 0;
   for (auto supercubes = by_scale.rbegin(); supercubes != by_scale.rend(); ++supercubes) {
     for (const auto& [key, slots] : *supercubes) {
       keys.push_back(key);
       occupancy.push_back(slots);
-      updates += std::uint64_t(std::popcount(slots));
     }
     *supercubes = Supercubes();
   }
-  // Known only now; the names of updates in memory have 32 bits.
-  if (updates > std::numeric_limits<std::uint32_t>::max())
-    throw std::length_error("the range needs more than 2^32 - 1 updates: choose a smaller one");
+  if (keys.size() > kMostSupercubes) throw std::length_error("the range needs too many updates: choose a smaller one");  // known only now
   result.set = SupercubeSet(keys, std::move(occupancy));
   return result;
 }

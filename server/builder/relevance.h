@@ -26,7 +26,7 @@ struct Relevance {
 };
 
 // Uses all cores that oneTBB may, and less than half a byte a sample, with rows rounded up to multiples of 64 samples.
-// shapes: by scale. Throws std::length_error if more than 2^32 - 1 diamonds are relevant.
+// shapes: by scale. Throws std::length_error if relevant diamonds are in more than kMostSupercubes.
 [[nodiscard]] Relevance find_relevant(const Volume& volume, const Range& range, Refine refine, const std::vector<BorderShapes>& shapes);
 
 }  // namespace intervale

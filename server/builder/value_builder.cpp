@@ -17,7 +17,6 @@ ValueVolume build_value_volume(Volume& volume, const ValueFormat& format, const 
   const bool is_exact = has_exact_values(volume, format);
   round_samples(volume, format);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const FieldHierarchy hierarchy(volume, {{-kInfinity, kInfinity}, Refine::uniform, progress, kept});
   ValueVolume::Parts parts;
   FieldDescription& d = parts.description;
   d.name = volume.name;
@@ -27,12 +26,15 @@ ValueVolume build_value_volume(Volume& volume, const ValueFormat& format, const 
   d.is_exact = is_exact;
   d.statistics.histogram = make_value_histogram(volume, format);
   d.statistics.volumes = make_volume_table(volume);
-  parts.set = hierarchy.set();
-  const std::uint32_t size = parts.set.size(), coarse = coarse_diamonds(parts.set);
-  for (UpdateIndex i{0}; i < size; ++i) d.max_error = std::max(d.max_error, double(hierarchy.error(i)));
-  parts.error_levels.resize(coarse);
-  for (UpdateIndex i{0}; i < coarse; ++i) parts.error_levels[i] = ValueVolume::level_of_error(d.max_error, double(hierarchy.error(i)));
-  parts.keys = ValueKeys(size, format.last);
+  {  // four bytes a diamond, which are freed before keys are found
+    const FieldHierarchy hierarchy(volume, {{-kInfinity, kInfinity}, Refine::uniform, progress, kept});
+    parts.set = hierarchy.set();
+    const std::size_t size = parts.set.size(), coarse = coarse_diamonds(parts.set);
+    for (UpdateIndex i{0}; i < size; ++i) d.max_error = std::max(d.max_error, double(hierarchy.error(i)));
+    parts.error_levels.resize(coarse);
+    for (UpdateIndex i{0}; i < coarse; ++i) parts.error_levels[i] = ValueVolume::level_of_error(d.max_error, double(hierarchy.error(i)));
+  }
+  parts.keys = ValueKeys(parts.set.size(), format.last);
   find_keys(volume, format, parts.set, parts.keys);
   d.corners = corner_keys(volume, format);
   parts.weights = fit_weights(parts, on_all_cores);

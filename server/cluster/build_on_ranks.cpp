@@ -165,7 +165,7 @@ class Part {
       const Vertex block = block_at(p);
       return scale > 0 || shares_.rank_of_block(block) == rank || (shares_.rank_of_block(block) >= 0 && shares_.is_thin(block));
     });
-    const std::uint32_t coarse = coarse_diamonds(parts_.set);
+    const std::size_t coarse = coarse_diamonds(parts_.set);
     parts_.keys = ValueKeys(parts_.set.size(), d.format.last);
     const Diamond root(domain_.root());
     find_keys({build_.type, d.grid.dims, std::as_const(samples_).bytes()}, d.format, parts_.set, parts_.keys,
@@ -178,7 +178,7 @@ class Part {
         d.corners[std::size_t(v)] = shares_.rank_of_sample(corner) == rank ? key_at(corner) : 0;
       }
     });
-    ranks_.unite(parts_.keys.bytes().first(std::size_t(coarse) * parts_.keys.width()));
+    ranks_.unite(parts_.keys.bytes().first(coarse * parts_.keys.width()));
     unite_thin_blocks();
     const auto corners = std::as_writable_bytes(std::span(d.corners));
     ranks_.unite({reinterpret_cast<std::uint8_t*>(corners.data()), corners.size()});
@@ -304,7 +304,7 @@ class Part {
     }
     if (auto ok = write_shared_file(ranks_, build_.output, pieces, build_.writes); !ok) return tl::unexpected(ok.error());
     BuiltByRanks built{std::move(parts_.description), 0, shares_.supercubes(), frame.file_bytes};
-    for (const std::uint32_t diamonds : shares_.diamonds()) built.updates += diamonds;
+    for (const std::size_t diamonds : shares_.diamonds()) built.updates += diamonds;
     return built;
   }
 
@@ -323,7 +323,7 @@ class Part {
 }  // namespace
 
 Result<BuiltByRanks> build_on_ranks(Ranks& ranks, const RankBuild& build) {
-  if (build.field.grid.sample_count() > kMostSamples) return misuse("the volume has more than 2^31 - 1 samples, too many for every range");
+  if (build.field.grid.sample_count() > kMostSamples) return misuse("the volume has more than 2^36 samples, too many for every range");
   return Part(ranks, build).run();
 }
 

@@ -35,7 +35,7 @@ class Shares {
     int rank = 0;
   };
   [[nodiscard]] const std::vector<Page>& pages() const { return pages_; }                            // all, by number
-  [[nodiscard]] const std::array<std::uint32_t, kMaxLevels>& diamonds() const { return diamonds_; }  // by scale
+  [[nodiscard]] const std::array<std::size_t, kMaxLevels>& diamonds() const { return diamonds_; }  // by scale
   [[nodiscard]] std::uint64_t supercubes() const { return supercubes_; }                             // of all scales
   [[nodiscard]] int rank_of_sample(Vertex v) const { return rank_of_box_[box_index(v)]; }            // v: in the box
   // Of a block of scale 0: who compresses it (-1: there is none), whether it is thin, and whose samples lie there.
@@ -64,7 +64,7 @@ class Shares {
 
   Vertex last_, boxes_, blocks_;
   std::vector<Page> pages_;
-  std::array<std::uint32_t, kMaxLevels> diamonds_{};
+  std::array<std::size_t, kMaxLevels> diamonds_{};
   std::uint64_t supercubes_ = 0;
   std::vector<int> rank_of_box_, rank_of_block_;
 };

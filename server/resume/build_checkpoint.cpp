@@ -148,7 +148,7 @@ bool fits(const std::vector<SupercubeKey>& keys, const std::vector<std::uint64_t
     if (std::max({p.x, p.y, p.z}) > (1 << kMaxLevels) >> (scale + 2)) return false;
     diamonds += std::uint64_t(std::popcount(occupancy[i]));
   }
-  return diamonds <= std::numeric_limits<std::uint32_t>::max();
+  return diamonds <= kMostUpdates && keys.size() <= kMostSupercubes;
 }
 
 SupercubeSet read_set(In& file, int levels) {

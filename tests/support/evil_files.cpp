@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "common/codec/byte_planes.h"
@@ -287,6 +288,15 @@ void lie_about_every_range(Liar& lie) {
         for (const std::size_t at : {0, 4, 8}) number(Stream::field, at, std::int32_t(1 << 20))(s);
       },
       "more samples than this program can read");
+  for (const auto& [name, last, about] : {std::tuple{"sides-over-most", 4097, "more samples than this program can read"},
+                                          std::tuple{"sides-most", 4096, "claims more values than it can hold"}})
+    lie(
+        name,
+        [last = last](Streams& s) {
+          for (const std::size_t at : {0, 4}) number(Stream::field, at, std::int32_t(1 << 12))(s);
+          number(Stream::field, 8, std::int32_t(last))(s);
+        },
+        about);
   lie(
       "sides-long",
       [](Streams& s) {
