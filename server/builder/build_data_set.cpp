@@ -33,8 +33,7 @@ Result<IntervalVolume::Parts> build_range(Volume& volume, const BuildOptions& op
 
 Result<ValueVolume::Parts> build_every_range(Volume& volume, std::optional<double> step, const std::function<void(double)>& progress,
                                              KeptErrors* kept) {
-  if (volume.grid.sample_count() > kMostSamples)
-    return misuse("the volume has more than 2^36 samples, too many for every range: give --range LO HI");
+  if (volume.grid.sample_count() > kMostSamples) return misuse("the volume has more than 2^36 samples, too many for every range: give --range LO HI");
   const auto format = choose_value_format(volume, step);
   if (!format) return tl::unexpected(format.error());
   ValueVolume::Parts parts = build_value_volume(volume, *format, progress, kept).take();

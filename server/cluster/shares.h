@@ -34,10 +34,10 @@ class Shares {
     std::vector<BlockKey> blocks;
     int rank = 0;
   };
-  [[nodiscard]] const std::vector<Page>& pages() const { return pages_; }                            // all, by number
+  [[nodiscard]] const std::vector<Page>& pages() const { return pages_; }                          // all, by number
   [[nodiscard]] const std::array<std::size_t, kMaxLevels>& diamonds() const { return diamonds_; }  // by scale
-  [[nodiscard]] std::uint64_t supercubes() const { return supercubes_; }                             // of all scales
-  [[nodiscard]] int rank_of_sample(Vertex v) const { return rank_of_box_[box_index(v)]; }            // v: in the box
+  [[nodiscard]] std::uint64_t supercubes() const { return supercubes_; }                           // of all scales
+  [[nodiscard]] int rank_of_sample(Vertex v) const { return rank_of_box_[box_index(v)]; }          // v: in the box
   // Of a block of scale 0: who compresses it (-1: there is none), whether it is thin, and whose samples lie there.
   [[nodiscard]] int rank_of_block(Vertex block) const { return rank_of_block_[block_index(block)]; }
   [[nodiscard]] bool is_thin(Vertex block) const { return block.x >= boxes_.x || block.y >= boxes_.y || block.z >= boxes_.z; }

@@ -235,7 +235,7 @@ Template record_all(const std::string& file, const Options& options, std::string
     std::vector<Recording>& of = scenario == Scenario::range ? to.drags : to.users;
     of.insert(of.end(), users.begin(), users.end());
   }
-  const double values = volume->size();
+  const double values = double(volume->size());
   to.bytes_a_value = double(volume->memory_bytes()) / values;
   to.seconds_a_value = decoding / values;
   facts += fmt::format("| {} | {:.2f} | {:.2f} | {} | {:.2f} | {:.2f} | {:.1f} | {:.1f} | {:.3f} | {:.0f} |\n", name,

@@ -61,7 +61,7 @@ TEST(CoarseScales, AreTheSameUpdatesAsThoseOfTheWholeFile) {
   for (const Bytes& file : {large(), file_of({70, 67, 66}, 0), file_of({300, 60, 20}, 4)}) {
     const SharedVolume all = whole(file);
     EXPECT_TRUE(all->is_whole());
-    std::uint32_t before = 0;
+    std::size_t before = 0;
     for (const CoarseScales& scales : scales_of(file)) {
       const SharedVolume some = coarse(file, scales);
       EXPECT_FALSE(some->is_whole());

@@ -240,7 +240,7 @@ TEST_P(Extremes, AreBuiltInSecondsAndAreValid) {
   const auto sigma = FieldHierarchy(volume, {.range = {100, 250}}).compact();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   ASSERT_TRUE(sigma) << sigma.error().message;
-  std::printf("             built in %.2f s, %u updates\n", seconds, sigma->size());
+  std::printf("             built in %.2f s, %zu updates\n", seconds, sigma->size());
   EXPECT_LT(seconds, 240) << "quadratic in the long side?";  // a tenth of that and less without a sanitizer
   if (volume.grid.sample_count() > 8) {
     EXPECT_GT(sigma->size(), 0u);
