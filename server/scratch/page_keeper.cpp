@@ -18,6 +18,7 @@ constexpr std::size_t kStretch = 256 << 10;
 constexpr std::size_t kMostPages = kStretch / 4096;
 constexpr std::uint64_t kPresent = std::uint64_t(1) << 63;  // bit of an entry of pagemap
 constexpr std::size_t kMostRounds = 8;                      // of the hand at a time
+constexpr std::uint64_t kMostAhead = 16 << 20;              // bytes over the budget while another thread takes pages out
 constexpr std::size_t kCounted = 4096;                      // stretches, before the budget is looked at again
 
 // So that about a quarter of the stretches is slower than the bound: a step up for each that is not, and three down.
@@ -96,7 +97,7 @@ void PageKeeper::recount(std::size_t end) noexcept {
 void PageKeeper::keep_within_budget(std::size_t end) noexcept {
   if (resident() <= budget_) return;
   if (is_sweeping_.exchange(true, std::memory_order_acquire)) {
-    while (is_sweeping_.load(std::memory_order_acquire)) ::sched_yield();
+    while (is_sweeping_.load(std::memory_order_acquire) && resident() > budget_ + kMostAhead) ::sched_yield();
     return;
   }
   sweep(end);
@@ -108,21 +109,25 @@ void PageKeeper::sweep(std::size_t end) noexcept {
   const std::size_t stretches = (end + kStretch - 1) / kStretch;
   const std::uint32_t now = milliseconds();
   std::size_t taken = 0, absent = 0;
+  bool is_far_over = resident() > budget_ + kMostAhead;  // then there is no time to choose
   for (std::size_t looks = 0; looks < kMostRounds * stretches && absent < stretches; ++looks) {
     if (hand_ >= stretches) hand_ = 0;
     const std::size_t stretch = hand_++;
     const unsigned pages = present(stretch);
     absent = pages == 0 ? absent + 1 : 0;
     if (pages == 0) continue;
-    if (float(pages) > slow_ * float(now - taken_at_[stretch] + 1)) {
+    if (!is_far_over && float(pages) > slow_ * float(now - taken_at_[stretch] + 1)) {
       slow_ = std::min(slow_ * kStepUp, kFastest);
       continue;
     }
-    slow_ = std::max(slow_ * kStepDown, kSlowest);
+    if (!is_far_over) slow_ = std::max(slow_ * kStepDown, kSlowest);
     ::madvise(mapping_ + stretch * kStretch, kStretch, MADV_DONTNEED);
     taken_at_[stretch] = now;
     taken_out_.fetch_add(pages * page_bytes(), std::memory_order_relaxed);
-    if (++taken % 8 == 0 && resident() <= enough) return;
+    if (++taken % 8 != 0) continue;
+    const std::uint64_t left = resident();
+    if (left <= enough) return;
+    is_far_over = left > budget_ + kMostAhead;
   }
 }
 

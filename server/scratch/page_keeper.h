@@ -32,8 +32,8 @@ class PageKeeper {
   ~PageKeeper();
 
   // Takes pages out of memory if more than the budget are in it. end: nothing beyond it was ever used. If another thread
-  // does so, waits until it is done. Any thread; safe in handlers of signals, but not where one may interrupt it that
-  // calls it, too.
+  // does so, waits as long as far more than the budget are in it. Any thread; safe in handlers of signals, but not where
+  // one may interrupt it that calls it, too.
   void keep_within_budget(std::size_t end) noexcept;
   // Counts the mapping's pages, and so what the program itself has of files, which grows in its first seconds. Reads 2 MB
   // of page tables for each GB; keeps within the budget meanwhile. One thread at a time.

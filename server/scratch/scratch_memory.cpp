@@ -111,6 +111,11 @@ ScratchMemory::Scope::Scope(ScratchMemory* memory) : before_(of_scope) {
 
 ScratchMemory::Scope::~Scope() { of_scope = before_; }
 
+ScratchMemory::Reading::Reading() {
+  const ScratchMemory* const memory = installed();
+  if (memory != nullptr && memory->keeper_) timer_.emplace(SIGPROF, kPeriod);
+}
+
 Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open(const std::filesystem::path& folder, std::uint64_t budget, unsigned threads) {
   const std::uint64_t least = kProgram + threads * kThread;
   if (budget < least)

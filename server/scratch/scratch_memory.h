@@ -8,8 +8,8 @@
 // For a build, the budget is of the whole process, and all threads that compute have their large arrays in the file. Every
 // millisecond a timer interrupts each of them to look. So the threads that fill memory empty it, however busy the machine
 // is. For a server, the budget is of the arrays: those of data sets, small ones too, and what measuring a range takes. A
-// thread that makes them says so by a Scope, and is interrupted likewise; while sessions read, a thread of its own looks
-// every millisecond.
+// thread that makes them says so by a Scope, and is interrupted likewise; one that reads them says so by a Reading.
+// Besides, a thread of its own looks every millisecond, which alone comes too late on a busy machine.
 #pragma once
 
 #include <atomic>
@@ -91,6 +91,16 @@ class ScratchMemory {
 
    private:
     ScratchMemory* before_;
+    std::optional<ThreadTimer> timer_;
+  };
+
+  // While it exists, SIGPROF comes to the calling thread, to keep the budget of the installed one for data sets while the
+  // thread reads them. Nothing happens if there is none when this is made. Not for a thread that waits: it would be woken.
+  class Reading {
+   public:
+    Reading();
+
+   private:
     std::optional<ThreadTimer> timer_;
   };
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/parallel/all_cores.h"
+#include "server/scratch/scratch_memory.h"
 #include "server/serve/thread_time.h"
 
 namespace intervale {
@@ -51,7 +52,10 @@ void Background::serve(const std::stop_token& stop) {
     work->is_busy = true;
     lock.unlock();
     const auto since = thread_time();
-    const bool has_more = work->slice(work->held);
+    const bool has_more = [&] {
+      const ScratchMemory::Reading data_sets;
+      return work->slice(work->held);
+    }();
     scheduler_.charge(*work->payer, thread_time() - since);
     lock.lock();
     work->is_busy = false;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/scratch/scratch_memory.h"
 #include "server/serve/fair_scheduler.h"
 
 namespace intervale {
@@ -77,6 +78,7 @@ class BasicConnectionExecutor {
     const auto executor = boost::asio::require(payer_->chosen().get_executor(), kBlocking);
     executor.execute([payer = payer_, run = std::decay_t<Function>(std::forward<Function>(function))]() mutable {
       const ConnectionPayer::Charge charge(*payer);
+      const ScratchMemory::Reading data_sets;
       std::move(run)();
     });
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -162,6 +163,7 @@ TEST(ScratchMemory, OfDataSetsKeepsItsBudgetWhileThreadsWriteAndRead) {
       const ScratchMemory::Scope scope(memory.get());
       for (std::size_t i = 0; i < kNumbers; ++i) numbers[i] = std::uint32_t(i) * salt;
     }
+    const ScratchMemory::Reading reading;
     std::mt19937 random(salt);
     for (int i = 0; i < 20'000; ++i) {
       const std::size_t at = random() % kNumbers;
@@ -175,7 +177,7 @@ TEST(ScratchMemory, OfDataSetsKeepsItsBudgetWhileThreadsWriteAndRead) {
   std::uint64_t most = 0;
   while (working != 0) {
     most = std::max(most, memory->keeper()->resident());
-    std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
   }
   one.join();
   two.join();
