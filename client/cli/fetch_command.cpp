@@ -65,6 +65,15 @@ class RecentVolume {
 // A data set of a server, or a file on a web server.
 using Source = std::variant<ServerUrl, RemoteUrl>;
 
+// What was read of a file.
+struct FileRead {
+  std::uint64_t of_bytes = 0, bytes = 0, requests = 0;
+};
+struct FromSource {
+  Fetched fetched;
+  std::optional<FileRead> file;
+};
+
 Result<Source> parse_source(const FetchCommand& options) {
   if (is_remote_url(options.url)) return parse_remote_url(options.url).map([](RemoteUrl url) { return Source(std::move(url)); });
   auto url = parse_url(options.url, options.access);
@@ -87,27 +96,34 @@ FetchEvents events_of(Progress& progress) {
   return events;
 }
 
-Result<Fetched> fetch_from(const ServerUrl& url, const FetchCommand& /*options*/, const FetchOptions& fetch) {
+Result<FromSource> fetch_from(const ServerUrl& url, const FetchCommand& /*options*/, const FetchOptions& fetch) {
   Progress progress("receiving " + printable(url.name));
   auto fetched = intervale::fetch(url, fetch, events_of(progress));
   if (!fetched) return tl::unexpected(with_access_hint(fetched.error(), url));
-  return fetched;
+  return FromSource{*std::move(fetched), {}};
 }
 
-// Reads the whole file, and chooses what the view needs. The token is not for web servers: it is not sent.
-Result<Fetched> fetch_from(const RemoteUrl& url, const FetchCommand& options, const FetchOptions& fetch) {
+// Reads the file as far as the view needs it, and chooses what that is. The token is not for web servers: it is not sent.
+Result<FromSource> fetch_from(const RemoteUrl& url, const FetchCommand& options, const FetchOptions& fetch) {
   RemoteOptions remote = options.remote;
   remote.authorities = options.access.authorities;
   const auto access = read_access(remote);
   if (!access) return tl::unexpected(access.error());
-  fmt::print(stderr, "intervale-client: no server: reads all of {}, and chooses what the view needs\n", url.shown);
+  fmt::print(stderr, "intervale-client: no server: reads what the view needs of {}\n", url.shown);
   Progress progress("reading " + url.shown);
-  auto read = load_remote_volume(url, *access, on_all_threads);
-  if (!read) {
-    const bool is_file = url.shown.ends_with(".ivm");
-    return fail(read.error().message + (is_file ? "" : "; data sets of intervale servers begin with ws:// or wss://"));
-  }
-  return fetch_local(*read, fetch, events_of(progress));
+  const RemoteLimits limits;
+  RemoteVolume file(url, *access, limits);
+  bool has_begun = false;
+  const NextVolume next = [&](ReadOn how, const ParallelFor& parallel) -> Result<std::shared_ptr<const IntervalVolume>> {
+    auto read = how == ReadOn::all ? file.whole(parallel) : file.next(parallel);
+    const bool is_other = !read && !has_begun && !url.shown.ends_with(".ivm");
+    has_begun = true;
+    if (is_other) return fail(read.error().message + "; data sets of intervale servers begin with ws:// or wss://");
+    return read;
+  };
+  auto fetched = fetch_growing(next, fetch, events_of(progress), on_all_threads);
+  if (!fetched) return tl::unexpected(fetched.error());
+  return FromSource{*std::move(fetched), FileRead{file.file_bytes(), file.read_bytes(), file.requests()}};
 }
 
 // The meshes of all ranges as one, and the figures of each if there are several.
@@ -127,7 +143,8 @@ FetchedMesh mesh_of(const StreamClient& client, bool has_digest) {
   return all;
 }
 
-Result<void> report(const FetchCommand& options, const Fetched& fetched, const FetchedMesh& all) {
+Result<void> report(const FetchCommand& options, const FromSource& source, const FetchedMesh& all) {
+  const Fetched& fetched = source.fetched;
   const FetchStats& stats = fetched.stats;
   const MeshFigures figures = figures_of(all.mesh, fetched.client.updates_in_mesh(), options.digest);
   if (options.json) {
@@ -141,6 +158,7 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const F
                                 {"seconds_first_mesh", stats.seconds_first_mesh},
                                 {"seconds_applying", stats.session.seconds_applying},
                                 {"seconds", stats.seconds}};
+    if (const auto& file = source.file) json["file"] = {{"bytes", file->of_bytes}, {"bytes_read", file->bytes}, {"requests", file->requests}};
     if (figures.digest) json["digest"] = *figures.digest;
     if (!all.each.empty()) json["ranges"] = to_json(all.each);
     return print_json(json);
@@ -148,6 +166,8 @@ Result<void> report(const FetchCommand& options, const Fetched& fetched, const F
   std::string text = printable(fetched.client.description().name) + ": " + to_text(figures) + "\n" + to_text(all.each);
   text += fmt::format("received {} in {} messages; first mesh after {:.1f} ms, {} after {:.1f} ms\n", human_bytes(stats.session.bytes),
                       stats.session.messages, 1000 * stats.seconds_first_mesh, stats.is_complete ? "all" : "budget reached", 1000 * stats.seconds);
+  if (const auto& file = source.file)
+    text += fmt::format("read {} of the file's {} in {} requests\n", human_bytes(file->bytes), human_bytes(file->of_bytes), file->requests);
   if (figures.digest) text += "digest " + *figures.digest + "\n";
   if (options.output) text += "wrote " + options.output->string() + "\n";
   if (options.picture) text += "drew " + options.picture->file.string() + "\n";
@@ -178,8 +198,9 @@ Result<void> run(const FetchCommand& options) {
   const auto& picture = options.picture;
   const bool has_budget = fetch.max_bytes || fetch.lod.max_tets;
   fetch.is_opaque = has_budget && picture && !options.output && picture->render == Render::surface && !picture->clip && !picture->edges;
-  const auto fetched = std::visit([&](const auto& url) { return fetch_from(url, options, fetch); }, *source);
-  if (!fetched) return tl::unexpected(fetched.error());
+  const auto from = std::visit([&](const auto& url) { return fetch_from(url, options, fetch); }, *source);
+  if (!from) return tl::unexpected(from.error());
+  const Fetched* const fetched = &from->fetched;
   const FetchedMesh all = mesh_of(fetched->client, options.digest);
   if (options.output) {
     if (auto written = write_mesh(*options.output, all.mesh); !written) return written;
@@ -191,7 +212,7 @@ Result<void> run(const FetchCommand& options) {
     if (!drawn) return tl::unexpected(drawn.error());
     if (!*drawn) fmt::print(stderr, "intervale-client: warning: nothing of the mesh is in the picture\n");
   }
-  return report(options, *fetched, all);
+  return report(options, *from, all);
 }
 
 }  // namespace
@@ -200,9 +221,9 @@ void add_fetch_command(Program& program) {
   const auto options = std::make_shared<FetchCommand>();
   CLI::App& command = program.add_command("fetch", "Receive a mesh, and write or draw it", [options] { return run(*options); });
   command
-      .add_option(
-          "URL", options->url,
-          "ws://HOST:PORT/NAME (or wss://) of a server; or https://HOST/FILE.ivm (or http://), a file on a web server, which is read as a whole")
+      .add_option("URL", options->url,
+                  "ws://HOST:PORT/NAME (or wss://) of a server; or https://HOST/FILE.ivm (or http://), a file on a web server, which is read as far "
+                  "as the mesh needs it")
       ->required();
   command.add_option("-o,--output", options->output, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")->type_name("MESH");
   add_ranges_option(command, options->range, kShownRangeHelp);

@@ -6,6 +6,10 @@
 
 namespace intervale {
 
+bool takes_coarse_first(const FetchOptions& options) {
+  return !options.lod.camera && !options.lod.max_tets && !options.lod.max_updates && !options.max_bytes;
+}
+
 FetchSession::FetchSession(const std::string& name, const std::string& server, const FetchOptions& options, const FetchEvents& events)
     : name_(name),
       server_(server),
@@ -40,6 +44,7 @@ Result<void> FetchSession::look(const std::optional<Refine>& refine) {
   return session_.look({.lod = options_.lod,
                         .budget = {.max_tets = options_.lod.max_tets.value_or(UINT64_MAX)},
                         .shown = {options_.shown.ranges, refine},
+                        .early = takes_coarse_first(options_),
                         .channels = options_.channels,
                         .is_opaque = options_.is_opaque});
 }

@@ -48,6 +48,11 @@ struct FetchEvents {
   std::function<void(const std::string&)> on_notice;
 };
 
+// Whether what is asked for may be sent from the coarse scales of a data set before the finer ones are there: the mesh is
+// the same in the end. Not with a camera, since how far surfaces move is not known yet; nor where a budget ends the stream,
+// since the order of what arrives matters then.
+[[nodiscard]] bool takes_coarse_first(const FetchOptions& options);
+
 // On one thread. options and events must outlive it.
 class FetchSession {
  public:

@@ -70,6 +70,25 @@ Result<IntervalVolume> decode_coarse(const FileEnds& file, const CoarseScales& s
   return of_every_range(std::move(*values).take(), parallel);
 }
 
+// Errors are saturated: an update's is no smaller than that of any child. The parents of a scale's first level are of the
+// last level of the scale before, and each of its other levels has its parents in the level before it. So where no update of
+// the finest scale's last level has an error above the threshold, none of a finer scale has. The levels before the last need
+// not be looked at: their errors may be above it, but they are held.
+//
+// Finer values may still make more of the held updates relevant to a range: those of whose own values, and of those of held
+// descendants, none counts. No mesh shows such an update (front.h), so that the mesh is the same without it.
+//
+// With a camera, how far surfaces move is measured in the whole data set.
+bool wants_finer(const IntervalVolume& volume, const Lod& lod) {
+  if (volume.is_whole()) return false;
+  const double threshold = error_of(lod, volume.description().max_error);
+  if (threshold <= 0 || lod.camera) return true;
+  const SupercubeSet& set = volume.set();
+  bool is_wanted = false;
+  set.for_each(scale_of_key(set.bricks().back().key), 2, [&](const Place& p) { is_wanted = is_wanted || double(volume.error(p.index)) > threshold; });
+  return is_wanted;
+}
+
 Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path, const ParallelFor& parallel) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = in ? std::streamoff(in.tellg()) : -1;

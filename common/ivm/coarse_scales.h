@@ -17,6 +17,7 @@
 #include "common/ivm/ivm_container.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
+#include "common/view/lod.h"
 
 namespace intervale {
 
@@ -39,6 +40,10 @@ inline constexpr std::size_t kStartBytes = 64 << 10;
 // (IntervalVolume::is_whole()). Fails as decode_volume().
 [[nodiscard]] Result<IntervalVolume> decode_coarse(const FileEnds& file, const CoarseScales& scales, std::string name,
                                                    const ParallelFor& parallel = serial);
+
+// Whether a level of detail needs more of a data set than these coarse scales of it, whichever ranges are shown. False of one
+// that is whole.
+[[nodiscard]] bool wants_finer(const IntervalVolume& volume, const Lod& lod);
 
 // The first of these of a file, by its first and last bytes. nullptr: it has none. The name is the file's.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path,

@@ -1,5 +1,6 @@
 #include "common/remote/load_remote.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "common/ivm/load_volume.h"
@@ -13,6 +14,64 @@ Result<std::shared_ptr<const IntervalVolume>> load_remote_volume(const RemoteUrl
   auto volume = decode_volume(contents->bytes, url.name, parallel, kAnyRoom, faults);
   if (!volume) return fail(url.shown + ": " + volume.error().message);
   return std::make_shared<const IntervalVolume>(std::move(*volume));
+}
+
+Result<std::shared_ptr<const IntervalVolume>> RemoteVolume::next(const ParallelFor& parallel) { return go_on(false, parallel); }
+Result<std::shared_ptr<const IntervalVolume>> RemoteVolume::whole(const ParallelFor& parallel) { return go_on(true, parallel); }
+
+RemoteVolume::RemoteVolume(const RemoteUrl& url, const RemoteAccess& access, const RemoteLimits& limits)
+    : url_(url), access_(access), limits_(limits), file_(url, access, limits) {}
+
+std::uint64_t RemoteVolume::file_bytes() const { return file_.ends().file_bytes; }
+
+std::uint64_t RemoteVolume::bytes_here() const {
+  const FileEnds ends = file_.ends();
+  return ends.first.size() + ends.last.size();
+}
+
+RemoteVolume::Next RemoteVolume::read_whole(const ParallelFor& parallel) {
+  if (auto all = file_.read_all(parallel); !all) return tl::unexpected(all.error());
+  return decode_volume(file_.ends().first, url_.name, parallel);
+}
+
+RemoteVolume::Next RemoteVolume::read_next(bool to_end, const ParallelFor& parallel) {
+  if (!std::exchange(is_begun_, true)) {
+    if (auto begun = file_.begin(parallel); !begun) return tl::unexpected(begun.error());
+    const FileEnds start = file_.ends();
+    auto scales = coarse_scales(start.first, start.file_bytes);
+    if (!scales) return Result<IntervalVolume>(tl::unexpected(scales.error()));
+    scales_ = *std::move(scales);
+    // What comes after the pages is a few kilobytes; where it is not, all is read at once. Nor are scales of use where
+    // everything is there, or nearly so.
+    std::erase_if(scales_, [&](const CoarseScales& one) {
+      const std::uint64_t there = std::max<std::uint64_t>(start.first.size(), one.first_bytes);
+      return one.last_bytes > limits_.range_bytes || there >= start.file_bytes || one.last_bytes >= start.file_bytes - there;
+    });
+  }
+  // Of those that are there already, the finest.
+  const std::uint64_t there = file_.ends().first.size();
+  while (next_ + 1 < scales_.size() && scales_[next_ + 1].first_bytes <= there) ++next_;
+  if (to_end || next_ >= scales_.size()) return read_whole(parallel);
+  const CoarseScales& scales = scales_[next_++];
+  if (auto read = file_.read(scales.first_bytes, scales.last_bytes, parallel); !read) return tl::unexpected(read.error());
+  const FileEnds ends = file_.ends();
+  return decode_coarse({ends.first.first(std::size_t(scales.first_bytes)), ends.last, ends.file_bytes}, scales, url_.name, parallel);
+}
+
+Result<std::shared_ptr<const IntervalVolume>> RemoteVolume::go_on(bool to_end, const ParallelFor& parallel) {
+  for (;;) {
+    auto read = read_next(to_end, parallel);
+    if (read && *read) return std::make_shared<const IntervalVolume>(**std::move(read));
+    if (read) return fail(url_.shown + ": " + read->error().message);
+    if (read.error().kind == RemoteFailure::Kind::final) return tl::unexpected(read.error().error);
+    if (starts_++ == kMostRemoteStarts) return fail(url_.shown + ": the file changes while it is read");
+    read_before_ += bytes_here();
+    requests_before_ += file_.requests();
+    file_ = RemoteFile(url_, access_, limits_);
+    is_begun_ = false;
+    scales_.clear();
+    next_ = 0;
+  }
 }
 
 }  // namespace intervale

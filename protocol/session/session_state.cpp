@@ -112,6 +112,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (is_other_view) search_.reset();  // if it is done, it would say that nothing is waited for
   shown_ = std::move(shown);
   is_early_ = view.early;
+  is_grown_ = false;
   is_new_ = true;
   waits_ = false;
   if (is_other_view || view_ == ViewState::none) view_bytes_ = 0;
@@ -229,11 +230,11 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   const bool others_wait = max_payload < protocol::kMaxBatchPayload;
   auto batch = plan_->next(size, others_wait ? kContendedVisits : StreamPlan::kMostVisits);
   if (!batch) {
-    const bool is_last = !measurement_ && volume_->is_whole();
+    const bool is_last = !measurement_ && (volume_->is_whole() || is_grown_);
     waits_ = plan_->done() && !is_last;
     if (!plan_->done() || !is_last) return {};
     if (is_ahead && !plan_->is_full()) ahead_percent_ = coarse_percent_;
-    is_new_ = !is_ahead && goes_ahead();
+    is_new_ = !is_ahead && volume_->is_whole() && goes_ahead();
     view_ = is_new_ ? ViewState::ahead : ViewState::done;
     if (is_ahead) return {};
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};

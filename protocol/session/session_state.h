@@ -36,6 +36,13 @@ class SessionState {
   // takes to code the batch.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
+  // Nothing that is still to come of the data set is wanted by the last view, which has neither camera nor budget
+  // (wants_finer()): it is done with what is there.
+  void end_growth() {
+    is_grown_ = true;
+    waits_ = false;
+  }
+
   // There may be a batch to select and encode.
   [[nodiscard]] bool has_work() const { return opened_was_sent_ && is_streaming() && !needs_credit() && !waits(); }
   // Until it is known what new ranges need, how far their surfaces move, or what is within a budget; or until the data set
@@ -91,6 +98,7 @@ class SessionState {
   bool is_measured_ = true;                                    // how far surfaces move, of those
   std::shared_ptr<const RangeAnswer> estimate_, measurement_;  // of shown_; nullptr if there is no need
   std::shared_ptr<BudgetSearch> search_;                       // of the plan; nullptr: none is under way
+  bool is_grown_ = false;                                      // end_growth(), for the last view
   bool waits_ = false;                                         // nothing more can be sent before one of them is ready
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding

@@ -89,6 +89,34 @@ TEST(Remote, InfoAndVerifySendHeadersAndRefuseInOneLine) {
   expect_complaint(run({program("intervale"), "info", web.url(), "--part", "one"}), 2, "--part", "intervale: ");
 }
 
+// The first mesh is there after two round trips; each byte is read once, and none that the error does not need.
+TEST(Remote, FetchReadsCoarseScalesFirstAndNoFinerOnesThanItNeeds) {
+  const TempDir folder;
+  const std::string volume = folder / "gyroid.nrrd", file = folder / "gyroid.ivm";
+  ASSERT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "129", "-o", volume}).status, 0);
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", file}).status, 0);
+  const ServerProgram local(file);
+  for (const Arguments& view :
+       {Arguments{}, {"--error-percent", "10"}, {"--error", "0.3"}, {"--error-percent", "0.01"}, {"--max-tets", "20000"}, views()[2]}) {
+    const FileServer web(contents_of(file));
+    const Arguments more = Arguments{"--range", "-0.3", "0.4", "--digest", "--json"} + view;
+    const auto served = json_of(run(Arguments{program("intervale-client"), "fetch", local.url("gyroid")} + more));
+    const auto read = json_of(run(Arguments{program("intervale-client"), "fetch", web.url("/gyroid.ivm")} + more));
+    EXPECT_EQ(read.at("digest"), served.at("digest"));
+    EXPECT_EQ(read.at("updates"), served.at("updates"));
+    const auto& of_file = read.at("file");
+    EXPECT_EQ(of_file.at("bytes"), contents_of(file).size());
+    EXPECT_EQ(of_file.at("requests"), web.requests().size());
+    EXPECT_LE(web.requests().size(), of_file.at("bytes_read").get<std::size_t>() / (64 << 10) + 1);
+    const bool is_coarse = view.size() == 2 && (view[1] == "10" || view[1] == "0.3");
+    if (is_coarse) {
+      EXPECT_LT(of_file.at("bytes_read").get<std::size_t>(), contents_of(file).size() / 4);
+    } else {
+      EXPECT_EQ(of_file.at("bytes_read"), of_file.at("bytes"));
+    }
+  }
+}
+
 TEST(Remote, FetchSaysThatThereIsNoServer) {
   const FileServer web(contents_of(buckyball()));
   const TempDir folder;

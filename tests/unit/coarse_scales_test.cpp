@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <memory>
+#include <random>
+#include <utility>
 
 #include "client/core/client_session.h"
+#include "client/local/fetch_local.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/load_volume.h"
 #include "common/ivm/value_file.h"
@@ -92,6 +95,90 @@ TEST(CoarseScales, TheirMeshIsThatOfTheWholeFileWhereNothingFinerIsWanted) {
     EXPECT_GT((*one)[0].mesh.tets.size(), 0U);
     EXPECT_EQ(mesh_digest((*one)[0].mesh), mesh_digest((*other)[0].mesh));
   }
+}
+
+// The largest error of a scale's last level bounds those of all finer scales, whatever the box cuts.
+TEST(CoarseScales, ErrorsOfTheLastLevelOfAScaleBoundThoseOfFinerOnes) {
+  for (const Dims& dims :
+       std::vector<Dims>{{33, 33, 33}, {40, 21, 35}, {70, 67, 66}, {65, 9, 30}, {2, 50, 7}, {37, 2, 2}, {18, 17, 100}, {3, 3, 66}}) {
+    for (unsigned seed = 0; seed < 5; ++seed) {
+      const SharedVolume all = whole(file_of(dims, seed));
+      const SupercubeSet& set = all->set();
+      const auto largest = [&](int scale, int cls) {
+        double error = 0;
+        set.for_each(scale, std::size_t(cls), [&](const Place& p) { error = std::max(error, double(all->error(p.index))); });
+        return error;
+      };
+      double finer = 0;
+      for (int scale = 0; scale < all->domain().levels(); ++scale) {
+        for (const int cls : {2, 1, 0}) {
+          EXPECT_GE(largest(scale, cls), finer) << dims[0] << "x" << dims[1] << "x" << dims[2] << " field " << seed << " scale " << scale << " level "
+                                                << cls;
+          finer = std::max(finer, largest(scale, cls));
+        }
+      }
+    }
+  }
+}
+
+TEST(CoarseScales, WantFinerOnesWhereTheirErrorsAreAboveTheThreshold) {
+  for (const Bytes& file : {large(), file_of({70, 67, 66}, 0), file_of({300, 60, 20}, 4)}) {
+    const SharedVolume all = whole(file);
+    EXPECT_FALSE(wants_finer(*all, {}));
+    for (const CoarseScales& scales : scales_of(file)) {
+      const SharedVolume some = coarse(file, scales);
+      EXPECT_TRUE(wants_finer(*some, {})) << "error 0 wants all";
+      EXPECT_FALSE(wants_finer(*some, {.error_percent = 100}));
+      EXPECT_TRUE(wants_finer(*some, {.error_percent = 100, .camera = Camera{}})) << "distances need the whole data set";
+      for (const float step : all->error_steps()) {
+        bool is_finer_wanted = false, is_last_level_above = false;
+        for (UpdateIndex i{some->size()}; i < all->size(); ++i) is_finer_wanted = is_finer_wanted || all->error(i) > step;
+        some->set().for_each(scales.finest, 2, [&](const Place& p) { is_last_level_above = is_last_level_above || some->error(p.index) > step; });
+        if (step > 0) {
+          EXPECT_EQ(wants_finer(*some, {.error = step}), is_last_level_above);
+        }
+        EXPECT_TRUE(wants_finer(*some, {.error = step}) || !is_finer_wanted) << "error " << step;
+      }
+    }
+  }
+}
+
+// Any range, refined in any way: what finer values make relevant besides is not shown.
+TEST(CoarseScales, EndAFetchOnceNothingFinerIsWanted) {
+  std::mt19937 random(3);
+  std::size_t ended = 0;
+  for (const unsigned seed : {0U, 1U, 2U, 4U}) {
+    const Dims dims{70, 67, 66};
+    const testing::ValueField field = testing::random_value_field(dims, seed);
+    const Bytes file = file_of(dims, seed);
+    const SharedVolume all = whole(file), some = coarse(file, scales_of(file).front());
+    double least = 0;  // threshold
+    some->set().for_each(scales_of(file).front().finest, 2, [&](const Place& p) { least = std::max(least, double(some->error(p.index))); });
+    for (int n = 0; n < 12; ++n) {
+      FetchOptions options;
+      options.lod.error = n % 3 == 0 ? least : n % 3 == 1 ? least * 1.3 : least / 2;
+      options.shown = {{testing::random_range(field, random)}, n % 4 == 1 ? Refine::uniform : Refine::boundary};
+      if (n % 5 == 0) options.shown.ranges.push_back(testing::random_range(field, random));
+      bool is_whole = false;
+      const auto read = [&](ReadOn how, const ParallelFor&) -> Result<SharedVolume> {
+        EXPECT_EQ(how, ReadOn::one_scale);
+        return std::exchange(is_whole, true) ? all : some;
+      };
+      int reads = 0;
+      const auto growing =
+          fetch_growing([&](ReadOn how, const ParallelFor& parallel) { return ++reads, read(how, parallel); }, options, {}, on_all_cores);
+      const auto at_once = fetch_local(all, options, {});
+      ASSERT_TRUE(growing && at_once);
+      EXPECT_TRUE(growing->stats.is_complete);
+      EXPECT_EQ(reads, wants_finer(*some, options.lod) ? 2 : 1);
+      ended += reads == 1 ? 1 : 0;
+      const auto one = growing->client.meshes(), other = at_once->client.meshes();
+      ASSERT_EQ(one.size(), other.size());
+      for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(mesh_digest(one[i]), mesh_digest(other[i])) << seed << " " << n;
+      EXPECT_EQ(growing->client.updates_in_mesh(), at_once->client.updates_in_mesh());
+    }
+  }
+  EXPECT_GT(ended, 20U);
 }
 
 TEST(CoarseScales, AreFewOfTheBytes) {
