@@ -34,7 +34,7 @@ class BudgetSearch {
   [[nodiscard]] bool is_done() const { return is_done_.load(std::memory_order_acquire); }
   // Of the search, besides the volume and what is relevant. Between slices.
   [[nodiscard]] std::size_t memory_bytes() const {
-    return sizeof *this + page_.capacity() * sizeof page_[0] + ranks_.size() * sizeof ranks_[0] + result_.memory_bytes();
+    return sizeof *this + ranking_.memory_bytes() + page_.capacity() * sizeof page_[0] + ranks_.size() * sizeof ranks_[0] + result_.memory_bytes();
   }
   // Once it is done; closed under parents. Throws what prevented it, for example that memory is exhausted.
   [[nodiscard]] SplitSet result() &&;

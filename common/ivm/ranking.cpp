@@ -22,16 +22,20 @@ Ranking::Ranking(const IntervalVolume& volume, const RelevantUpdates& relevant, 
   const auto steps = volume.error_steps();
   while (threshold > 0 && least_step_ < steps.size() && steps[least_step_] <= threshold) ++least_step_;
   const Grid& g = volume.description().grid;
-  if (lod.roi) roi_.emplace(*lod.roi, g);
+  if (lod.roi) roi_ = std::make_unique<const SeenBox>(*lod.roi, g);
   if (lod.camera) {
     screen_.emplace(*lod.camera, g);
-    if (hidden != nullptr) occlusion_.emplace(*hidden, *lod.camera, g);
-    if (ahead != nullptr) ahead_.emplace(*ahead, g);
+    if (hidden != nullptr) occlusion_ = std::make_unique<const Occlusion>(*hidden, *lod.camera, g);
+    if (ahead != nullptr) ahead_ = std::make_unique<const ScreenError>(*ahead, g);
     pixel_error_ = float(lod.camera->pixel_error);
     const Vec3 spacing = g.affine.spacing();
     for (unsigned slope = 0; slope <= kMaxSlope; ++slope) removed_[slope] = removed_of(slope);
     spacing_ = std::cbrt(spacing[0]) * std::cbrt(spacing[1]) * std::cbrt(spacing[2]);
   }
+}
+
+std::size_t Ranking::memory_bytes() const {
+  return (roi_ ? sizeof *roi_ : 0) + (ahead_ ? sizeof *ahead_ : 0) + (occlusion_ ? sizeof *occlusion_ + occlusion_->memory_bytes() : 0);
 }
 
 Ranking::Brick Ranking::of_brick(BrickIndex brick) const {

@@ -19,6 +19,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 
 #include "common/ivm/interval_volume.h"
@@ -167,7 +168,7 @@ class Ranking {
   [[nodiscard]] Rank band_below(Rank top) const;
 
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
-  [[nodiscard]] std::size_t memory_bytes() const { return occlusion_ ? occlusion_->memory_bytes() : 0; }  // besides this object
+  [[nodiscard]] std::size_t memory_bytes() const;  // besides this object
 
  private:
   static constexpr float kLeastImportance = std::numeric_limits<float>::min(), kMostImportance = 0x1p100f;
@@ -191,9 +192,11 @@ class Ranking {
   const IntervalVolume& volume_;
   const RelevantUpdates& relevant_;
   unsigned least_step_ = 0;  // the lowest error step that is wanted
-  std::optional<SeenBox> roi_;
-  std::optional<ScreenError> screen_, ahead_;  // now, and soon
-  std::optional<Occlusion> occlusion_;
+  std::optional<ScreenError> screen_;
+  // What few views have takes no memory otherwise.
+  std::unique_ptr<const SeenBox> roi_;
+  std::unique_ptr<const ScreenError> ahead_;  // soon
+  std::unique_ptr<const Occlusion> occlusion_;
   float pixel_error_ = 0;
   double spacing_ = 0;                          // between samples, the geometric mean over the axes
   std::array<float, kMaxSlope + 1> removed_{};  // by slope

@@ -43,7 +43,7 @@ bool is_redirect(long status) { return status == 301 || status == 302 || status 
 bool is_temporary_status(long status) { return status == 408 || status == 429 || (status >= 500 && status < 600); }
 
 std::string text_of(long status) {
-  const std::string text = "the server answers " + std::to_string(status);
+  std::string text = "the server answers " + std::to_string(status);
   if (status == 401 || status == 403) return text + ": it wants other credentials (--header-file or --aws-sign)";
   if (status == 404 || status == 410) return text + ": there is no such file";
   return text;

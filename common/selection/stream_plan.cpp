@@ -66,18 +66,18 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   relevant_ = std::move(relevant);
   shown_ = std::move(shown);
   const SupercubeSet& set = volume_->set();
-  pending_.assign(set.bricks().size(), {});
-  is_loose_.assign(pending_.size(), false);
+  viewed_.assign(set.bricks().size(), {});
+  pending_ = SparseArray<std::uint64_t>(viewed_.size());
   wanted_count_ = pending_bricks_ = 0;
-  for (BrickIndex b{0}; b < pending_.size(); ++b) {
-    Pending& pending = pending_[b];
-    const RelevantUpdates::Bound& bound = relevant_->bound(b);
-    const unsigned all = set.updates(b), left = bound.updates == 0 ? 0 : all - sent_.count(set.bricks()[b].first, all);
-    pending.set_unsent(std::min<unsigned>(bound.updates, left));
-    pending.raise_to({bound.error_step, 0, bound.slope, 0}, bound.object_error);
+  for (BrickIndex b{0}; b < viewed_.size(); ++b) {
+    if (relevant_->bound(b).updates == 0) continue;
+    Pending pending = first_pending(b);
+    const unsigned all = set.updates(b), sent = sent_.count(set.bricks()[b].first, all);
+    if (sent == 0) continue;
+    pending.set_unsent(std::min<unsigned>(pending.unsent, all - sent));
+    keep(b, pending);
   }
-  highest_steps_ = SparseArray<std::uint16_t>(set.supercubes());
-  highest_distances_ = SparseArray<std::uint8_t>(relevant_->has_distances() ? set.supercubes() : 0);
+  supercube_bounds_ = SupercubeBounds(viewed_.size());
 }
 
 void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* ahead) {
@@ -140,9 +140,12 @@ void StreamPlan::put(const SlotGroup& updates, BatchBuilder& builder) {
   const auto count = unsigned(std::popcount(updates.slots));
   builder.put(updates, count);
   sent_count_ += count;
-  Pending& w = pending_[updates.brick];
+  Pending w = pending(updates.brick);
   w.set_unsent(w.unsent - count);
-  if (w.wanted > w.unsent) set_pending(updates.brick, w.rank, w.unsent);
+  if (w.wanted > w.unsent)
+    set_pending(updates.brick, w, viewed_[updates.brick].rank, w.unsent);
+  else
+    keep(updates.brick, w);
 }
 
 bool StreamPlan::has_room(const BatchBuilder& builder, std::size_t updates) const {
@@ -153,24 +156,27 @@ bool StreamPlan::has_room(const BatchBuilder& builder, std::size_t updates) cons
 bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   const SupercubeSet& set = volume_->set();
   const Ranking::Brick ranking = ranking_->of_brick(brick);
-  if (is_loose_[brick]) refine(brick, ranking);
-  Pending& pending = pending_[brick];
-  if (pending.rank < band_) return true;
+  if (viewed_[brick].is_loose != 0) refine(brick, ranking);
+  if (viewed_[brick].rank < band_) return true;
   if (!relevant_->is_found(brick)) builder.visited += kFindVisits;
   const BrickNeeds& needs = relevant_->brick(brick);
-  std::array<Highest, kBrick> highest = highest_of(brick, needs);
-  if (ranking_->has_camera()) move_limit(brick, ranking, highest);
+  Bounds bounds = bounds_of(brick, needs);
+  Pending before = pending(brick);
+  if (ranking_->has_camera()) {
+    move_limit(ranking, before, bounds);
+    keep(brick, before);
+  }
   const int scale = scale_of_key(set.bricks()[brick].key);
   const Rank least = budget_ ? Rank(1) : Rank(0);  // ancestors in the budget come last
   Unsent rest;
   float object_error = 0;
   bool full = false;
-  InBrick in{needs, 0, scale, relevant_->distance(pending.limit)};
+  InBrick in{needs, 0, scale, relevant_->distance(before.limit)};
   builder.visited += kBrickVisits;
   set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     if (full) return;
     const std::size_t n = in.number++;
-    const Highest& all = highest[n];
+    const Highest all = bounds.highest[n];
     const float farthest = relevant_->object_error(needs.to_distance(n), scale, all.error_step, all.distance);
     const Rank bound = std::max(ranking.bound({all.error_step, farthest, all.slope}), least);
     const std::uint64_t occupancy = set.occupancy()[s], relevant = needs.slots(n, occupancy);
@@ -186,15 +192,18 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
     const auto here = visit_supercube(ranking, {needs, n, scale, in.limit}, {key, brick, s, {}, first}, unsent, all, builder);
     full = !here;
     if (full) return;
+    bounds.set(n, here->highest);
     rest.raise(*here);
     object_error = std::max(object_error, relevant_->object_error(needs.to_distance(n), scale, here->highest.error_step, here->highest.distance));
   });
+  keep(brick, bounds);
   if (full) return false;
   // What was not looked up may have been sent; but bounds do not grow.
-  pending.set_unsent(std::min<unsigned>(pending.unsent, needs.updates()));
-  set_pending(brick, rest.rank, std::min<unsigned>(pending.wanted, rest.wanted));
-  pending.lower_to(rest.highest, object_error);
-  if (ranking_->has_camera()) pending.pixels = Up16(ranking.pixels(float(pending.object_error)));
+  Pending after = pending(brick);
+  after.set_unsent(std::min<unsigned>(after.unsent, needs.updates()));
+  after.lower_to(rest.highest, object_error);
+  set_pending(brick, after, rest.rank, std::min<unsigned>(after.wanted, rest.wanted));
+  if (ranking_->has_camera()) viewed_[brick].pixels = Up16(ranking.pixels(float(after.object_error)));
   return true;
 }
 
@@ -224,7 +233,6 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
     rest.highest.raise(of_update(in, first.index + *number, count_below(relevant, slot)));
     ++number;
   }
-  set_highest(in, s, rest.highest);
   return rest;
 }
 
@@ -278,7 +286,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
       if (builder.bytes >= max_bytes / 4 * 3) break;  // little room for another band: it would pay for its names twice
       begin_band();
     }
-    if (pending_[next_brick_ - 1].rank < band_) {
+    if (viewed_[next_brick_ - 1].rank < band_) {
       --next_brick_;
       continue;
     }

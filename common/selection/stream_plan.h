@@ -3,9 +3,9 @@
 //
 // Updates are sent in bands of falling rank (ranking.h): within a band, importances differ by a factor of 4. Within a
 // band they are sent region by region, each after its missing ancestors: neighbours share names and code tables, which
-// makes the batch smaller. Bounds of the unsent updates are kept for each brick and supercube, and a brick is visited
-// only if its bound is in the band: a new view costs O(bricks), and then the work for what it sends. What a brick needs may
-// be found only then (relevant_updates.h).
+// makes the batch smaller. Bounds of the unsent updates are kept for each brick and supercube that something was sent of
+// (those of others are of all that is relevant), and a brick is visited only if its bound is in the band: a new view costs
+// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h).
 #pragma once
 
 #include <algorithm>
@@ -23,6 +23,7 @@
 #include "common/ivm/budget_search.h"
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ranking.h"
+#include "common/selection/supercube_bounds.h"
 #include "common/util/bits.h"
 #include "common/util/sparse_array.h"
 #include "common/view/lod.h"
@@ -131,21 +132,15 @@ class StreamPlan {
     explicit Up16(float value) : bits(std::uint16_t((bits_as<std::uint32_t>(value) + 0xffff) >> 16)) {}
     explicit operator float() const { return bits_as<float>(std::uint32_t(bits) << 16); }
   };
-  // Upper bounds on the error steps, distances and slopes of unsent updates. slope_below: of those whose object errors are
-  // not above the brick's limit; the other slope may be of any.
-  struct Highest {
-    std::uint8_t error_step = 0, distance = 0, slope = 0, slope_below = 0;
-    void raise(const Highest& other) {
-      error_step = std::max(error_step, other.error_step);
-      distance = std::max(distance, other.distance);
-      slope = std::max(slope, other.slope);
-      slope_below = std::max(slope_below, other.slope_below);
-    }
-    friend bool operator==(const Highest&, const Highest&) = default;
+  // What a view looks at of a brick.
+  struct Viewed {
+    std::uint16_t rank : 15 = 0;     // of the unsent updates that are wanted; 0: there are none
+    std::uint16_t is_loose : 1 = 0;  // the rank may be much too high; see refine()
+    Up16 pixels;                     // of those, on the camera's screen; 0 without one
   };
+  static_assert(sizeof(Viewed) == 4);
   // The unsent relevant updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
   struct Pending {
-    Rank rank = 0;                  // of those that are wanted; 0: there are none
     std::uint16_t unsent : 12 = 0;  // at most so many
     std::uint16_t slope : 4 = 0;
     std::uint16_t wanted : 12 = 0;  // bound on the number of those that are wanted
@@ -153,12 +148,18 @@ class StreamPlan {
     std::uint8_t error_step = 0;
     std::uint8_t limit = 0;  // a code: `slope` is of those whose object errors are above its distance
     Up16 object_error;
-    Up16 pixels;  // on the camera's screen; 0 without one
     void set_unsent(unsigned count) { unsent = count & 0xfffU; }
     void raise_to(const Highest& highest, float object_error);
     void lower_to(const Highest& highest, float object_error);
   };
-  static_assert(sizeof(Pending) == 12);
+  static_assert(sizeof(Pending) == 8);
+  // What is not in pending_ is as it is known of all relevant updates, of which none was sent.
+  [[nodiscard]] Pending pending(BrickIndex brick) const {
+    const auto found = pending_.find(brick);
+    return found ? bits_as<Pending>(*found) : first_pending(brick);
+  }
+  [[nodiscard]] Pending first_pending(BrickIndex brick) const;
+  void keep(BrickIndex brick, const Pending& pending);
   [[nodiscard]] Ranking::Left left(const Pending& pending) const {
     return {pending.error_step, float(pending.object_error), pending.slope, relevant_->distance(pending.limit), pending.slope_below};
   }
@@ -169,7 +170,8 @@ class StreamPlan {
     int scale = 0;
     float limit = 0;  // of the brick
   };
-  void set_pending(BrickIndex brick, Rank rank, unsigned wanted);
+  // Keeps what is pending, of which so many are wanted from now on; pending.wanted: until now.
+  void set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted);
   [[nodiscard]] InBrick in_brick(BrickIndex brick, SupercubeIndex s) const;
   // before: relevant updates of the supercube with lower numbers.
   [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, int before) const {
@@ -178,12 +180,17 @@ class StreamPlan {
     if (error <= in.limit) std::swap(own.slope, own.slope_below);
     return own;
   }
-  [[nodiscard]] static Highest of_relevant(const InBrick& in);
-  [[nodiscard]] Highest highest(const InBrick& in, SupercubeIndex s) const;
-  static constexpr std::size_t kBrick = 64;  // most supercubes of one
-  [[nodiscard]] std::array<Highest, kBrick> highest_of(BrickIndex brick, const BrickNeeds& needs) const;
-  void move_limit(BrickIndex brick, const Ranking::Brick& ranking, std::array<Highest, kBrick>& highest);
-  void set_highest(const InBrick& in, SupercubeIndex s, Highest to);
+  [[nodiscard]] static Highest of_relevant(const InBrick& in) {
+    return {in.needs.error_step(in.number), in.needs.distance(in.number), in.needs.slope(in.number), 0};
+  }
+  // Bounds of all supercubes of a brick. Those that are not kept are those of their relevant updates.
+  struct Bounds : SupercubeBounds::OfBrick {
+    bool has_changed = false;                         // since it was read
+    void set(std::size_t number, const Highest& to);  // number: of the supercube in the brick
+  };
+  [[nodiscard]] Bounds bounds_of(BrickIndex brick, const BrickNeeds& needs) const;
+  void keep(BrickIndex brick, const Bounds& bounds);
+  void move_limit(const Ranking::Brick& ranking, Pending& pending, Bounds& bounds) const;
   void rank_bricks();
   // Lowers a loose rank to that which Ranking::of_brick() tells.
   void refine(BrickIndex brick, const Ranking::Brick& ranking);
@@ -214,12 +221,9 @@ class StreamPlan {
   std::shared_ptr<const RelevantUpdates> relevant_;  // not null
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
-  std::vector<Pending> pending_;  // by brick
-  std::vector<bool> is_loose_;    // by brick: its rank may be much too high; see refine()
-  // Highest of supercubes, where it is not that of their relevant updates: error step * 256 + slope_below * 16 + slope; and
-  // distance, if distances are known.
-  SparseArray<std::uint16_t> highest_steps_;
-  SparseArray<std::uint8_t> highest_distances_;
+  std::vector<Viewed> viewed_;                // by brick
+  SparseArray<std::uint64_t> pending_;        // by brick, the bits of Pending
+  SupercubeBounds supercube_bounds_;          // of unsent updates, where they are not those of the relevant ones
   std::vector<SentChannel> channels_;         // of the data set
   std::vector<std::size_t> wanted_channels_;  // ascending
   std::uint32_t next_lacking_ = 0;            // bricks before this one lack no value that is wanted

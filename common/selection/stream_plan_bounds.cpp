@@ -18,42 +18,30 @@ constexpr float kLimit = 1.3F, kLeastLimit = 0.95F;
 
 StreamPlan::InBrick StreamPlan::in_brick(BrickIndex brick, SupercubeIndex s) const {
   const SupercubeSet::Brick& b = volume_->set().bricks()[brick];
-  return {relevant_->brick(brick), s - b.first_supercube, scale_of_key(b.key), relevant_->distance(pending_[brick].limit)};
+  return {relevant_->brick(brick), s - b.first_supercube, scale_of_key(b.key), relevant_->distance(pending(brick).limit)};
 }
 
-StreamPlan::Highest StreamPlan::of_relevant(const InBrick& in) {
-  return {in.needs.error_step(in.number), in.needs.distance(in.number), in.needs.slope(in.number), 0};
+StreamPlan::Bounds StreamPlan::bounds_of(BrickIndex brick, const BrickNeeds& needs) const {
+  const auto count = std::size_t(std::popcount(volume_->set().bricks()[brick].mask));
+  Bounds bounds;
+  for (std::size_t n = 0; n < count; ++n) bounds.highest[n] = of_relevant({needs, n});
+  supercube_bounds_.read(brick, count, bounds);
+  return bounds;
 }
 
-StreamPlan::Highest StreamPlan::highest(const InBrick& in, SupercubeIndex s) const {
-  const auto steps = highest_steps_.find(s);
-  if (!steps) return of_relevant(in);
-  const std::uint8_t distance = relevant_->has_distances() ? highest_distances_.find(s).value_or(0) : std::uint8_t(0);
-  return {std::uint8_t(*steps >> 8), distance, std::uint8_t(*steps & 15U), std::uint8_t(*steps >> 4 & 15U)};
+void StreamPlan::keep(BrickIndex brick, const Bounds& bounds) {
+  if (bounds.has_changed) supercube_bounds_.write(brick, std::size_t(std::popcount(volume_->set().bricks()[brick].mask)), bounds);
 }
 
-std::array<StreamPlan::Highest, StreamPlan::kBrick> StreamPlan::highest_of(BrickIndex brick, const BrickNeeds& needs) const {
-  const SupercubeSet::Brick& b = volume_->set().bricks()[brick];
-  const std::size_t first = b.first_supercube, count = std::size_t(std::popcount(b.mask));
-  std::array<Highest, kBrick> highest;
-  for (std::size_t n = 0; n < count; ++n) highest[n] = of_relevant({needs, n});
-  highest_steps_.for_each_in(first, first + count, [&](std::size_t s, std::uint16_t steps) {
-    highest[s - first] = {std::uint8_t(steps >> 8), 0, std::uint8_t(steps & 15U), std::uint8_t(steps >> 4 & 15U)};
-  });
-  highest_distances_.for_each_in(first, first + (relevant_->has_distances() ? count : 0),
-                                 [&](std::size_t s, std::uint8_t distance) { highest[s - first].distance = distance; });
-  return highest;
+void StreamPlan::Bounds::set(std::size_t number, const Highest& to) {
+  if (highest[number] == to) return;
+  highest[number] = to;
+  kept |= std::uint64_t(1) << number;
+  has_changed = true;
 }
 
-void StreamPlan::set_highest(const InBrick& in, SupercubeIndex s, Highest to) {
-  if (!highest_steps_.find(s) && to == of_relevant(in)) return;
-  highest_steps_.set(s, std::uint16_t(to.error_step << 8 | to.slope_below << 4 | to.slope));
-  if (relevant_->has_distances()) highest_distances_.set(s, to.distance);
-}
-
-// Sets a brick's limit again if it is not near what a view wants there. highest: of the brick, which it changes.
-void StreamPlan::move_limit(BrickIndex brick, const Ranking::Brick& ranking, std::array<Highest, kBrick>& highest) {
-  Pending& pending = pending_[brick];
+// Sets a brick's limit again if it is not near what a view wants there. bounds: of the brick.
+void StreamPlan::move_limit(const Ranking::Brick& ranking, Pending& pending, Bounds& bounds) const {
   const float limit = relevant_->distance(pending.limit), unwanted = ranking.unwanted();
   if (limit >= kLeastLimit * unwanted && limit <= Ranking::Left::kHardly * unwanted) return;
   const std::uint8_t to = relevant_->code_below(kLimit * unwanted);
@@ -64,13 +52,11 @@ void StreamPlan::move_limit(BrickIndex brick, const Ranking::Brick& ranking, std
     pending.slope = std::max<unsigned>(pending.slope, pending.slope_below) & 15U;
   else
     pending.slope_below = std::max<unsigned>(pending.slope, pending.slope_below) & 15U;
-  const SupercubeSet::Brick& b = volume_->set().bricks()[brick];
-  const std::size_t first = b.first_supercube;
-  highest_steps_.change_each_in(first, first + std::size_t(std::popcount(b.mask)), [&](std::size_t s, std::uint16_t steps) {
-    Highest& h = highest[s - first];
+  for (const std::size_t n : set_bits<std::size_t>(bounds.kept)) {
+    Highest& h = bounds.highest[n];
     (is_lower ? h.slope : h.slope_below) = std::max(h.slope, h.slope_below);
-    return std::uint16_t((steps & 0xff00U) | unsigned(h.slope_below) << 4 | h.slope);
-  });
+    bounds.has_changed = true;
+  }
 }
 
 void StreamPlan::Pending::raise_to(const Highest& highest, float error) {
@@ -90,48 +76,64 @@ void StreamPlan::Pending::lower_to(const Highest& highest, float error) {
 // Bricks are ranked by bounds that are found fast. Those that come first are ranked again, as well as can be.
 void StreamPlan::rank_bricks() {
   Ranking::BrickBounds bounds(*ranking_);
-  for (BrickIndex b{0}; b < pending_.size(); ++b) {
-    Pending& w = pending_[b];
+  for (BrickIndex b{0}; b < viewed_.size(); ++b) {
+    if (relevant_->bound(b).updates == 0) continue;
+    const Pending w = pending(b);
     if (w.unsent == 0) continue;
     const auto bound = bounds(b, left(w));
-    w.pixels = Up16(bound.pixels);
-    is_loose_[b] = !bound.is_exact;
-    set_pending(b, std::max(bound.rank, budget_ ? Rank(1) : Rank(0)), w.unsent);
+    viewed_[b].pixels = Up16(bound.pixels);
+    viewed_[b].is_loose = bound.is_exact ? 0 : 1;
+    set_pending(b, w, std::max(bound.rank, budget_ ? Rank(1) : Rank(0)), w.unsent);
   }
   begin_band();
 }
 
 void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
-  const Pending& w = pending_[brick];
-  is_loose_[brick] = false;
+  const Pending w = pending(brick);
+  viewed_[brick].is_loose = 0;
   const Rank exact = ranking.bound(left(w));
-  set_pending(brick, std::min(w.rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), w.wanted);
+  set_pending(brick, w, std::min<Rank>(viewed_[brick].rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), w.wanted);
 }
 
-void StreamPlan::set_pending(BrickIndex brick, Rank rank, unsigned wanted) {
-  Pending& w = pending_[brick];
-  if (w.unsent == 0) rank = 0;
-  wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, w.unsent);
-  wanted_count_ += wanted - std::uint64_t(w.wanted);
-  pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(w.rank != 0);
-  w.rank = rank;
-  w.wanted = wanted & 0xfffU;
+StreamPlan::Pending StreamPlan::first_pending(BrickIndex brick) const {
+  const RelevantUpdates::Bound& bound = relevant_->bound(brick);
+  Pending first;
+  first.set_unsent(bound.updates);
+  first.wanted = viewed_[brick].rank == 0 ? 0 : first.unsent;
+  first.raise_to({bound.error_step, 0, bound.slope, 0}, bound.object_error);
+  return first;
+}
+
+void StreamPlan::keep(BrickIndex brick, const Pending& pending) {
+  const auto bits = bits_as<std::uint64_t>(pending);
+  if (bits != bits_as<std::uint64_t>(this->pending(brick))) pending_.set(brick, bits);
+}
+
+void StreamPlan::set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted) {
+  if (pending.unsent == 0) rank = 0;
+  wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, pending.unsent);
+  wanted_count_ += wanted - std::uint64_t(pending.wanted);
+  Viewed& viewed = viewed_[brick];
+  pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(viewed.rank != 0);
+  viewed.rank = rank & 0x7fffU;
+  pending.wanted = wanted & 0xfffU;
+  keep(brick, pending);
 }
 
 void StreamPlan::begin_band() {
-  next_brick_ = std::uint32_t(pending_.size());
+  next_brick_ = std::uint32_t(viewed_.size());
   Rank top = 0;
   for (std::uint32_t next = next_brick_; next != 0; --next) {  // coarse ones have high ranks, so that few others are refined
     const BrickIndex b(next - 1);
-    if (pending_[b].rank > top && is_loose_[b]) refine(b, ranking_->of_brick(b));
-    top = std::max(top, pending_[b].rank);
+    if (viewed_[b].rank > top && viewed_[b].is_loose != 0) refine(b, ranking_->of_brick(b));
+    top = std::max<Rank>(top, viewed_[b].rank);
   }
   band_ = top == 0 ? Rank(0) : ranking_->band_below(top);
 }
 
 StreamPlan::Remaining StreamPlan::remaining() const {
   Rank top = 0;
-  for (const Pending& w : pending_) top = std::max(top, w.rank);
+  for (const Viewed& v : viewed_) top = std::max<Rank>(top, v.rank);
   Remaining remaining{wanted_count_, 0, 0};
   if (top == 0) return remaining;
   if (!ranking_->has_camera()) {
@@ -139,10 +141,10 @@ StreamPlan::Remaining StreamPlan::remaining() const {
     return remaining;
   }
   unsigned error_step = 0;
-  for (const Pending& w : pending_) {
-    if (w.rank == 0) continue;
-    error_step = std::max(error_step, unsigned(w.error_step));
-    remaining.pixels = std::max(remaining.pixels, double(float(w.pixels)));
+  for (BrickIndex b{0}; b < viewed_.size(); ++b) {
+    if (viewed_[b].rank == 0) continue;
+    error_step = std::max(error_step, unsigned(pending(b).error_step));
+    remaining.pixels = std::max(remaining.pixels, double(float(viewed_[b].pixels)));
   }
   remaining.error = volume_->error_steps()[error_step];
   return remaining;

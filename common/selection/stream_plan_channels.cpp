@@ -69,7 +69,7 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
   std::size_t bytes = kPlaneBytes;
   bool is_full = false;
   std::uint32_t visited = 0;
-  for (; next_lacking_ < pending_.size() && !is_full && visited < kMaxSearched; next_lacking_ += std::uint32_t(!is_full)) {
+  for (; next_lacking_ < viewed_.size() && !is_full && visited < kMaxSearched; next_lacking_ += std::uint32_t(!is_full)) {
     const BrickIndex brick(next_lacking_);
     visited += std::uint32_t(std::popcount(set.bricks()[brick].mask));
     const std::size_t before = groups.size();
@@ -100,7 +100,7 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
 
 std::size_t StreamPlan::memory_bytes() const {
   std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
-  bytes += pending_.capacity() * sizeof(Pending) + is_loose_.capacity() / 8 + highest_steps_.memory_bytes() + highest_distances_.memory_bytes();
+  bytes += viewed_.capacity() * sizeof(Viewed) + pending_.memory_bytes() + supercube_bounds_.memory_bytes();
   if (ranking_) bytes += ranking_->memory_bytes();
   for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
   return bytes;

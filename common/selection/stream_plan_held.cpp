@@ -16,9 +16,10 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   if (added == 0) return true;
   sent_.insert(first, occupancy, added);
   sent_count_ += std::uint64_t(std::popcount(added));
-  Pending& pending = pending_[found->brick];
+  Pending pending = this->pending(found->brick);
   const InBrick in = in_brick(found->brick, found->supercube);
   pending.set_unsent(pending.unsent - unsigned(std::popcount(added & in.needs.slots(in.number, occupancy))));
+  keep(found->brick, pending);
   return true;
 }
 
@@ -48,13 +49,16 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const InBrick in = in_brick(here.brick, here.supercube);
     const std::uint64_t relevant = in.needs.slots(in.number, here.occupancy);
     if ((relevant >> slot & 1) == 0) return;
-    Pending& pending = pending_[here.brick];
+    Pending pending = this->pending(here.brick);
     pending.set_unsent(pending.unsent + 1);
     const Highest again = of_update(in, i, count_below(relevant, slot));
     pending.raise_to(again, relevant_->object_error(in.needs.to_distance(in.number), in.scale, again.error_step, again.distance));
-    Highest highest = this->highest(in, here.supercube);
+    keep(here.brick, pending);
+    Bounds bounds = bounds_of(here.brick, in.needs);
+    Highest highest = bounds.highest[in.number];
     highest.raise(again);
-    set_highest(in, here.supercube, highest);
+    bounds.set(in.number, highest);
+    keep(here.brick, bounds);
   });
   return true;
 }

@@ -15,7 +15,7 @@ template <class To, class From>
 [[nodiscard]] To bits_as(const From& from) {
   static_assert(sizeof(To) == sizeof(From) && std::is_trivially_copyable_v<To> && std::is_trivially_copyable_v<From>);
   To to;
-  std::memcpy(&to, &from, sizeof to);
+  std::memcpy(static_cast<void*>(&to), &from, sizeof to);  // of any class that can be copied so
   return to;
 }
 

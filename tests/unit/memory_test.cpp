@@ -92,7 +92,7 @@ TEST(Memory, OfASessionGrowsWithWhatWasSent) {
   plan.set_lod({});
   while (!plan.done()) {
     (void)plan.next(64 << 10);
-    EXPECT_LE(plan.memory_bytes(), (16u << 10) + 12 * volume->set().bricks().size() + plan.sent() / 2) << plan.sent();
+    EXPECT_LE(plan.memory_bytes(), (16u << 10) + 5 * volume->set().bricks().size() + plan.sent() / 2) << plan.sent();
   }
   EXPECT_EQ(plan.sent(), volume->size());
   EXPECT_GE(plan.memory_bytes() - before, volume->size() / 8) << "a bit for each update";

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -143,13 +146,15 @@ TEST(RemoteVolume, OthersAreReadWhole) {
   expect_at_once(server);
   EXPECT_EQ(server.requests().size(), 1U);
   RemoteLimits narrow = hasty();  // what follows the pages takes more than one request
-  narrow.range_bytes = 100;
+  narrow.range_bytes = 200;
   narrow.connections = 1;
-  const std::string small = file_of({70, 67, 66}, 0);
+  const std::string small = file_of({70, 50, 36}, 0);
   const FileServer other(small);
   const auto read = read_all(other.url(), narrow);
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_EQ(read->size(), 1U);
+  const auto ranges = ranges_of(other, small.size());
+  EXPECT_TRUE(std::is_sorted(ranges.begin(), ranges.end()));
 }
 
 TEST(RemoteVolume, TriesAgainAfterWhatMayPassAndEndsInOneLineOtherwise) {
@@ -186,12 +191,12 @@ TEST(RemoteVolume, TriesAgainAfterWhatMayPassAndEndsInOneLineOtherwise) {
 
 // The file changes after any of the requests; a stream that has begun starts again.
 TEST(RemoteVolume, AFileThatChangesIsReadAgain) {
-  const std::string other = file_of({134, 130, 129}, 0);
+  const std::string other = file_of({130, 134, 129}, 1);
   FetchOptions options;
-  options.shown.ranges = {{0.2, 4}};
+  options.shown.ranges = {{1.3, 1.5}};
   const auto wanted = fetch_local(whole(other), options, {});
   ASSERT_TRUE(wanted);
-  for (std::size_t from = 1; from < 6; ++from) {
+  for (const std::size_t from : {1, 3, 5}) {
     FileServer server(contents());
     server.misbehave([from](const FileRequest&, std::size_t number, FileAnswer& answer) {
       if (number == from) answer = {.status = 412};
@@ -220,9 +225,12 @@ TEST(RemoteVolume, AFileThatChangesIsReadAgain) {
 }
 
 TEST(RemoteVolume, AnErrorWhileAStreamRunsEndsIt) {
+  std::atomic<std::size_t> batches{0};
   FileServer server(contents());
-  server.misbehave([](const FileRequest&, std::size_t number, FileAnswer& answer) {
-    if (number >= 3) answer = {.status = 404};
+  server.misbehave([&batches](const FileRequest&, std::size_t number, FileAnswer& answer) {
+    if (number < 3) return;
+    for (int ms = 0; ms < 10'000 && batches == 0; ++ms) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    answer = {.status = 404};
   });
   const RemoteUrl url = parse_remote_url(server.url()).value();
   const RemoteAccess access;
@@ -230,7 +238,6 @@ TEST(RemoteVolume, AnErrorWhileAStreamRunsEndsIt) {
   RemoteVolume file(url, access, limits);
   FetchOptions options;
   options.shown.ranges = {{0.2, 1}};
-  std::size_t batches = 0;
   const FetchEvents events{.on_batch = [&](const StreamClient&, const FetchStats&) { ++batches; }, .on_notice = {}};
   const auto fetched = fetch_growing([&](ReadOn, const ParallelFor& parallel) { return file.next(parallel); }, options, events, serial);
   ASSERT_FALSE(fetched);
