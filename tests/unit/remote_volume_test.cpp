@@ -198,8 +198,8 @@ TEST(RemoteVolume, AFileThatChangesIsReadAgain) {
   ASSERT_TRUE(wanted);
   for (const std::size_t from : {1, 3, 5}) {
     FileServer server(contents());
-    server.misbehave([from](const FileRequest&, std::size_t number, FileAnswer& answer) {
-      if (number == from) answer = {.status = 412};
+    server.misbehave([from, has = false](const FileRequest& request, std::size_t number, FileAnswer& answer) mutable {
+      if (number >= from && !request.header("if-match").empty() && !std::exchange(has, true)) answer = {.status = 412};
     });
     const RemoteUrl url = parse_remote_url(server.url()).value();
     const RemoteAccess access;
@@ -218,8 +218,8 @@ TEST(RemoteVolume, AFileThatChangesIsReadAgain) {
     EXPECT_EQ(notices, 1U);
   }
   FileServer restless(contents());
-  restless.misbehave([](const FileRequest&, std::size_t number, FileAnswer& answer) {
-    if (number % 4 == 3) answer = {.status = 412};
+  restless.misbehave([](const FileRequest& request, std::size_t number, FileAnswer& answer) {
+    if (number % 4 == 3 && !request.header("if-match").empty()) answer = {.status = 412};
   });
   EXPECT_THAT(read_all(restless.url()).error().message, HasSubstr("changes while it is read"));
 }
