@@ -2,7 +2,7 @@
 // The finest levels of the mesh are left out, and each has about half of its updates.
 
 const kStepMs = 30; // for the worker's part of a step; uploading and drawing take about as long again
-const kFirstMsPerUpdate = 0.0008; // until a step was measured
+const kFirstMsPerUpdate = 0.002; // until a step was measured
 const kMostLevels = 15; // five scales
 
 export class PreviewPace {
