@@ -25,15 +25,6 @@ static_assert(kFirstBytes >= kMostHeadBytes);
 constexpr unsigned kMostRedirects = 5;
 constexpr std::chrono::milliseconds kTurn{50};  // between looks at whether reading is to stop
 
-// A range of the file that one request is for.
-struct Piece {
-  std::uint64_t first = 0, bytes = 0;
-  bool is_last = false;  // one of the file's last bytes
-  std::uint64_t received = 0;
-  unsigned attempts = 0;
-  Clock::time_point due{};
-};
-
 std::uint64_t memory_of_machine() {
   const long pages = ::sysconf(_SC_PHYS_PAGES), size = ::sysconf(_SC_PAGESIZE);
   return pages > 0 && size > 0 ? std::uint64_t(pages) * std::uint64_t(size) : ~std::uint64_t(0);
@@ -92,6 +83,15 @@ class RemoteFile::Reader {
   [[nodiscard]] RemoteContents take() { return {std::move(bytes_), std::move(stamp_)}; }
 
  private:
+  // A range of the file that one request is for.
+  struct Piece {
+    std::uint64_t first = 0, bytes = 0;
+    bool is_last = false;  // one of the file's last bytes
+    std::uint64_t received = 0;
+    unsigned attempts = 0;
+    Clock::time_point due{};
+  };
+
   void add_pieces(std::uint64_t from, std::uint64_t end, bool is_last) {
     for (std::uint64_t at = from; at < end; at += limits_.range_bytes) pieces_.push_back({at, std::min(limits_.range_bytes, end - at), is_last});
   }

@@ -8,7 +8,7 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kHere = 4;                                         // bytes of a bit for each brick
+constexpr std::size_t kHereBytes = 4;                                    // bytes of a bit for each brick
 constexpr std::size_t kPast = 3;                                         // bytes that a load may read past the last record
 constexpr std::size_t kAllocator = 8;                                    // what an allocator takes for a block; their sum is a multiple of 16
 constexpr std::size_t kMostBytes = 8 + 5 + SupercubeBounds::kBrick * 3;  // of a record
@@ -127,7 +127,7 @@ struct SupercubeBounds::Place {
   std::size_t records = 0, before = 0;      // how many
   std::size_t begin = 0, end = 0, all = 0;  // in bytes, from the first record's begin
   bool is_here = false;
-  [[nodiscard]] static std::size_t first(std::size_t records) { return kHere + 2 * records; }
+  [[nodiscard]] static std::size_t first(std::size_t records) { return kHereBytes + 2 * records; }
 };
 
 SupercubeBounds::Place SupercubeBounds::place(const Block& block, BrickIndex brick) {
@@ -137,7 +137,7 @@ SupercubeBounds::Place SupercubeBounds::place(const Block& block, BrickIndex bri
   p.is_here = (p.here >> (brick % kPage) & 1) != 0;
   p.records = std::size_t(std::popcount(p.here));
   p.before = std::size_t(count_below(p.here, int(brick % kPage)));
-  const auto end = [&](std::size_t records) { return records == 0 ? std::size_t(0) : load16(block.get() + kHere + 2 * (records - 1)); };
+  const auto end = [&](std::size_t records) { return records == 0 ? std::size_t(0) : load16(block.get() + kHereBytes + 2 * (records - 1)); };
   p.begin = end(p.before);
   p.end = p.is_here ? end(p.before + 1) : p.begin;
   p.all = end(p.records);
@@ -168,8 +168,9 @@ void SupercubeBounds::write(BrickIndex brick, std::size_t count, const OfBrick& 
     store32(grown.get(), p.here | std::uint32_t(1) << (brick % kPage));
     if (block) {
       const std::uint8_t* const from = block.get() + Place::first(p.records);
-      std::memcpy(grown.get() + kHere, block.get() + kHere, 2 * p.before);
-      std::memcpy(grown.get() + kHere + 2 * (p.before + 1), block.get() + kHere + 2 * (p.before + (p.is_here ? 1 : 0)), 2 * (records - p.before - 1));
+      std::memcpy(grown.get() + kHereBytes, block.get() + kHereBytes, 2 * p.before);
+      std::memcpy(grown.get() + kHereBytes + 2 * (p.before + 1), block.get() + kHereBytes + 2 * (p.before + (p.is_here ? 1 : 0)),
+                  2 * (records - p.before - 1));
       std::memcpy(grown.get() + first, from, p.begin);
       std::memcpy(grown.get() + first + p.begin + bytes, from + p.end, p.all - p.end);
     }
@@ -177,7 +178,7 @@ void SupercubeBounds::write(BrickIndex brick, std::size_t count, const OfBrick& 
     block = std::move(grown);
     block_bytes_ += needs + kAllocator - (had == 0 ? 0 : had + kAllocator);
   }
-  std::uint8_t* const ends = block.get() + kHere;
+  std::uint8_t* const ends = block.get() + kHereBytes;
   store16(ends + 2 * p.before, p.begin + bytes);
   for (std::size_t i = p.before + 1; i < records; ++i) store16(ends + 2 * i, load16(ends + 2 * i) + bytes - (p.end - p.begin));
 }
