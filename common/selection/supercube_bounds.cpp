@@ -9,7 +9,7 @@ namespace intervale {
 namespace {
 
 constexpr std::size_t kHereBytes = 4;                                    // bytes of a bit for each brick
-constexpr std::size_t kPast = 3;                                         // bytes that a load may read past the last record
+constexpr std::size_t kPast = 4;                                         // bytes that a load may read past the last record
 constexpr std::size_t kAllocator = 8;                                    // what an allocator takes for a block; their sum is a multiple of 16
 constexpr std::size_t kMostBytes = 8 + 5 + SupercubeBounds::kBrick * 3;  // of a record
 
@@ -18,7 +18,6 @@ std::size_t capacity(std::size_t bytes) { return (bytes + kPast + kAllocator + 1
 
 std::uint32_t load16(const std::uint8_t* from) { return from[0] | std::uint32_t(from[1]) << 8; }
 std::uint32_t load32(const std::uint8_t* from) { return load16(from) | load16(from + 2) << 16; }
-std::uint64_t load64(const std::uint8_t* from) { return load32(from) | std::uint64_t(load32(from + 4)) << 32; }
 void store16(std::uint8_t* to, std::size_t value) {
   to[0] = std::uint8_t(value);
   to[1] = std::uint8_t(value >> 8);
@@ -98,8 +97,8 @@ std::size_t encode(std::size_t count, const SupercubeBounds::OfBrick& bounds, st
 }
 
 void decode(std::size_t count, const std::uint8_t* from, SupercubeBounds::OfBrick& to) {
-  to.kept = load64(from) & (~std::uint64_t(0) >> (64 - count));
-  from += mask_bytes(count);
+  to.kept = 0;
+  for (std::size_t i = 0; i < mask_bytes(count); ++i) to.kept |= std::uint64_t(*from++) << (8 * i);
   const Head head = load_head(from);
   from += head.bytes();
   const auto below = [](unsigned bits) { return (std::uint32_t(1) << bits) - 1; };
