@@ -43,6 +43,7 @@ class Ranking {
 
   // 0: not wanted for its own sake. Otherwise what matters more has a higher rank.
   using Rank = std::uint16_t;
+  static constexpr unsigned kRankBits = 13;  // of the highest rank
 
   // Ranks the updates of one supercube.
   class Supercube {
@@ -179,6 +180,7 @@ class Ranking {
   // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1. All that is seen ranks above all
   // that is hidden.
   static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 32, kSeenFrom = 4096;
+  static_assert(((127 + 100) << 4) - kRankFrom + kSeenFrom < 1 << kRankBits, "of kMostImportance");
   [[nodiscard]] static Rank rank_of(float importance, bool is_seen) {
     const int rank = int(bits_as<std::uint32_t>(importance < kMostImportance ? importance : kMostImportance) >> kRankShift) - kRankFrom;
     return Rank(std::max(rank, 1) + is_seen * kSeenFrom);

@@ -138,7 +138,7 @@ class StreamPlan {
     std::uint16_t is_loose : 1 = 0;  // the rank may be much too high; see refine()
     Up16 pixels;                     // of those, on the camera's screen; 0 without one
   };
-  static_assert(sizeof(Viewed) == 4);
+  static_assert(sizeof(Viewed) == 4 && Ranking::kRankBits <= 15);
   // The unsent relevant updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
   struct Pending {
     std::uint16_t unsent : 12 = 0;  // at most so many

@@ -12,8 +12,6 @@
 #include <optional>
 #include <vector>
 
-#include "common/util/bits.h"
-
 namespace intervale {
 
 // Elements are used or not; an unused one reads as 0. Memory: eight bytes for each page of 1024 elements; for each page
@@ -77,16 +75,6 @@ class SparseArray {
     std::byte* const at = use(i) + offset(pages_[i / kPage], i);
     store(at, T(change(load<T>(at))));
   }
-  // Calls visit(i, value) for those in [begin, end) that are used, in order.
-  template <class Visit>
-  void for_each_in(std::size_t begin, std::size_t end, Visit&& visit) const {
-    for_each_place(begin, end, [&visit](std::size_t i, const std::byte* at) { visit(i, load<T>(at)); });
-  }
-  // Calls change(i, value) for them, which returns what the element is from now on.
-  template <class Change>
-  void change_each_in(std::size_t begin, std::size_t end, Change&& change) {
-    for_each_place(begin, end, [&change](std::size_t i, std::byte* at) { store(at, T(change(i, load<T>(at)))); });
-  }
   // Calls visit(value) for all that are used, in order.
   template <class Visit>
   void for_each(Visit&& visit) const {
@@ -141,20 +129,6 @@ class SparseArray {
     else
       std::fill_n(copy.get(), kHead, std::byte(0));
     return copy;
-  }
-  template <class Visit>
-  void for_each_place(std::size_t begin, std::size_t end, Visit&& visit) const {
-    for (std::size_t i = begin; i < end; i = (i / 64 + 1) * 64) {
-      std::byte* const block = pages_[i / kPage].get();
-      if (block == nullptr) continue;
-      const std::size_t word = i % kPage / 64, many = std::min(end - i, 64 - i % 64);
-      const auto all = load<std::uint64_t>(block + word * 8);
-      std::byte* at = block + kHead + (used_before(block, word) + std::size_t(count_below(all, int(i % 64)))) * sizeof(T);
-      for (const int k : set_bits(all >> (i % 64) & (~std::uint64_t(0) >> (64 - many)))) {
-        visit(i + std::size_t(k), at);
-        at += sizeof(T);
-      }
-    }
   }
   std::byte* use(std::size_t i) {
     Block& block = pages_[i / kPage];

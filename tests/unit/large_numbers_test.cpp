@@ -124,9 +124,9 @@ TEST(LargeNumbers, ASparseArrayHasElementsBeyond2To32) {
     ASSERT_EQ(array.get(at - k2To32 + 5'000), 0U);
     ASSERT_EQ(array.uses_any(at, at + 1), model.contains(at));
   }
-  std::vector<std::size_t> visited, used;
-  array.for_each_in(0, array.size(), [&](std::size_t i, std::uint32_t) { visited.push_back(i); });
-  for (const auto& [i, value] : model) used.push_back(i);
+  std::vector<std::uint32_t> visited, used;
+  array.for_each([&](std::uint32_t value) { visited.push_back(value); });
+  for (const auto& [i, value] : model) used.push_back(value);
   EXPECT_EQ(visited, used);
 }
 

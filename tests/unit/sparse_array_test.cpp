@@ -53,25 +53,6 @@ TEST_P(SparseArrays, HoldWhatWasUsedAndNothingElse) {
   EXPECT_LE(copy.memory_bytes(), copy.size() / 256 * 76 + model.size() * 4);
 }
 
-TEST_P(SparseArrays, VisitAndChangeThoseOfAPart) {
-  std::mt19937 random(17);
-  SparseArray<std::uint32_t> array(kElements);
-  Model model;
-  for (std::size_t n = 0; n < GetParam(); ++n) {
-    const std::size_t i = random() % kElements;
-    array.set(i, model[i] = std::uint32_t(random()));
-  }
-  for (int trial = 0; trial < 100; ++trial) {
-    const std::size_t begin = random() % kElements, end = begin + random() % (trial % 2 == 0 ? 80 : kElements - begin);
-    Model visited, expected(model.lower_bound(begin), model.lower_bound(end));
-    array.for_each_in(begin, std::min(end, kElements), [&visited](std::size_t i, std::uint32_t value) { visited[i] = value; });
-    EXPECT_EQ(visited, expected) << begin << " to " << end;
-    array.change_each_in(begin, std::min(end, kElements), [](std::size_t i, std::uint32_t value) { return value + std::uint32_t(i); });
-    for (const auto& [i, value] : expected) model[i] = value + std::uint32_t(i);
-    expect_equal(array, model);
-  }
-}
-
 TEST_P(SparseArrays, GiveTheirBitsFromAnywhere) {
   std::mt19937 random(11);
   SparseArray<std::uint32_t> array(kElements + 2);
