@@ -132,8 +132,12 @@ Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, Supercube
 
 double Ranking::error(Rank rank) const { return rank == 0 ? 0 : double(volume_.error_steps()[rank - 1u]); }
 
-Ranking::Rank Ranking::band_below(Rank top) const {
-  if (screen_) return Rank(std::max(top > kSeenFrom ? kSeenFrom + 1 : 1, top - kBand + 1));
+Ranking::Rank Ranking::band_below(Rank top, bool is_rest) const {
+  if (screen_) {
+    const int last = top > kSeenFrom ? kSeenFrom + 1 : 1;
+    return Rank(is_rest ? last : std::max(last, top - kBand + 1));
+  }
+  if (is_rest) return 1;
   const auto steps = volume_.error_steps();
   const float low = steps[top - 1u] * 0.25F;
   return Rank(std::lower_bound(steps.begin(), steps.end(), low) - steps.begin() + 1);

@@ -165,8 +165,8 @@ class Ranking {
   // Without a camera: the largest field error that remains once all updates of higher ranks are applied.
   [[nodiscard]] double error(Rank rank) const;
   // The lowest rank of the band that is sent as one with `top`: field errors, and with a camera importances, differ by a
-  // factor of 4 at most.
-  [[nodiscard]] Rank band_below(Rank top) const;
+  // factor of 4 at most. is_rest: of all further ones that are sent, but for those that are hidden if top is not.
+  [[nodiscard]] Rank band_below(Rank top, bool is_rest = false) const;
 
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
   [[nodiscard]] std::size_t memory_bytes() const;  // besides this object

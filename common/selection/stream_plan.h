@@ -1,11 +1,12 @@
 // Selects what a session sends next: a pure function of the data set, the level of detail and the updates sent. No
 // I/O.
 //
-// Updates are sent in bands of falling rank (ranking.h): within a band, importances differ by a factor of 4. Within a
-// band they are sent region by region, each after its missing ancestors: neighbours share names and code tables, which
-// makes the batch smaller. Bounds of the unsent updates are kept for each brick and supercube that something was sent of
-// (those of others are of all that is relevant), and a brick is visited only if its bound is in the band: a new view costs
-// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h).
+// Updates are sent in bands of falling rank (ranking.h): within a band, importances differ by a factor of 4. The last
+// band takes all that is left once that is little. Within a band they are sent region by region, each after its missing
+// ancestors: neighbours share names and code tables, which makes the batch smaller. Bounds of the unsent updates are kept
+// for each brick and supercube that something was sent of (those of others are of all that is relevant), and a brick is
+// visited only if its bound is in the band: a new view costs O(bricks), and then the work for what it sends. What a brick
+// needs may be found only then (relevant_updates.h).
 #pragma once
 
 #include <algorithm>
@@ -39,9 +40,14 @@ struct Batch {
 
 // Bound on the payload of a view's next batch, after `sent` bytes of payload. The first batch is small, so that there is
 // a mesh to draw soon; each further one about doubles what was sent, since a batch takes about a third of its bound. So a
-// client that has room for n bytes shows what fits into n / 2 at least. most: no less than kFirstPayload.
+// client that has room for n bytes shows what fits into n / 2 at least.
 inline constexpr std::size_t kFirstPayload = 4 << 10;
-[[nodiscard]] constexpr std::size_t next_payload(std::size_t sent, std::size_t most) { return std::clamp(3 * sent, kFirstPayload, most); }
+// The same of a view that shows other ranges of what the client has: there is a mesh already. What is missing lies in many
+// places, so that names are a third of small batches; such a batch takes some 6 to 16 kB.
+inline constexpr std::size_t kFirstPayloadOfRange = 128 << 10;
+[[nodiscard]] constexpr std::size_t next_payload(std::size_t sent, std::size_t most, std::size_t first = kFirstPayload) {
+  return std::clamp(3 * sent, std::min(first, most), most);
+}
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
 // brick; for each 32 updates of which one was sent four bytes and a little more (eight with max_updates, four more for
@@ -116,6 +122,8 @@ class StreamPlan {
     SplitSet held;
     std::uint64_t count = 0;
   };
+  // When less than this part of what the client has is left to send, its order changes little in the picture.
+  static constexpr std::uint64_t kRest = 16;
   static constexpr std::size_t kBrickBytes = 18;     // most bytes that name a brick
   static constexpr std::size_t kSupercubeBytes = 7;  // flags, or a mask of slots
   static constexpr std::size_t kPlaneBytes = 64;     // lengths, and the ends of what is coded

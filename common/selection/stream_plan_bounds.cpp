@@ -128,7 +128,8 @@ void StreamPlan::begin_band() {
     if (viewed_[b].rank > top && viewed_[b].is_loose != 0) refine(b, ranking_->of_brick(b));
     top = std::max<Rank>(top, viewed_[b].rank);
   }
-  band_ = top == 0 ? Rank(0) : ranking_->band_below(top);
+  const bool is_rest = wanted_count_ < sent_count_ / kRest;
+  band_ = top == 0 ? Rank(0) : ranking_->band_below(top, is_rest);
 }
 
 StreamPlan::Remaining StreamPlan::remaining() const {

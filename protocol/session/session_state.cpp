@@ -103,19 +103,22 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   plan_->set_channels(*channels);
   coarse_percent_ = view.coarse_error_percent;
   epoch_ = view.epoch;
-  const bool is_other_view = lod_ != view.lod || shown_ != shown;
+  const bool is_other_range = shown_ != shown, is_other_view = lod_ != view.lod || is_other_range;
   lod_ = view.lod;
   depth_ = view.depth;
   ahead_ = view.ahead;
-  if (shown_ != shown || !lod_.camera) measurement_.reset();
-  if (shown_ != shown) estimate_.reset();
+  if (is_other_range || !lod_.camera) measurement_.reset();
+  if (is_other_range) estimate_.reset();
   if (is_other_view) search_.reset();  // if it is done, it would say that nothing is waited for
   shown_ = std::move(shown);
   is_early_ = view.early;
   is_grown_ = false;
   is_new_ = true;
   waits_ = false;
-  if (is_other_view || view_ == ViewState::none) view_bytes_ = 0;
+  if (is_other_view || view_ == ViewState::none) {
+    view_bytes_ = 0;
+    first_payload_ = is_other_range && plan_->sent() != 0 ? kFirstPayloadOfRange : kFirstPayload;
+  }
   view_ = ViewState::unanswered;
   return {};
 }
@@ -224,8 +227,8 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   }
   // A batch does not use all the credit: the connection would be idle until the client's next grant arrives. Clients
   // grant a quarter of their window or more, and a batch takes about a third of its bound.
-  const std::size_t bound = std::min<std::uint64_t>(
-      {next_payload(view_bytes_, protocol::kMaxBatchPayload), max_payload, std::max<std::uint64_t>(protocol::kMinPayload, 2 * last_grant_)});
+  const std::size_t bound = std::min<std::uint64_t>({next_payload(view_bytes_, protocol::kMaxBatchPayload, first_payload_), max_payload,
+                                                     std::max<std::uint64_t>(protocol::kMinPayload, 2 * last_grant_)});
   const std::uint64_t size = std::min<std::uint64_t>(bound, credit_ - protocol::kBatchEnvelope);  // credit_ >= kMinCredit
   const bool others_wait = max_payload < protocol::kMaxBatchPayload;
   auto batch = plan_->next(size, others_wait ? kContendedVisits : StreamPlan::kMostVisits);

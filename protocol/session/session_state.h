@@ -103,9 +103,10 @@ class SessionState {
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding
   std::uint64_t last_grant_ = 0;
-  std::uint64_t sequence_ = 0;  // of the next batch
-  std::size_t view_bytes_ = 0;  // payloads of the view's batches; while other sessions wait, what these might have been
-  bool resumed_ = false;        // the client has updates of this data set, with the same contents
+  std::uint64_t sequence_ = 0;                 // of the next batch
+  std::size_t view_bytes_ = 0;                 // payloads of the view's batches; while other sessions wait, what these might have been
+  std::size_t first_payload_ = kFirstPayload;  // of the view
+  bool resumed_ = false;                       // the client has updates of this data set, with the same contents
   bool opened_was_sent_ = false;
   ViewState view_ = ViewState::none;
 };

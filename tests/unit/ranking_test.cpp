@@ -141,6 +141,9 @@ TEST_P(Ranks, WhatADepthMapHidesComesLastAndIsWantedAllTheSame) {
       }
     });
     ASSERT_LT(highest_hidden, lowest_seen);
+    if (highest_hidden != 0) {
+      ASSERT_GT(ranking.band_below(lowest_seen, true), highest_hidden);
+    }
   }
   if (GetParam() == 0) {
     EXPECT_GT(hidden, 0u);
@@ -263,6 +266,7 @@ TEST_P(Ranks, GrowWithTheSquaredDeviationInThePicture) {
       const Ranking::Rank top = all[i].first, low = ranking.band_below(top);
       ASSERT_GE(low, 1);
       ASSERT_LE(low, top);
+      ASSERT_LE(ranking.band_below(top, true), all.front().first);
       const auto last = std::lower_bound(all.begin(), all.end(), std::pair(low, 0.0));
       if (low > 1) {
         ASSERT_LE(all[i].second, last->second * 4 * 1.07) << "trial " << trial;
@@ -284,6 +288,7 @@ TEST_P(Ranks, WithoutACameraErrorsAreThoseThatAreLeft) {
       ASSERT_GE(low, 1);
       ASSERT_LE(low, rank);
       ASSERT_LE(ranking.error(rank), ranking.error(low) * 4) << "trial " << trial;
+      ASSERT_EQ(ranking.band_below(rank, true), 1);
     });
   }
 }
