@@ -245,7 +245,8 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   is_new_ = measurement_ && view_ == ViewState::unanswered;  // coarser after the first batch
   if (!is_ahead) view_ = ViewState::streaming;
   view_bytes_ += others_wait ? size : batch->payload.size();  // fewer and larger batches take less processor time
-  const StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();
+  StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();
+  if (measurement_) remaining.pixels = std::max(remaining.pixels, coarser(lod_).camera->pixel_error);  // what is not measured yet may need that
   protocol::Batch message{epoch_,
                           sequence_++,
                           batch->updates,

@@ -23,14 +23,19 @@
 #include "client/core/stream_client.h"
 #include "common/front/batch_decoder.h"
 #include "common/ivm/batch_encoder.h"
+#include "common/ivm/every_range.h"
 #include "common/ivm/refinement.h"
 #include "common/mesh/boundary.h"
 #include "common/mesh/io/mesh_writer.h"
 #include "common/picture/canvas.h"
+#include "common/ranges/find_relevant_updates.h"
 #include "common/selection/stream_plan.h"
 #include "common/view/depth_map.h"
 #include "protocol/limits.h"
+#include "protocol/session/local_worker.h"
+#include "protocol/session/session_state.h"
 #include "server/builder/field_hierarchy.h"
+#include "server/builder/value_builder.h"
 #include "tests/bench/cases.h"
 #include "tests/bench/quality.h"
 #include "tests/support/cameras.h"
@@ -171,8 +176,9 @@ using NextBatch = std::function<std::optional<std::vector<std::uint8_t>>(const S
 using BytesSoFar = std::function<double()>;
 
 // Takes batches as a client does, and measures what it has now and then.
-Curve follow(const IntervalVolume& volume, const Picture& picture, const NextBatch& next, const BytesSoFar& bytes_so_far = {}) {
-  StreamClient client = or_throw(StreamClient::start(volume.description()));
+Curve follow(const IntervalVolume& volume, const Picture& picture, const NextBatch& next, const BytesSoFar& bytes_so_far = {},
+             const RangeRequest& shown = {}) {
+  StreamClient client = or_throw(StreamClient::start(volume.description(), {}, shown));
   Curve curve;
   double bytes = 0, due = kFirstBytes;
   bool more = true;
@@ -180,7 +186,7 @@ Curve follow(const IntervalVolume& volume, const Picture& picture, const NextBat
     const auto batch = next(client);
     more = batch.has_value();
     if (more) {
-      if (const auto applied = client.apply(*batch); !applied) throw std::runtime_error(applied.error().message);
+      if (const auto applied = client.apply(*batch, 0, shown); !applied) throw std::runtime_error(applied.error().message);
       bytes += double(batch->size());
       if (bytes < due) continue;
     }
@@ -204,25 +210,58 @@ DepthMap depth_map_of(const Mesh& mesh, const Camera& camera) {
   return buffer.map();
 }
 
-// with_depth: as a client that sends a depth map whenever it has twice as many updates as at the last.
-Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod, bool with_depth = false) {
+// with_depth: as a client that sends a depth map whenever it has twice as many updates as at the last. shown: of a data set of
+// every range, of which it is measured how far its surfaces move.
+Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod, bool with_depth = false, const RangeRequest& shown = {}) {
   StreamPlan plan(sigma);
+  if (!shown.ranges.empty()) plan.set_relevant(find_relevant_updates(sigma, resolve(sigma->description(), shown), Distances::measured));
   plan.set_lod(lod);
   std::size_t bytes = 0;
   std::uint64_t due = kDepthMapUpdates;
-  return follow(*sigma, picture, [&](const StreamClient& client) -> std::optional<std::vector<std::uint8_t>> {
-    if (with_depth && client.updates() >= due) {
-      due = 2 * client.updates();
-      const DepthMap map = depth_map_of(client.mesh(), *lod.camera);
-      plan.set_lod(lod, &map);
+  return follow(
+      *sigma, picture,
+      [&](const StreamClient& client) -> std::optional<std::vector<std::uint8_t>> {
+        if (with_depth && client.updates() >= due) {
+          due = 2 * client.updates();
+          const DepthMap map = depth_map_of(client.mesh(), *lod.camera);
+          plan.set_lod(lod, &map);
+        }
+        const std::size_t most = next_payload(bytes, protocol::kMaxBatchPayload);
+        auto batch = plan.next(most);
+        while (!batch && !plan.done()) batch = plan.next(most);
+        if (!batch) return {};
+        bytes += batch->payload.size();
+        return std::move(batch->payload);
+      },
+      {}, shown);
+}
+
+// A range of a data set of every range, as a session sends it. What can be sent by estimates is sent before the first
+// surface is measured: the worst case.
+Curve follow_afresh(const Sigma& every, const Picture& picture, const Lod& lod, const RangeRequest& shown) {
+  LocalWorker worker;
+  const auto open = [&every](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return every; };
+  SessionState session(open, worker);
+  const auto tell = [&session](const protocol::ClientMessage& message) {
+    if (const auto fault = session.receive(message)) throw std::runtime_error(fault->text);
+  };
+  tell(protocol::Open{.dataset = "every", .client = "bench", .credit = protocol::kMaxWindow});
+  tell(protocol::View{.epoch = 1, .lod = lod, .shown = shown, .early = true});
+  const auto next = [&](const StreamClient&) -> std::optional<std::vector<std::uint8_t>> {
+    while (true) {
+      auto message = session.next();
+      if (message) {
+        if (auto* const batch = std::get_if<protocol::Batch>(&*message)) {
+          tell(protocol::Credit{protocol::cost_of(*batch)});
+          return std::move(batch->payload);
+        }
+        if (std::holds_alternative<protocol::Done>(*message)) return {};
+      } else if (session.waits()) {
+        if (!worker.work()) throw std::runtime_error("the session waits for nothing");
+      }
     }
-    const std::size_t most = next_payload(bytes, protocol::kMaxBatchPayload);
-    auto batch = plan.next(most);
-    while (!batch && !plan.done()) batch = plan.next(most);
-    if (!batch) return {};
-    bytes += batch->payload.size();
-    return std::move(batch->payload);
-  });
+  };
+  return follow(*every, picture, next, {}, shown);
 }
 
 // Updates one by one, in batches that grow by an eighth. at_least: each prefix counts the fewest bytes it can be had
@@ -247,6 +286,9 @@ Curve follow_list(const Sigma& sigma, const Picture& picture, const std::vector<
 std::vector<Row> measure(const Case& c) {
   const FieldHierarchy hierarchy(*c.volume, {c.range, c.refine, {}});
   const auto sigma = std::make_shared<const IntervalVolume>(or_throw(hierarchy.compact(c.format)));
+  Volume samples = *c.volume;
+  const auto every = std::make_shared<const IntervalVolume>(or_throw(of_every_range(build_value_volume(samples, c.format).take())));
+  const RangeRequest shown{{c.range}, c.refine};
   std::vector<UpdateIndex> all(sigma->size()), by_level;
   std::iota(all.begin(), all.end(), UpdateIndex(0));
   sigma->set().for_each_down([&](const Place& p) { by_level.push_back(p.index); });
@@ -274,6 +316,8 @@ std::vector<Row> measure(const Case& c) {
     row.curves[kIdeal] = follow_list(sigma, picture, in_order(*sigma, select(*sigma, to_the_end), to_the_end), true);
     row.curves[kByError] = follow_plan(sigma, picture, Lod{});
     row.curves[kByLevel] = follow_list(sigma, picture, by_level, false);
+    row.curves[kAfresh] = follow_afresh(every, picture, lod, shown);
+    row.curves[kMeasured] = follow_plan(every, picture, lod, false, shown);
     row.least_bytes = double(bytes_of(*sigma, wanted));
     StreamPlan plan(sigma);
     plan.set_lod(lod);

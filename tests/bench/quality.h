@@ -16,12 +16,14 @@ struct Order {
   const char* name;
   const char* color;
 };
-inline constexpr std::array<Order, 5> kOrders{{{"Intervale", "#0b6e4f"},
+inline constexpr std::array<Order, 7> kOrders{{{"Intervale", "#0b6e4f"},
                                                {"ideal", "#888888"},
                                                {"by field error", "#c1440e"},
                                                {"by level", "#3b5ba5"},
-                                               {"Intervale with depth maps", "#8e44ad"}}};
-inline constexpr std::size_t kOurs = 0, kIdeal = 1, kByError = 2, kByLevel = 3, kHiddenLast = 4;
+                                               {"Intervale with depth maps", "#8e44ad"},
+                                               {"of every range, asked for afresh", "#e0a100"},
+                                               {"of every range, measured before", "#7a6a00"}}};
+inline constexpr std::size_t kOurs = 0, kIdeal = 1, kByError = 2, kByLevel = 3, kHiddenLast = 4, kAfresh = 5, kMeasured = 6;
 
 // Pixels on the screen: of so many percent of the points.
 struct Deviation {

@@ -56,7 +56,7 @@ void print_bytes(const std::vector<Row>& rows) {
   for (const double pixels : kPixels) fmt::print(" {} px |", pixels);
   fmt::print(" / ideal: 4 px | 1 px | when done |\n|---|---|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
   for (const Row& r : rows) {
-    for (const std::size_t k : {kOurs, kIdeal, kByError, kByLevel}) {
+    for (const std::size_t k : {kOurs, kAfresh, kMeasured, kIdeal, kByError, kByLevel}) {
       fmt::print("| {} | {} | {} |", r.title, r.look, kOrders[k].name);
       for (const double pixels : kPixels) fmt::print(" {} |", kilobytes(bytes_to(r.curves[k], pixels)));
       for (const double pixels : {4.0, 1.0}) {
@@ -72,7 +72,8 @@ void print_bytes(const std::vector<Row>& rows) {
       "first that which removes most squared deviation from the picture, each with the ancestors that it lacks; its bytes are\n"
       "what the updates so far would take in one batch, the fewest possible. By level: coarse before fine, as a\n"
       "level-of-detail pyramid is sent. By field error: the same order whatever the view. When done: the bytes sent for a\n"
-      "pixel error of 1, over the fewest bytes for that.\n",
+      "pixel error of 1, over the fewest bytes for that. Of every range: the range of a data set of every range, by estimates of\n"
+      "how far its surfaces move as long as these have anything to send, and then as it is measured; or measured before.\n",
       kPoints);
 }
 
@@ -128,7 +129,7 @@ void draw_curves(const std::vector<Row>& rows, const std::string& path) {
   const int columns = int(kLookNames.size()), lines = int((rows.size() + kLookNames.size() - 1) / kLookNames.size());
   std::ofstream out(path);
   out << fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" font-size=\"11\">\n",
-                     columns * kWidth, lines * kHeight + 26)
+                     columns * kWidth, lines * kHeight + 46)
       << "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const int left = int(i) % columns * kWidth + kLeft, top = int(i) / columns * kHeight + kTop;
@@ -157,7 +158,7 @@ void draw_curves(const std::vector<Row>& rows, const std::string& path) {
     }
   }
   for (std::size_t k = 0; k < kOrders.size(); ++k) {
-    const int at = kLeft + int(k) * 150, y = lines * kHeight + 12;
+    const int at = kLeft + int(k % 4) * 240, y = lines * kHeight + 12 + int(k / 4) * 20;
     out << fmt::format("<path d=\"M{} {}h24\" stroke=\"{}\" stroke-width=\"2.5\"/><text x=\"{}\" y=\"{}\" font-size=\"12\">{}</text>\n", at, y,
                        kOrders[k].color, at + 30, y + 4, kOrders[k].name);
   }
