@@ -158,7 +158,12 @@ Result<std::unique_ptr<ScratchMemory>> ScratchMemory::map_file(const std::filesy
 }
 
 ScratchMemory::ScratchMemory(std::filesystem::path folder, int file, int statm, std::byte* base, std::uint64_t budget, Use use)
-    : folder_(std::move(folder)), file_(file), statm_(statm), base_(base), budget_(budget) {
+    : folder_(std::move(folder)),
+      last_words_("intervale: the disk of the scratch file in '" + folder_.string() + "' failed\n"),
+      file_(file),
+      statm_(statm),
+      base_(base),
+      budget_(budget) {
   ::madvise(base_, kRegionBytes, MADV_RANDOM);  // or one access makes up to two megabytes resident
   unused_.emplace(0, kRegionBytes);
   if (use == Use::data_sets) keeper_.emplace(base_, kRegionBytes, budget_, statm_);
@@ -188,9 +193,22 @@ void ScratchMemory::install(ScratchMemory& memory) {
   action.sa_handler = &ScratchMemory::on_tick;
   action.sa_flags = SA_RESTART;
   ::sigaction(SIGPROF, &action, nullptr);
+  action.sa_sigaction = &ScratchMemory::on_failed_access;
+  action.sa_flags = SA_SIGINFO;
+  ::sigaction(SIGBUS, &action, nullptr);
   if (memory.keeper_) return;
   of_all_threads.store(&memory, std::memory_order_release);
   memory.timers_ = std::make_unique<Timers>();
+}
+
+void ScratchMemory::on_failed_access(int signal, siginfo_t* access, void* /*context*/) noexcept {
+  const ScratchMemory* const memory = installed();
+  if (memory == nullptr || !memory->owns(access->si_addr)) {
+    (void)::signal(signal, SIG_DFL);  // the access is tried again
+    return;
+  }
+  (void)!::write(STDERR_FILENO, memory->last_words_.data(), memory->last_words_.size());
+  ::_exit(1);
 }
 
 bool ScratchMemory::free_installed(void* array) noexcept {

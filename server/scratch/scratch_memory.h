@@ -13,6 +13,7 @@
 #pragma once
 
 #include <atomic>
+#include <csignal>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -72,7 +73,8 @@ class ScratchMemory {
 
   // From now on the program's `operator new` (server/cli/scratch_new.cpp) takes large arrays from it: of one for data sets,
   // those of threads with a Scope; else those of all threads, and the budget is kept, by SIGPROF to the calling thread and
-  // to those of oneTBB that work for it. Its destructor ends both. One in a process.
+  // to those of oneTBB that work for it. Its destructor ends both. If the disk fails when a page is read (SIGBUS), the
+  // process ends with one line on stderr, and status 1. One in a process.
   static void install(ScratchMemory& memory);
   // Where an array of so many bytes of the calling thread belongs; nullptr: in the process' own memory. With a Scope,
   // from SmallArrays::kLeastBytes on: much of a data set is in small arrays, some for each of its bricks.
@@ -116,11 +118,13 @@ class ScratchMemory {
   class Timers;
   static ScratchMemory* installed();
   static void on_tick(int signal) noexcept;
+  static void on_failed_access(int signal, siginfo_t* access, void* context) noexcept;
   void keep_within_budget() noexcept;
   void keep(const std::stop_token& stop) noexcept;  // of one for data sets: what its thread does
 
   std::filesystem::path folder_;
-  int file_, statm_;  // statm: /proc/self/statm
+  std::string last_words_;  // for a disk that fails
+  int file_, statm_;        // statm: /proc/self/statm
   std::byte* base_;
   std::uint64_t budget_;
   std::mutex mutex_;                                   // of what follows

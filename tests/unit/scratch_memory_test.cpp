@@ -2,14 +2,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <random>
+#include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -223,6 +227,24 @@ TEST(ScratchMemory, OfABuildIsOfAllThreads) {
   EXPECT_EQ(ScratchMemory::place_of(ScratchMemory::kLeastBytes), memory.get());
   EXPECT_EQ(ScratchMemory::place_of(ScratchMemory::kLeastBytes - 1), nullptr);
   std::thread([&memory] { EXPECT_EQ(ScratchMemory::place_of(ScratchMemory::kLeastBytes), memory.get()); }).join();
+}
+
+// A file that is shorter than its mapping stands for a disk that fails.
+TEST(ScratchMemory, ADiskThatFailsIsOneLine) {
+  const TempDir folder;
+  const auto read_what_is_lost = [&folder] {
+    const auto memory = open_scratch(folder);
+    ScratchMemory::install(*memory);
+    const auto* const array = static_cast<const volatile std::byte*>(memory->allocate(1 << 20));
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+      std::error_code gone;  // the folder's own
+      const std::string target = std::filesystem::read_symlink(entry.path(), gone).string();
+      if (target.find(folder.path().string()) == 0 && ::ftruncate(std::stoi(entry.path().filename().string()), 0) != 0) std::abort();
+    }
+    return array[5];
+  };
+  EXPECT_EXIT(static_cast<void>(read_what_is_lost()), ::testing::ExitedWithCode(1),
+              "^intervale: the disk of the scratch file in '" + folder.path().string() + "' failed\n$");
 }
 
 TEST(ScratchMemory, FreesOnlyWhatItOwns) {
