@@ -72,8 +72,9 @@ void print_bytes(const std::vector<Row>& rows) {
       "first that which removes most squared deviation from the picture, each with the ancestors that it lacks; its bytes are\n"
       "what the updates so far would take in one batch, the fewest possible. By level: coarse before fine, as a\n"
       "level-of-detail pyramid is sent. By field error: the same order whatever the view. When done: the bytes sent for a\n"
-      "pixel error of 1, over the fewest bytes for that. Of every range: the range of a data set of every range, by estimates of\n"
-      "how far its surfaces move as long as these have anything to send, and then as it is measured; or measured before.\n",
+      "pixel error of 1, over the fewest bytes for that. Of every range: the range of a data set of every range, by\n"
+      "estimates of how far its surfaces move as long as these have anything to send, and then as it is measured; or measured\n"
+      "before.\n",
       kPoints);
 }
 
