@@ -51,9 +51,33 @@ BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<cons
   if (is_all) slots_ = {};
 }
 
+BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<const BrickNeeds*> parts) : parts_(std::move(parts)) {
+  const int scale = scale_of_key(set.bricks()[brick].key);
+  bool is_all = true;
+  highest_.reserve(parts_.front()->highest_.size());
+  slots_.reserve(parts_.front()->highest_.size());
+  set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
+    const std::size_t n = highest_.size();
+    const std::uint64_t occupancy = set.occupancy()[s];
+    Highest highest;
+    std::uint64_t slots = 0;
+    for (const BrickNeeds* const part : parts_) {
+      const Highest& one = part->highest_[n];
+      slots |= part->slots(n, occupancy);
+      highest = {ErrorToDistance::farther(highest.to_distance, one.to_distance, scale), std::max(highest.error_step, one.error_step),
+                 std::max(highest.slope, one.slope), std::max(highest.distance, one.distance)};
+    }
+    highest_.push_back(highest);
+    slots_.push_back(slots);
+    updates_ += unsigned(std::popcount(slots));
+    is_all = is_all && slots == occupancy;
+  });
+  if (is_all) slots_ = {};
+}
+
 std::size_t BrickNeeds::memory_bytes() const {
   return sizeof *this + highest_.size() * sizeof highest_[0] + slots_.size() * sizeof slots_[0] + first_.size() * sizeof first_[0] + slopes_.size() +
-         distances_.size();
+         distances_.size() + parts_.size() * sizeof parts_[0];
 }
 
 }  // namespace intervale

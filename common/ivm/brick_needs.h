@@ -1,6 +1,7 @@
 // What ranges need of one brick: which of its updates are relevant, and how far the surfaces around them can move.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -28,6 +29,9 @@ class BrickNeeds {
   };
   // needs: of each supercube of the brick. steps: the error steps of all updates of the set, by number.
   BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs, Surface surface);
+  // What each of the parts needs, of one brick: of an update the most that is known of it. They must outlive it; one at
+  // least, and all or none have slopes, and distances.
+  BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<const BrickNeeds*> parts);
 
   // Relevant ones. occupancy: of that supercube.
   [[nodiscard]] std::uint64_t slots(std::size_t supercube, std::uint64_t occupancy) const { return slots_.empty() ? occupancy : slots_[supercube]; }
@@ -36,14 +40,20 @@ class BrickNeeds {
   [[nodiscard]] std::uint8_t error_step(std::size_t supercube) const { return highest_[supercube].error_step; }
   [[nodiscard]] std::uint8_t slope(std::size_t supercube) const { return highest_[supercube].slope; }
   [[nodiscard]] std::uint8_t distance(std::size_t supercube) const { return highest_[supercube].distance; }
-  // Of one relevant update: `before` relevant ones of its supercube have lower slots. 0 where they are not known.
-  [[nodiscard]] std::uint8_t slope(std::size_t supercube, int before) const {
-    if (slopes_.empty()) return 0;
-    const std::size_t i = std::size_t(first_[supercube]) + std::size_t(before);
-    return std::uint8_t(slopes_[i / 2] >> (i % 2 * 4) & 15U);
-  }
-  [[nodiscard]] std::uint8_t distance(std::size_t supercube, int before) const {
-    return distances_.empty() ? std::uint8_t(0) : distances_[std::size_t(first_[supercube]) + std::size_t(before)];
+  // Of one relevant update. relevant: the slots of its supercube that are; 0 where they are not known.
+  struct OfUpdate {
+    std::uint8_t distance = 0, slope = 0;
+  };
+  [[nodiscard]] OfUpdate of_update(std::size_t supercube, std::uint64_t relevant, Slot slot) const {
+    if (parts_.empty()) return own_update(supercube, count_below(relevant, slot));
+    OfUpdate most;
+    for (const BrickNeeds* const part : parts_) {
+      const std::uint64_t slots = part->slots(supercube, relevant);
+      if ((slots >> slot & 1) == 0) continue;
+      const OfUpdate one = part->of_update(supercube, slots, slot);
+      most = {std::max(most.distance, one.distance), std::max(most.slope, one.slope)};
+    }
+    return most;
   }
   [[nodiscard]] unsigned updates() const { return updates_; }  // that are relevant
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -53,11 +63,19 @@ class BrickNeeds {
     ErrorToDistance to_distance;
     std::uint8_t error_step = 0, slope = 0, distance = 0;
   };
-  std::vector<Highest> highest_;         // by supercube
-  std::vector<std::uint64_t> slots_;     // by supercube; empty: all
-  std::vector<std::uint16_t> first_;     // by supercube: how many relevant updates are before it; empty: no need to know
-  std::vector<std::uint8_t> slopes_;     // by two relevant updates, the first in the lower half
-  std::vector<std::uint8_t> distances_;  // by relevant update
+  // before: relevant updates of the supercube with lower slots.
+  [[nodiscard]] OfUpdate own_update(std::size_t supercube, int before) const {
+    if (first_.empty()) return {};
+    const std::size_t i = std::size_t(first_[supercube]) + std::size_t(before);
+    return {distances_.empty() ? std::uint8_t(0) : distances_[i],
+            slopes_.empty() ? std::uint8_t(0) : std::uint8_t(slopes_[i / 2] >> (i % 2 * 4) & 15U)};
+  }
+  std::vector<Highest> highest_;          // by supercube
+  std::vector<std::uint64_t> slots_;      // by supercube; empty: all
+  std::vector<std::uint16_t> first_;      // by supercube: how many relevant updates are before it; empty: no need to know
+  std::vector<std::uint8_t> slopes_;      // by two relevant updates, the first in the lower half
+  std::vector<std::uint8_t> distances_;   // by relevant update
+  std::vector<const BrickNeeds*> parts_;  // that have what is known of updates; empty: this has it
   unsigned updates_ = 0;
 };
 

@@ -42,6 +42,7 @@ inline constexpr float kMaxFarDeviation = 64;
 // scale of logarithms: 1 to 14 are 2^(1.5 (slope - 7)), the nearest of them; 0 is nothing, and kMaxSlope is not measured
 // and comes before all others.
 inline constexpr unsigned kMaxSlope = 15;
+inline constexpr int kTopScale = 4;  // diamonds of coarser scales have kMaxSlope
 [[nodiscard]] unsigned slope_of(double removed);
 [[nodiscard]] float removed_of(unsigned slope);
 

@@ -84,7 +84,7 @@ std::vector<std::uint8_t> coded_update_slopes(const IntervalVolume& volume) {
       const BrickNeeds& needs = volume.relevant().brick(b);
       const std::uint64_t relevant = needs.slots(n, set.occupancy()[s]);  // all, unless some were lost
       for (const Slot slot : set_bits<Slot>(set.occupancy()[s]))
-        slopes.push_back((relevant >> slot & 1) != 0 ? needs.slope(n, count_below(relevant, slot)) : std::uint8_t(0));
+        slopes.push_back((relevant >> slot & 1) != 0 ? needs.of_update(n, relevant, slot).slope : std::uint8_t(0));
       ++n;
     });
   }

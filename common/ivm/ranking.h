@@ -76,8 +76,9 @@ class Ranking {
     // The rank of update i, a relevant one in this slot.
     [[nodiscard]] Rank operator()(UpdateIndex i, Slot slot) const {
       if (!meets_roi(slot)) return 0;
-      const int before = count_below(needs_->slots(number_, ranking_->volume_.set().occupancy()[supercube_]), slot);
-      return rank(importance(ranking_->volume_.error_step(i), needs_->distance(number_, before), needs_->slope(number_, before)));
+      const std::uint64_t relevant = needs_->slots(number_, ranking_->volume_.set().occupancy()[supercube_]);
+      const BrickNeeds::OfUpdate own = needs_->of_update(number_, relevant, slot);
+      return rank(importance(ranking_->volume_.error_step(i), own.distance, own.slope));
     }
 
    private:

@@ -83,57 +83,45 @@ std::vector<std::uint64_t> RelevantSlots::of_coarse(BrickIndex brick) const {
 }
 
 template <int Class>
-UpdateIndex RelevantSlots::add_counting(const SplitLattice& lattice, std::uint64_t occupancy, UpdateIndex next, Counting& counting) const {
-  const ValueFormat& format = volume_.description().format;
+std::uint64_t RelevantSlots::counting_of(const SplitLattice& lattice, std::uint64_t occupancy, UpdateIndex& next) const {
   VertexKeys around;
   std::uint64_t word = 0;
-  float most = 0;
   for (const Slot slot : set_bits<Slot>(occupancy & kSlotsOfClass[Class])) {
-    const UpdateIndex i = next++;
-    const KeySpan before = lattice.gather<Class>(slot, around);
-    KeySpan span = before;
-    span.add(volume_.key(i));
-    if (!counts_(span.least, span.greatest)) continue;
-    word |= std::uint64_t(1) << slot;
-    const double error = volume_.error(i);
-    if (error == 0) continue;
-    const bool is_crossed = counts_(before.least, before.greatest);
-    most = std::max(most, is_crossed ? float(std::min(error / (format.value(before.greatest) - format.value(before.least)), 1.0)) : 1.0F);
+    KeySpan span = lattice.gather<Class>(slot, around);
+    span.add(volume_.key(next++));
+    word |= std::uint64_t(counts_(span.least, span.greatest)) << slot;
   }
-  counting.words.back() |= word;
-  counting.moves.back() = std::max(counting.moves.back(), most);
-  return next;
+  return word;
 }
 
-RelevantSlots::Counting RelevantSlots::find_counting(BrickIndex brick) const {
-  Counting counting;
-  if (!has_any(brick)) return counting;
+RelevantSlots::Words RelevantSlots::find_counting(BrickIndex brick) const {
+  Words words;
+  if (!has_any(brick)) return words;
   SplitLattice lattice(volume_);
   set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-    counting.words.push_back(0);
-    counting.moves.push_back(0);
+    words.push_back(0);
     if (!bounds_.is_relevant(counts_, s)) return;
     const std::uint64_t occupancy = set_.occupancy()[s];
     lattice.move_to(key);
     (void)lattice.splittable(occupancy);
     UpdateIndex next = set_.first(brick, s);
-    next = add_counting<0>(lattice, occupancy, next, counting);
-    next = add_counting<1>(lattice, occupancy, next, counting);
-    add_counting<2>(lattice, occupancy, next, counting);
+    words.back() |= counting_of<0>(lattice, occupancy, next);
+    words.back() |= counting_of<1>(lattice, occupancy, next);
+    words.back() |= counting_of<2>(lattice, occupancy, next);
   });
-  return counting;
+  return words;
 }
 
 // Of a brick of scale 0.
-const RelevantSlots::Counting& RelevantSlots::counting(BrickIndex brick) const {
-  const Counting* const known = counting_.find(brick - first_fine_);
+const RelevantSlots::Words& RelevantSlots::fine_counting(BrickIndex brick) const {
+  const Words* const known = counting_.find(brick - first_fine_);
   return known != nullptr ? *known : counting_.keep(brick - first_fine_, find_counting(brick)).value;
 }
 
-std::vector<float> RelevantSlots::moves(BrickIndex brick) const {
-  std::vector<float> moves = brick < first_fine_ ? find_counting(brick).moves : counting(brick).moves;
-  moves.resize(std::size_t(std::popcount(set_.bricks()[brick].mask)));
-  return moves;
+std::vector<std::uint64_t> RelevantSlots::counting(BrickIndex brick) const {
+  Words words = brick < first_fine_ ? find_counting(brick) : fine_counting(brick);
+  words.resize(std::size_t(std::popcount(set_.bricks()[brick].mask)));
+  return words;
 }
 
 std::vector<std::uint64_t> RelevantSlots::of_fine(BrickIndex brick) const {
@@ -143,7 +131,7 @@ std::vector<std::uint64_t> RelevantSlots::of_fine(BrickIndex brick) const {
   for (std::int32_t i = 0; i < 7; ++i) {  // not the one ahead on all axes
     const Vertex ahead{i & 1, i >> 1 & 1, i >> 2};
     const auto other = i == 0 ? std::optional(brick) : set_.find_brick(0, {first.x / 4 + ahead.x, first.y / 4 + ahead.y, first.z / 4 + ahead.z});
-    const Words* const words = other ? &counting(*other).words : nullptr;
+    const Words* const words = other ? &fine_counting(*other) : nullptr;
     if (words == nullptr || words->empty()) continue;
     std::size_t n = 0;
     for (const int k : set_bits(set_.bricks()[*other].mask)) {

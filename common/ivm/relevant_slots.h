@@ -1,5 +1,4 @@
-// The diamonds that are relevant to a range (Weiss and De Floriani 2008, section 6), by brick; and how far surfaces move
-// there, roughly.
+// The diamonds that are relevant to a range (Weiss and De Floriani 2008, section 6), by brick.
 #pragma once
 
 #include <cstdint>
@@ -27,10 +26,8 @@ class RelevantSlots {
 
   // By supercube of the brick, in order. Some 30 microseconds of scale 0 where the surface is, otherwise a few.
   [[nodiscard]] std::vector<std::uint64_t> of(BrickIndex brick) const;
-  // How far diamonds that count move the surface at most, by supercube of the brick, in widths of its diamonds: by the
-  // diamond's error over the steepness of the values around it, and by 1 at most; by 1 where only its centre lies on
-  // another side. An estimate; 0 if none has an error. The range has one surface.
-  [[nodiscard]] std::vector<float> moves(BrickIndex brick) const;
+  // Likewise, only what counts itself, lost values included.
+  [[nodiscard]] std::vector<std::uint64_t> counting(BrickIndex brick) const;
   // Whether a brick has any at all.
   [[nodiscard]] bool has_any(BrickIndex brick) const { return bounds_.is_relevant(counts_, brick); }
 
@@ -38,21 +35,17 @@ class RelevantSlots {
   using Words = std::vector<std::uint64_t>;  // by supercube of a brick
   [[nodiscard]] Words of_coarse(BrickIndex brick) const;
   [[nodiscard]] Words of_fine(BrickIndex brick) const;
-  struct Counting {
-    Words words;               // by supercube of a brick; empty: none
-    std::vector<float> moves;  // likewise
-  };
-  [[nodiscard]] Counting find_counting(BrickIndex brick) const;
+  [[nodiscard]] Words find_counting(BrickIndex brick) const;  // empty: none
   template <int Class>
-  UpdateIndex add_counting(const SplitLattice& lattice, std::uint64_t occupancy, UpdateIndex next, Counting& counting) const;
-  [[nodiscard]] const Counting& counting(BrickIndex brick) const;
+  std::uint64_t counting_of(const SplitLattice& lattice, std::uint64_t occupancy, UpdateIndex& next) const;
+  [[nodiscard]] const Words& fine_counting(BrickIndex brick) const;
 
   const IntervalVolume& volume_;
   const SupercubeSet& set_;
   const ValueBounds& bounds_;
   CountingKeys counts_;
-  BrickIndex first_fine_;                 // bricks of scale 0 are the last
-  mutable LazyArray<Counting> counting_;  // by brick of scale 0
+  BrickIndex first_fine_;              // bricks of scale 0 are the last
+  mutable LazyArray<Words> counting_;  // by brick of scale 0
 };
 
 }  // namespace intervale

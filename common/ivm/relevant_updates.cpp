@@ -82,33 +82,48 @@ struct Union {
 };
 
 BrickNeeds Union::operator()(BrickIndex b) const {
+  struct Part {
+    const RelevantUpdates& of;
+    const BrickNeeds& needs;
+  };
   const SupercubeSet& set = volume.set();
+  std::vector<Part> parts;
+  std::vector<const BrickNeeds*> needs_of_parts;
+  bool are_alike = true;
+  for (const auto& one : each) {
+    if (one->bound(b).updates == 0) continue;
+    parts.push_back({*one, one->brick(b)});
+    needs_of_parts.push_back(&parts.back().needs);
+    are_alike = are_alike && one->has_slopes() == known.slopes && one->has_distances() == known.distances;
+  }
+  if (are_alike && !parts.empty()) return {set, b, std::move(needs_of_parts)};
   const double width = diamond_width(volume.description().grid);
   const int scale = scale_of_key(set.bricks()[b].key);
   std::vector<BrickNeeds::Supercube> needs;
   BrickNeeds::Surface surface;
+  std::array<std::uint8_t, kSlots> slopes{}, distances{};  // those of relevant slots are set
   std::size_t n = 0;
   set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
     const std::uint64_t occupancy = set.occupancy()[s];
     BrickNeeds::Supercube all;
-    for (const auto& one : each) {
-      if (one->bound(b).updates == 0) continue;
-      all.slots |= one->brick(b).slots(n, occupancy);
-      all.to_distance = ErrorToDistance::farther(all.to_distance, one->brick(b).to_distance(n), scale);
+    for (const Part& part : parts) {
+      all.slots |= part.needs.slots(n, occupancy);
+      all.to_distance = ErrorToDistance::farther(all.to_distance, part.needs.to_distance(n), scale);
     }
     needs.push_back(all);
     if (known.slopes || known.distances) {
-      std::array<std::uint8_t, kSlots> slopes{}, distances{};
-      for (const auto& one : each) {
-        if (one->bound(b).updates == 0) continue;
-        int before = 0;
-        for (const Slot slot : set_bits<Slot>(one->brick(b).slots(n, occupancy))) {
-          slopes[slot] = std::max(slopes[slot], one->brick(b).slope(n, before));
-          const unsigned step = volume.error_step(set.first(b, s) + count_below(occupancy, slot));
-          const std::uint8_t distance = one->has_distances() ? one->brick(b).distance(n, before)
-                                                             : distance_at_least(double(one->object_error(all.to_distance, scale, step)), width);
+      for (const Slot slot : set_bits<Slot>(all.slots)) slopes[slot] = distances[slot] = 0;
+      for (const Part& part : parts) {
+        const std::uint64_t slots = part.needs.slots(n, occupancy);
+        for (const Slot slot : set_bits<Slot>(slots)) {
+          const BrickNeeds::OfUpdate own = part.needs.of_update(n, slots, slot);
+          slopes[slot] = std::max(slopes[slot], own.slope);
+          std::uint8_t distance = own.distance;
+          if (!part.of.has_distances()) {
+            const unsigned step = volume.error_step(set.first(b, s) + count_below(occupancy, slot));
+            distance = distance_at_least(double(part.of.object_error(all.to_distance, scale, step)), width);
+          }
           distances[slot] = std::max(distances[slot], distance);
-          ++before;
         }
       }
       for (const Slot slot : set_bits<Slot>(all.slots)) {

@@ -8,7 +8,7 @@
 #include "common/ivm/relevant_slots.h"
 #include "common/patch/key_sides.h"
 #include "common/ranges/error_to_distance.h"
-#include "common/ranges/estimate_distances.h"
+#include "common/ranges/estimate_surface.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -100,27 +100,33 @@ std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
   if (part.distances == Distances::measured) return find_measured(part);
   const SupercubeSet& set = volume_.set();
   const auto slots = std::make_shared<const RelevantSlots>(volume_, part.shown, parallel_);
-  const double reach = diamond_width(volume_.description().grid) / 2;
+  const bool is_estimated = part.distances == Distances::estimated;
   std::vector<RelevantUpdates::Bound> bounds(set.bricks().size());
   for (BrickIndex b{0}; b < bounds.size(); ++b) {
     const RelevantUpdates::Bound& whole = volume_.relevant().bound(b);
     if (whole.updates == 0 || !slots->has_any(b)) continue;
     bounds[b] = {whole.updates, whole.error_step, 0, 0};
-    const bool moves = part.distances == Distances::estimated && volume_.error_steps()[whole.error_step] > 0;
-    if (moves) bounds[b].object_error = float(reach * std::exp2(scale_of_key(set.bricks()[b].key)));
+    if (!is_estimated) continue;
+    const EstimateBound most = bound_of_estimates(volume_.description().grid, scale_of_key(set.bricks()[b].key));
+    bounds[b].slope = most.slope;
+    if (volume_.error_steps()[whole.error_step] > 0) bounds[b].object_error = most.distance;
   }
-  const auto find_brick = [&volume = volume_, slots, part](BrickIndex brick) {
+  const CountingKeys counts(KeySides(volume_.description().format, part.shown.range), part.shown.refine);
+  const auto find_brick = [&volume = volume_, slots, counts, is_estimated](BrickIndex brick) {
     const std::vector<std::uint64_t> relevant = slots->of(brick);
     std::vector<BrickNeeds::Supercube> needs(relevant.size());
     for (std::size_t n = 0; n < needs.size(); ++n) needs[n].slots = relevant[n];
-    if (part.distances == Distances::estimated) {
-      const auto to_distance = estimate_distances(volume, brick, slots->moves(brick), relevant);
-      for (std::size_t n = 0; n < needs.size(); ++n) needs[n].to_distance = to_distance[n];
+    BrickNeeds::Surface surface;
+    if (is_estimated) {
+      EstimatedSurface estimated = estimate_surface(volume, counts, brick, relevant, slots->counting(brick));
+      for (std::size_t n = 0; n < needs.size(); ++n) needs[n].to_distance = estimated.to_distance[n];
+      surface = std::move(estimated.of_updates);
     }
-    return BrickNeeds(volume.set(), brick, volume.steps(), needs, {});
+    return BrickNeeds(volume.set(), brick, volume.steps(), needs, std::move(surface));
   };
   return std::make_shared<const RelevantUpdates>(volume_.description().grid, UpdateErrors{volume_.steps(), volume_.error_steps()},
-                                                 ShownRanges{part.shown}, std::move(bounds), RelevantUpdates::Known(), find_brick);
+                                                 ShownRanges{part.shown}, std::move(bounds),
+                                                 RelevantUpdates::Known{is_estimated, is_estimated, false}, find_brick);
 }
 
 std::shared_ptr<const RelevantUpdates> find_relevant_updates(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,

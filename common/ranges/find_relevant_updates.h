@@ -20,7 +20,7 @@ namespace intervale {
 // What RelevantUpdates::object_error() tells. Each tells more than those before.
 enum class Distances {
   none,       // 0; levels of detail without a camera need no more
-  estimated,  // estimate_distances.h: within a factor of 4 for most; by brick, some 15 ns for each relevant update
+  estimated,  // estimate_surface.h: within a factor of 4 for most; by brick, some 15 ns for each relevant update
   measured,   // error_to_distance.h, for each update; one to two microseconds for each relevant update
 };
 

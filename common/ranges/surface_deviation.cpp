@@ -25,9 +25,8 @@
 namespace intervale {
 namespace {
 
-constexpr int kTopScale = 4;  // cubes of this scale are searched one by one; coarser diamonds keep their width
-
-// Of a top cube's width: the distance to the next patch where no diamond of the cube has one.
+// Cubes of kTopScale are searched one by one; coarser diamonds keep their width. Of such a cube's width: the distance to
+// the next patch where no diamond of the cube has one.
 constexpr double kUnknownDistance = kMaxFarDeviation / (1 << kTopScale);
 constexpr double kFarWidths = 2.01;       // a patch further away than so many widths of the diamond is far
 constexpr double kLeastDeviation = 1e-4;  // of the finest diamonds' width: smaller deviations count as 0

@@ -230,7 +230,7 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const std::uint64_t others = unsent & ~candidates, relevant = in.needs.slots(in.number, occupancy);
   auto number = set_bits(others).begin();
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(others, occupancy))) {
-    rest.highest.raise(of_update(in, first.index + *number, count_below(relevant, slot)));
+    rest.highest.raise(of_update(in, first.index + *number, relevant, slot));
     ++number;
   }
   return rest;
@@ -249,7 +249,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
   auto number = set_bits(candidates).begin();
   // Without branches on what is in the band: that is hard to foresee.
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
-    const Highest own = of_update(in, first + *number, count_below(relevant, slot));
+    const Highest own = of_update(in, first + *number, relevant, slot);
     ++number;
     float importance = ranking.importance(own.error_step, own.distance, std::max(own.slope, own.slope_below));
     if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;

@@ -181,9 +181,10 @@ class StreamPlan {
   // Keeps what is pending, of which so many are wanted from now on; pending.wanted: until now.
   void set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted);
   [[nodiscard]] InBrick in_brick(BrickIndex brick, SupercubeIndex s) const;
-  // before: relevant updates of the supercube with lower numbers.
-  [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, int before) const {
-    Highest own{std::uint8_t(volume_->error_step(i)), in.needs.distance(in.number, before), in.needs.slope(in.number, before)};
+  // relevant: the slots of the supercube that are.
+  [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, std::uint64_t relevant, Slot slot) const {
+    const BrickNeeds::OfUpdate known = in.needs.of_update(in.number, relevant, slot);
+    Highest own{std::uint8_t(volume_->error_step(i)), known.distance, known.slope};
     const float error = relevant_->object_error(in.needs.to_distance(in.number), in.scale, own.error_step, own.distance);
     if (error <= in.limit) std::swap(own.slope, own.slope_below);
     return own;

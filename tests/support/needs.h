@@ -21,15 +21,13 @@ inline bool is_relevant(const RelevantUpdates& relevant, const IntervalVolume& v
 }
 
 // Of an update; 0 if it is not relevant.
-inline unsigned slope_of(const RelevantUpdates& relevant, const IntervalVolume& v, const Place& p) {
-  if (!is_relevant(relevant, v, p)) return 0;
-  const int before = count_below(slots_of(relevant, v, p.brick, p.supercube), p.slot);
-  return relevant.brick(p.brick).slope(number_in_brick(v, p.brick, p.supercube), before);
+inline BrickNeeds::OfUpdate of_update(const RelevantUpdates& relevant, const IntervalVolume& v, const Place& p) {
+  if (!is_relevant(relevant, v, p)) return {};
+  return relevant.brick(p.brick).of_update(number_in_brick(v, p.brick, p.supercube), slots_of(relevant, v, p.brick, p.supercube), p.slot);
 }
+inline unsigned slope_of(const RelevantUpdates& relevant, const IntervalVolume& v, const Place& p) { return of_update(relevant, v, p).slope; }
 inline std::uint8_t distance_of(const RelevantUpdates& relevant, const IntervalVolume& v, const Place& p) {
-  if (!is_relevant(relevant, v, p)) return 0;
-  const int before = count_below(slots_of(relevant, v, p.brick, p.supercube), p.slot);
-  return relevant.brick(p.brick).distance(number_in_brick(v, p.brick, p.supercube), before);
+  return of_update(relevant, v, p).distance;
 }
 inline float object_error_of(const RelevantUpdates& relevant, const IntervalVolume& v, const Place& p) {
   return relevant.object_error(to_distance_of(relevant, v, p.brick, p.supercube), scale_of_key(p.key), v.error_step(p.index),

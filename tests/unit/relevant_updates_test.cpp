@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <random>
@@ -165,31 +166,36 @@ TEST_P(United, APartHasWhatCountsAndAllItsAncestors) {
 }
 
 // Of the same updates, whatever is known of distances; estimates are mostly near what is measured.
-TEST(FindRelevantUpdates, EstimatesDistances) {
+TEST(FindRelevantUpdates, EstimatesDistancesAndSlopes) {
   std::vector<double> octaves;
+  std::map<unsigned, std::vector<unsigned>> by_measured;  // slopes
   for (const double alpha : {-0.8, -0.2, 0.1, 0.5}) {
     const auto volume = testing::build_shared(testing::gyroid({40, 33, 36}), {.range = {-1.5, 1.5}, .refine = Refine::uniform});
     const ShownRange part{{alpha, std::numeric_limits<double>::infinity()}, Refine::boundary};
     PartFinder finder(*volume);
     const auto measured = finder.find({part, Distances::measured}), estimated = finder.find({part, Distances::estimated});
-    const SupercubeSet& set = volume->set();
-    for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
-      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
-        ASSERT_EQ(testing::slots_of(*estimated, *volume, b, s), testing::slots_of(*measured, *volume, b, s));
-        if (scale_of_key(key) != 0) return;
-        const std::size_t n = testing::number_in_brick(*volume, b, s);
-        const BrickNeeds &of_measured = measured->brick(b), &of_estimated = estimated->brick(b);
-        const unsigned step = of_measured.error_step(n);
-        const float as_estimated = estimated->object_error(of_estimated.to_distance(n), 0, step, 0),
-                    as_measured = measured->object_error(of_measured.to_distance(n), 0, step, of_measured.distance(n));
-        if (as_measured > 0 && as_estimated > 0) octaves.push_back(std::log2(as_estimated / as_measured));
-      });
-    }
+    EXPECT_TRUE(estimated->has_slopes() && estimated->has_distances());
+    volume->set().for_each_down([&](const Place& p) {
+      ASSERT_EQ(testing::is_relevant(*estimated, *volume, p), testing::is_relevant(*measured, *volume, p));
+      const unsigned slope = testing::slope_of(*estimated, *volume, p);
+      const float as_estimated = testing::object_error_of(*estimated, *volume, p), as_measured = testing::object_error_of(*measured, *volume, p);
+      ASSERT_LE(slope, scale_of_key(p.key) > kTopScale ? kMaxSlope : kMaxSlope - 1);
+      if (scale_of_key(p.key) > 0 || as_measured == 0 || as_estimated == 0) return;
+      octaves.push_back(std::log2(as_estimated / as_measured));
+      by_measured[testing::slope_of(*measured, *volume, p)].push_back(slope);
+    });
   }
   std::sort(octaves.begin(), octaves.end());
-  ASSERT_GT(octaves.size(), 1000u);
+  ASSERT_GT(octaves.size(), 10000u);
   EXPECT_NEAR(octaves[octaves.size() / 2], 0, 1);
   EXPECT_LT(octaves[octaves.size() * 99 / 100], 5);
+  double before = 0;
+  for (unsigned slope = 1; slope <= 8; ++slope) {  // steeper ones are mostly so for their descendants
+    const std::vector<unsigned>& of = by_measured[slope];
+    const double mean = std::accumulate(of.begin(), of.end(), 0.0) / double(of.size());
+    EXPECT_GT(mean, before) << "of slope " << slope;
+    before = mean;
+  }
 }
 
 // No step is below what it stands for, and none above by more than an eighth of an octave.
