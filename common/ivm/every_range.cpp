@@ -45,15 +45,21 @@ void add_finest_levels(const ValueVolume& volume, std::vector<ErrorLevel>& level
     lattice.move_to(block_of(set.bricks()[blocks[block].first].key), BlockLattice::Load::all);
     VertexKeys around{};
     for (BrickIndex brick = blocks[block].first; brick < blocks[block].end; ++brick) {
-      set.for_each_in_brick(brick, ~std::uint64_t(0), [&](const Place& p) {
-        if (!volume.domain().is_interior(Diamond(SupercubeSet::centre(p)))) {
-          levels[p.index] = level_of_ancestors(set, levels, coarse, p.key, p.slot);
-          return;
+      set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+        const BlockLattice::Point first = lattice.at(key);
+        const bool all_interior = is_interior(volume.domain(), 0, position_of_key(key));
+        UpdateIndex i = set.first(brick, s);
+        for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
+          if (all_interior || volume.domain().is_interior(Diamond(centre_of(key, slot)))) {
+            const BlockLattice::Point centre = first + BlockLattice::of_slot(slot);
+            lattice.gather(centre, slot, around);
+            const double error = spine_error(parts.description.format, around[0], around[1], lattice.key(centre));
+            levels[i] = ValueVolume::level_of_error(parts.description.max_error, error);
+          } else {
+            levels[i] = level_of_ancestors(set, levels, coarse, key, slot);
+          }
+          ++i;
         }
-        const BlockLattice::Point centre = lattice.at(p.key) + BlockLattice::of_slot(p.slot);
-        lattice.gather(centre, p.slot, around);
-        const double error = spine_error(parts.description.format, around[0], around[1], lattice.key(centre));
-        levels[p.index] = ValueVolume::level_of_error(parts.description.max_error, error);
       });
     }
   });

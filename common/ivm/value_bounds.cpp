@@ -20,15 +20,20 @@ void find_own_bounds(const PagedValues& values, ValueKeys& least, ValueKeys& gre
     lattice.move_to(block_of(set.bricks()[blocks[block].first].key), BlockLattice::Load::all);
     VertexKeys around{};
     for (BrickIndex brick = blocks[block].first; brick < blocks[block].end; ++brick) {
-      set.for_each_in_brick(brick, ~std::uint64_t(0), [&](const Place& p) {
-        const BlockLattice::Point centre = lattice.at(p.key) + BlockLattice::of_slot(p.slot);
-        lattice.gather(centre, p.slot, around);
-        KeySpan span{lattice.key(centre), lattice.key(centre)};
-        for (std::size_t v = 0; v < std::size_t(diamond_type(kTypeOfSlot[p.slot]).vertices); ++v) {
-          if (around[v] != kNoKey) span.add(around[v]);
+      set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
+        const BlockLattice::Point first = lattice.at(key);
+        UpdateIndex i = set.first(brick, s);
+        for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
+          const BlockLattice::Point centre = first + BlockLattice::of_slot(slot);
+          lattice.gather(centre, slot, around);
+          KeySpan span{lattice.key(centre), lattice.key(centre)};
+          for (std::size_t v = 0; v < std::size_t(diamond_type(kTypeOfSlot[slot]).vertices); ++v) {
+            if (around[v] != kNoKey) span.add(around[v]);
+          }
+          least.set(i, span.least);
+          greatest.set(i, span.greatest);
+          ++i;
         }
-        least.set(p.index, span.least);
-        greatest.set(p.index, span.greatest);
       });
     }
   });

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/diamond/supercube_neighbours.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 
@@ -76,9 +77,11 @@ double ValueVolume::error_of_level(double max_error, ErrorLevel level) {
 ErrorLevel ValueVolume::level_of_error(double max_error, double error) {
   if (!(error > 0)) return 0;
   if (error >= max_error) return kErrorLevels - 1;
-  int exponent = 0;
-  const double ratio = std::frexp(error / max_error, &exponent);  // in [0.5, 1) * 2^exponent
-  return ErrorLevel(std::clamp(kErrorLevels - 1 + exponent - int(ratio == 0.5), 1, kErrorLevels - 1));
+  // error <= max_error * 2^(level - (kErrorLevels - 1)), by the bits of a double.
+  constexpr int kFraction = 52, kBias = 1023;
+  const auto ratio = bits_as<std::uint64_t>(error / max_error);
+  const bool is_power = (ratio & ((std::uint64_t(1) << kFraction) - 1)) == 0;
+  return ErrorLevel(std::clamp(kErrorLevels - 1 + int(ratio >> kFraction) - kBias + int(!is_power), 1, kErrorLevels - 1));
 }
 
 Vertex last_supercube(const Domain& domain, int scale) {
