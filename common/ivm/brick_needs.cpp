@@ -77,7 +77,7 @@ BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<co
 
 std::size_t BrickNeeds::memory_bytes() const {
   return sizeof *this + highest_.size() * sizeof highest_[0] + slots_.size() * sizeof slots_[0] + first_.size() * sizeof first_[0] + slopes_.size() +
-         distances_.size() + parts_.size() * sizeof parts_[0];
+         distances_.size() + parts_.size() * sizeof(void*);
 }
 
 }  // namespace intervale

@@ -15,7 +15,7 @@ namespace intervale {
 
 // Immutable. Supercubes are counted within their brick, from 0. Memory: 4 bytes a supercube, 8 more unless all updates
 // are relevant; with slopes or distances 2 more, and for each relevant update a byte for its distance and half a byte
-// for its slope.
+// for its slope; or a pointer to each part that has these.
 class BrickNeeds {
  public:
   struct Supercube {

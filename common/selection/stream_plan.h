@@ -122,7 +122,7 @@ class StreamPlan {
     SplitSet held;
     std::uint64_t count = 0;
   };
-  // When less than this part of what the client has is left to send, its order changes little in the picture.
+  // When less than one in so many of the updates that the client has is left to send, their order changes little.
   static constexpr std::uint64_t kRest = 16;
   static constexpr std::size_t kBrickBytes = 18;     // most bytes that name a brick
   static constexpr std::size_t kSupercubeBytes = 7;  // flags, or a mask of slots
