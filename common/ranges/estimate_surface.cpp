@@ -19,16 +19,17 @@ constexpr double kPieceReach = 2;
 // So many surface points, each a square of the least spacing, come nearer by an update of class 0 and scale 0.
 constexpr double kPoints = 20;
 
-// What updates of one scale and class can do at most, in world units and in squares of the least spacing.
+// What updates of one scale and class can do at most, in world units and in squares of the least spacing. width: of a
+// diamond with h = 1.
 struct Most {
-  double piece = 0, distance = 0, removed = 0;
+  double width = 0, piece = 0, distance = 0, removed = 0;
 };
 
 // What is removed goes with the area of the diamond's surface and the square of its width: with its volume to the 4/3.
 Most most_of(const Grid& grid, int scale, std::size_t cls) {
   const Vec3 spacing = grid.affine.spacing();
   const double width = diamond_width(grid), unit = std::min({spacing[0], spacing[1], spacing[2]}), reach = width / 2 * std::exp2(scale);
-  return {kPieceReach * reach, kReach[cls] * reach,
+  return {width, kPieceReach * reach, kReach[cls] * reach,
           kPoints * width * width / (unit * unit) * std::pow(std::exp2(3.0 * scale - double(cls)), 4.0 / 3)};
 }
 
@@ -42,7 +43,6 @@ template <int Class>
 void add_estimates(const IntervalVolume& volume, const SplitLattice& lattice, const CountingKeys& counts, SupercubeIndex s, UpdateIndex first,
                    std::uint64_t slots, const Most& most, Estimates& estimates) {
   const ValueFormat& format = volume.description().format;
-  const double width = diamond_width(volume.description().grid);
   VertexKeys around;
   for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[Class])) {
     const KeySpan span = lattice.gather<Class>(slot, around);
@@ -56,7 +56,7 @@ void add_estimates(const IntervalVolume& volume, const SplitLattice& lattice, co
       distance = most.distance * std::min(error / difference, 1.0);
       part = std::min(std::abs(own) / difference, 1.0);
     }
-    estimates.distances[slot] = distance_at_least(distance, width);
+    estimates.distances[slot] = distance_at_least(distance, most.width);
     estimates.slopes[slot] = std::uint8_t(slope_of(part * part * most.removed));
     estimates.ratio = std::max(estimates.ratio, distance / error);
   }
@@ -100,8 +100,7 @@ EstimatedSurface estimate_surface(const IntervalVolume& volume, const CountingKe
 
 EstimateBound bound_of_estimates(const Grid& grid, int scale) {
   const Most most = most_of(grid, scale, 0);
-  const double width = diamond_width(grid);
-  return {distance_of(distance_at_least(most.piece, width), width), std::uint8_t(scale > kTopScale ? kMaxSlope : slope_of(most.removed))};
+  return {distance_of(distance_at_least(most.piece, most.width), most.width), std::uint8_t(scale > kTopScale ? kMaxSlope : slope_of(most.removed))};
 }
 
 }  // namespace intervale

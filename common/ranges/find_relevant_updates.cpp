@@ -1,7 +1,7 @@
 #include "common/ranges/find_relevant_updates.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <limits>
 #include <utility>
 
@@ -101,15 +101,17 @@ std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
   const SupercubeSet& set = volume_.set();
   const auto slots = std::make_shared<const RelevantSlots>(volume_, part.shown, parallel_);
   const bool is_estimated = part.distances == Distances::estimated;
+  std::array<EstimateBound, kMaxLevels> most;  // by scale
+  for (int scale = 0; scale < kMaxLevels; ++scale) most[std::size_t(scale)] = bound_of_estimates(volume_.description().grid, scale);
   std::vector<RelevantUpdates::Bound> bounds(set.bricks().size());
   for (BrickIndex b{0}; b < bounds.size(); ++b) {
     const RelevantUpdates::Bound& whole = volume_.relevant().bound(b);
     if (whole.updates == 0 || !slots->has_any(b)) continue;
     bounds[b] = {whole.updates, whole.error_step, 0, 0};
     if (!is_estimated) continue;
-    const EstimateBound most = bound_of_estimates(volume_.description().grid, scale_of_key(set.bricks()[b].key));
-    bounds[b].slope = most.slope;
-    if (volume_.error_steps()[whole.error_step] > 0) bounds[b].object_error = most.distance;
+    const EstimateBound& estimates = most[std::size_t(scale_of_key(set.bricks()[b].key))];
+    bounds[b].slope = estimates.slope;
+    if (volume_.error_steps()[whole.error_step] > 0) bounds[b].object_error = estimates.distance;
   }
   const CountingKeys counts(KeySides(volume_.description().format, part.shown.range), part.shown.refine);
   const auto find_brick = [&volume = volume_, slots, counts, is_estimated](BrickIndex brick) {
