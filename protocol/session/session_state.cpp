@@ -18,14 +18,7 @@ Fault other_version(std::uint32_t payload) {
                                         (theirs < protocol::kPayloadVersion ? ": update the client" : ": update the server")};
 }
 
-constexpr double kCoarser = 4;
 constexpr std::uint32_t kContendedVisits = 24 << 10;  // while other sessions wait: a fifth of a millisecond
-
-// For estimates, which are up to this many times too large for most diamonds.
-Lod coarser(Lod lod) {
-  lod.camera->pixel_error *= kCoarser;
-  return lod;
-}
 
 }  // namespace
 
@@ -141,9 +134,8 @@ void SessionState::set_relevant(const RangeAnswer::Relevant& relevant, bool is_m
   is_measured_ = is_measured;
 }
 
-// Without a camera distances do not matter. With one, a view that takes estimates begins with them, after the first batch
-// coarser than it asks for, since what an estimate sends too much stays; it is completed when they are measured. Other views
-// wait for that. False if this one does.
+// Without a camera distances do not matter. With one, a view that takes estimates begins with them, since the line would be
+// idle until they are measured; then it is completed. Other views wait for that. False if this one does.
 bool SessionState::begin_view() {
   const bool is_planned = planned_ == shown_;
   const bool has_needed = is_planned && (is_measured_ || !lod_.camera);
@@ -155,10 +147,7 @@ bool SessionState::begin_view() {
     const bool needs_measured = is_estimate && (!is_early_ || lod_.max_updates || (measurement_ && measurement_->is_soon()));
     if (needs_measured || (!is_planned && !estimate())) return false;
   }
-  if (std::exchange(is_new_, false)) {
-    const bool is_coarser = measurement_ && view_ != ViewState::unanswered;
-    plan_->set_lod(is_coarser ? coarser(lod_) : lod_, depth_ ? &*depth_ : nullptr, ahead_ ? &*ahead_ : nullptr);
-  }
+  if (std::exchange(is_new_, false)) plan_->set_lod(lod_, depth_ ? &*depth_ : nullptr, ahead_ ? &*ahead_ : nullptr);
   return true;
 }
 
@@ -242,11 +231,10 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
     if (is_ahead) return {};
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }
-  is_new_ = measurement_ && view_ == ViewState::unanswered;  // coarser after the first batch
   if (!is_ahead) view_ = ViewState::streaming;
   view_bytes_ += others_wait ? size : batch->payload.size();  // fewer and larger batches take less processor time
   StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();
-  if (measurement_) remaining.pixels = std::max(remaining.pixels, coarser(lod_).camera->pixel_error);  // what is not measured yet may need that
+  if (measurement_) remaining.pixels = std::max(remaining.pixels, lod_.camera->pixel_error);  // what is not measured may move as far
   protocol::Batch message{epoch_,
                           sequence_++,
                           batch->updates,
