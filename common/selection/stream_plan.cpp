@@ -66,7 +66,7 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   relevant_ = std::move(relevant);
   shown_ = std::move(shown);
   const SupercubeSet& set = volume_->set();
-  viewed_.assign(set.bricks().size(), {});
+  viewed_ = PagedArray<Viewed>(set.bricks().size());
   pending_ = SparseArray<std::uint64_t>(viewed_.size());
   wanted_count_ = pending_bricks_ = 0;
   for (BrickIndex b{0}; b < viewed_.size(); ++b) {
@@ -203,7 +203,7 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   after.set_unsent(std::min<unsigned>(after.unsent, needs.updates()));
   after.lower_to(rest.highest, object_error);
   set_pending(brick, after, rest.rank, std::min<unsigned>(after.wanted, rest.wanted));
-  if (ranking_->has_camera()) viewed_[brick].pixels = Up16(ranking.pixels(float(after.object_error)));
+  if (ranking_->has_camera() && viewed_[brick].rank != 0) viewed_.use(brick).pixels = Up16(ranking.pixels(float(after.object_error)));
   return true;
 }
 
@@ -281,10 +281,15 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
     rank_bricks();
   }
   BatchBuilder builder(*volume_, sent_, wanted_channels_, max_bytes);
-  while (!done()) {
+  while (has_more()) {
     if (next_brick_ == 0) {
       if (builder.bytes >= max_bytes / 4 * 3) break;  // little room for another band: it would pay for its names twice
       begin_band();
+    }
+    const std::size_t page = viewed_.page_of(next_brick_ - 1);
+    if (!viewed_.is_used(page)) {
+      next_brick_ = std::uint32_t(viewed_.begin_of(page));
+      continue;
     }
     if (viewed_[next_brick_ - 1].rank < band_) {
       --next_brick_;

@@ -26,6 +26,7 @@
 #include "common/ivm/ranking.h"
 #include "common/selection/supercube_bounds.h"
 #include "common/util/bits.h"
+#include "common/util/paged_array.h"
 #include "common/util/sparse_array.h"
 #include "common/view/lod.h"
 
@@ -49,10 +50,11 @@ inline constexpr std::size_t kFirstPayloadOfRange = 128 << 10;
   return std::clamp(3 * sent, std::min(first, most), most);
 }
 
-// The stream of one session over one data set. One thread at a time. Memory besides the data set: twelve bytes for each
-// brick; for each 32 updates of which one was sent four bytes and a little more (eight with max_updates, four more for
-// each channel); for each supercube whose unsent updates matter less than all of it two bytes, or three if distances are
-// known.
+// The stream of one session over one data set. One thread at a time. Memory besides the data set: a byte for each four
+// bricks; four bytes for each of 64 bricks of which one has something that is wanted and not sent; eight for each brick that
+// something was sent of; for each 32 updates of which one was sent four bytes and a little more (eight with max_updates,
+// four more for each channel); for each supercube whose unsent updates matter less than all of it two bytes, or three if
+// distances are known.
 class StreamPlan {
  public:
   static constexpr std::uint32_t kMostVisits = 1 << 19;
@@ -102,7 +104,7 @@ class StreamPlan {
   // max_visits: of supercubes and updates, after which the batch ends; 2^15 take about a quarter of a millisecond. Few cut
   // what a drag of a range needs, a few updates in many places, into small batches that name the same supercubes again.
   std::optional<Batch> next(std::size_t max_bytes, std::uint32_t max_visits = kMostVisits);
-  [[nodiscard]] bool done() const { return !search_ && !lacks_values() && (pending_bricks_ == 0 || is_full()); }
+  [[nodiscard]] bool done() const { return !search_ && !lacks_values() && !has_more(); }
   // More is wanted than the client may hold.
   [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }
 
@@ -127,6 +129,8 @@ class StreamPlan {
   static constexpr std::size_t kBrickBytes = 18;     // most bytes that name a brick
   static constexpr std::size_t kSupercubeBytes = 7;  // flags, or a mask of slots
   static constexpr std::size_t kPlaneBytes = 64;     // lengths, and the ends of what is coded
+  // Updates are wanted, and there is room for them.
+  [[nodiscard]] bool has_more() const { return pending_bricks_ != 0 && !is_full(); }
   // Some updates were sent without a value that is wanted now.
   [[nodiscard]] bool lacks_values() const;
   std::optional<Batch> next_values(std::size_t max_bytes);
@@ -230,7 +234,7 @@ class StreamPlan {
   std::shared_ptr<const RelevantUpdates> relevant_;  // not null
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
-  std::vector<Viewed> viewed_;                // by brick
+  PagedArray<Viewed> viewed_;                 // by brick; those whose rank is 0 may be as at first
   SparseArray<std::uint64_t> pending_;        // by brick, the bits of Pending
   SupercubeBounds supercube_bounds_;          // of unsent updates, where they are not those of the relevant ones
   std::vector<SentChannel> channels_;         // of the data set

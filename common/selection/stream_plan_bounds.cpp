@@ -81,16 +81,19 @@ void StreamPlan::rank_bricks() {
     const Pending w = pending(b);
     if (w.unsent == 0) continue;
     const auto bound = bounds(b, left(w));
-    viewed_[b].pixels = Up16(bound.pixels);
-    viewed_[b].is_loose = bound.is_exact ? 0 : 1;
-    set_pending(b, w, std::max(bound.rank, budget_ ? Rank(1) : Rank(0)), w.unsent);
+    const Rank rank = std::max(bound.rank, budget_ ? Rank(1) : Rank(0));
+    set_pending(b, w, rank, w.unsent);
+    if (rank == 0) continue;
+    Viewed& viewed = viewed_.use(b);
+    viewed.pixels = Up16(bound.pixels);
+    viewed.is_loose = bound.is_exact ? 0 : 1;
   }
   begin_band();
 }
 
 void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
   const Pending w = pending(brick);
-  viewed_[brick].is_loose = 0;
+  viewed_.use(brick).is_loose = 0;
   const Rank exact = ranking.bound(left(w));
   set_pending(brick, w, std::min<Rank>(viewed_[brick].rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), w.wanted);
 }
@@ -113,9 +116,10 @@ void StreamPlan::set_pending(BrickIndex brick, Pending pending, Rank rank, unsig
   if (pending.unsent == 0) rank = 0;
   wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, pending.unsent);
   wanted_count_ += wanted - std::uint64_t(pending.wanted);
-  Viewed& viewed = viewed_[brick];
-  pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(viewed.rank != 0);
-  viewed.rank = rank & 0x7fffU;
+  const Rank before = viewed_[brick].rank;
+  if (rank != before) viewed_.use(brick).rank = rank & 0x7fffU;
+  pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(before != 0);
+  if (pending_bricks_ == 0) viewed_.release_all();
   pending.wanted = wanted & 0xfffU;
   keep(brick, pending);
 }
@@ -123,10 +127,16 @@ void StreamPlan::set_pending(BrickIndex brick, Pending pending, Rank rank, unsig
 void StreamPlan::begin_band() {
   next_brick_ = std::uint32_t(viewed_.size());
   Rank top = 0;
-  for (std::uint32_t next = next_brick_; next != 0; --next) {  // coarse ones have high ranks, so that few others are refined
-    const BrickIndex b(next - 1);
-    if (viewed_[b].rank > top && viewed_[b].is_loose != 0) refine(b, ranking_->of_brick(b));
-    top = std::max<Rank>(top, viewed_[b].rank);
+  for (std::size_t page = viewed_.pages(); page-- != 0;) {  // coarse ones have high ranks, so that few others are refined
+    if (!viewed_.is_used(page)) continue;
+    Rank most = 0;
+    for (std::size_t i = viewed_.end_of(page); i-- != viewed_.begin_of(page);) {
+      const BrickIndex b{std::uint32_t(i)};
+      if (viewed_[b].rank > top && viewed_[b].is_loose != 0) refine(b, ranking_->of_brick(b));
+      most = std::max<Rank>(most, viewed_[b].rank);
+      top = std::max(top, most);
+    }
+    if (most == 0) viewed_.release(page);
   }
   const bool is_rest = wanted_count_ < sent_count_ / kRest;
   band_ = top == 0 ? Rank(0) : ranking_->band_below(top, is_rest);
@@ -134,18 +144,22 @@ void StreamPlan::begin_band() {
 
 StreamPlan::Remaining StreamPlan::remaining() const {
   Rank top = 0;
-  for (const Viewed& v : viewed_) top = std::max<Rank>(top, v.rank);
+  unsigned error_step = 0;
   Remaining remaining{wanted_count_, 0, 0};
+  for (std::size_t page = 0; page < viewed_.pages(); ++page) {
+    for (std::size_t i = viewed_.begin_of(page); viewed_.is_used(page) && i < viewed_.end_of(page); ++i) {
+      const Viewed& viewed = viewed_[i];
+      if (viewed.rank == 0) continue;
+      top = std::max<Rank>(top, viewed.rank);
+      if (!ranking_->has_camera()) continue;
+      error_step = std::max(error_step, unsigned(pending(BrickIndex(std::uint32_t(i))).error_step));
+      remaining.pixels = std::max(remaining.pixels, double(float(viewed.pixels)));
+    }
+  }
   if (top == 0) return remaining;
   if (!ranking_->has_camera()) {
     remaining.error = ranking_->error(top);
     return remaining;
-  }
-  unsigned error_step = 0;
-  for (BrickIndex b{0}; b < viewed_.size(); ++b) {
-    if (viewed_[b].rank == 0) continue;
-    error_step = std::max(error_step, unsigned(pending(b).error_step));
-    remaining.pixels = std::max(remaining.pixels, double(float(viewed_[b].pixels)));
   }
   remaining.error = volume_->error_steps()[error_step];
   return remaining;
