@@ -25,6 +25,9 @@ Grid grid_of(std::span<const std::byte> record) {
   return grid;
 }
 
+// Of the updates that are there.
+int finest_scale(const IntervalVolume& volume) { return scale_of_key(volume.set().bricks().back().key); }
+
 Result<std::vector<std::byte>> read_part(std::ifstream& in, std::uint64_t first, std::uint64_t bytes) {
   std::vector<std::byte> part(std::size_t(bytes), std::byte(0));
   in.seekg(std::streamoff(first));
@@ -85,11 +88,12 @@ bool wants_finer(const IntervalVolume& volume, const Lod& lod) {
   if (threshold <= 0 || lod.camera) return true;
   const SupercubeSet& set = volume.set();
   bool is_wanted = false;
-  set.for_each(scale_of_key(set.bricks().back().key), 2, [&](const Place& p) { is_wanted = is_wanted || double(volume.error(p.index)) > threshold; });
+  set.for_each(finest_scale(volume), 2, [&](const Place& p) { is_wanted = is_wanted || double(volume.error(p.index)) > threshold; });
   return is_wanted;
 }
 
-Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path, const ParallelFor& parallel) {
+Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path, const IntervalVolume* held,
+                                                                 const ParallelFor& parallel) {
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   const std::streamoff size = in ? std::streamoff(in.tellg()) : -1;
   if (size < 0) return fail("could not be read");
@@ -98,13 +102,14 @@ Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::file
   if (!start) return tl::unexpected(start.error());
   const auto scales = coarse_scales(*start, bytes);
   if (!scales) return tl::unexpected(scales.error());
-  if (scales->empty()) return nullptr;
-  const CoarseScales& coarsest = scales->front();
-  const auto first = read_part(in, 0, coarsest.first_bytes);
+  const auto next =
+      std::find_if(scales->begin(), scales->end(), [&](const CoarseScales& s) { return held == nullptr || s.finest < finest_scale(*held); });
+  if (next == scales->end()) return nullptr;
+  const auto first = read_part(in, 0, next->first_bytes);
   if (!first) return tl::unexpected(first.error());
-  const auto last = read_part(in, bytes - coarsest.last_bytes, coarsest.last_bytes);
+  const auto last = read_part(in, bytes - next->last_bytes, next->last_bytes);
   if (!last) return tl::unexpected(last.error());
-  auto volume = decode_coarse({*first, *last, bytes}, coarsest, path.stem().string(), parallel);
+  auto volume = decode_coarse({*first, *last, bytes}, *next, path.stem().string(), parallel);
   if (!volume) return tl::unexpected(volume.error());
   return std::make_shared<const IntervalVolume>(std::move(*volume));
 }

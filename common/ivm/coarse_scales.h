@@ -45,8 +45,10 @@ inline constexpr std::size_t kStartBytes = 64 << 10;
 // that is whole.
 [[nodiscard]] bool wants_finer(const IntervalVolume& volume, const Lod& lod);
 
-// The first of these of a file, by its first and last bytes. nullptr: it has none. The name is the file's.
+// The coarsest of these of a file that are finer than what is held of it, by its first and last bytes. held: nullptr for
+// nothing. nullptr: there are none, and the file is to be read whole. The name is the file's.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path,
+                                                                               const IntervalVolume* held = nullptr,
                                                                                const ParallelFor& parallel = serial);
 
 }  // namespace intervale

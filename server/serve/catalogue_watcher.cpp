@@ -83,7 +83,7 @@ Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
       if (auto loaded = load_folder(input, parallel); !loaded) return tl::unexpected(loaded.error());
       continue;
     }
-    auto& [path, volume] = files_.emplace_back(input, load_coarse(input, parallel));
+    auto& [path, volume] = files_.emplace_back(input, load_coarse(input, nullptr, parallel));
     if (volume) continue;
     if (auto loaded = load_file(path, volume, parallel); !loaded) return tl::unexpected(loaded.error());
   }
@@ -108,30 +108,42 @@ Result<void> CatalogueWatcher::load_file(const fs::path& path, Catalogue::Volume
   return {};
 }
 
-// What a large file begins with, in memory. nullptr: it is to be read whole, which also tells what is wrong with it.
-Catalogue::Volume CatalogueWatcher::load_coarse(const fs::path& path, const ParallelFor& parallel) {
+// The coarsest scales of a large file that are finer than those held; the first ones lie in memory. nullptr: it is to be
+// read whole, which also tells what is wrong with it.
+Catalogue::Volume CatalogueWatcher::load_coarse(const fs::path& path, const Catalogue::Volume& held, const ParallelFor& parallel) {
   if (tolerates_damage_ || memory_.room() != ~std::uint64_t(0)) return nullptr;
   std::error_code ignored;
   if (const auto size = fs::file_size(path, ignored); ignored || size < kLargeFile) return nullptr;
-  auto volume = catching("", [&] { return load_coarse_volume(path, parallel); });
+  const ScratchMemory::Scope scope(held ? memory_.data_memory() : nullptr);
+  auto volume = catching("", [&] { return load_coarse_volume(path, held.get(), parallel); });
   if (!volume || *volume == nullptr || !protocol::check_sendable((*volume)->description())) return nullptr;
+  if (held && (*volume)->description() != held->description()) return nullptr;  // the file has changed
   return counted(memory_, Memory::Holder::datasets, std::move(*volume));
 }
 
 Result<std::optional<Catalogue>> CatalogueWatcher::complete(std::stop_token stop) {
   const ParallelFor parallel = serial_until(std::move(stop));
-  for (auto& [path, volume] : files_) {
-    if (volume->is_whole()) continue;
-    if (auto loaded = load_file(path, volume, parallel); !loaded) return tl::unexpected(loaded.error());
-    return std::optional(*catalogue(false));
+  const fs::path* path = nullptr;
+  Catalogue::Volume* least = nullptr;
+  File* in_folder = nullptr;  // that has it
+  const auto look_at = [&](const fs::path& at, Catalogue::Volume& volume, File* file) {
+    if (!volume || volume->is_whole() || (least != nullptr && (*least)->size() <= volume->size())) return;
+    path = &at;
+    least = &volume;
+    in_folder = file;
+  };
+  for (auto& [at, volume] : files_) look_at(at, volume, nullptr);
+  for (auto& [at, file] : folder_files_) look_at(at, file.volume, &file);
+  if (least == nullptr) return std::nullopt;
+  if (auto finer = load_coarse(*path, *least, parallel)) {
+    *least = std::move(finer);
+  } else if (in_folder == nullptr) {
+    if (auto loaded = load_file(*path, *least, parallel); !loaded) return tl::unexpected(loaded.error());
+  } else {
+    least->reset();
+    poll_file(*path, *in_folder, parallel);
   }
-  for (auto& [path, file] : folder_files_) {
-    if (!file.volume || file.volume->is_whole()) continue;
-    file.volume.reset();
-    poll_file(path, file, parallel);
-    return std::optional(*catalogue(false));
-  }
-  return std::nullopt;
+  return std::optional(*catalogue(false));
 }
 
 Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const ParallelFor& parallel) {
@@ -140,7 +152,7 @@ Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const Paralle
   for (const fs::path& path : *paths) {
     File file;
     file.last_seen = stamp_of(path);  // the first load does not wait for a second look
-    if (Catalogue::check_name(path.stem().string())) file.volume = load_coarse(path, parallel);
+    if (Catalogue::check_name(path.stem().string())) file.volume = load_coarse(path, nullptr, parallel);
     if (!file.volume) poll_file(path, file, parallel);
     folder_files_[path] = std::move(file);
   }

@@ -36,8 +36,9 @@ class CatalogueWatcher {
   // Of large files of every range, only the coarse scales are in it (coarse_scales.h).
   Result<Catalogue> load(std::stop_token stop = {});
 
-  // After load(): reads one more data set whole that is not. Returns the new catalogue; nullopt once all are. A named file
-  // that turns out to be damaged is an error; such a file in a folder is logged, and leaves the catalogue.
+  // After load(): reads on, of the data set that has fewest updates of those that are not whole: as far as the next scale,
+  // at last all of it. Returns the new catalogue; nullopt once all are whole. A named file that turns out to be damaged is
+  // an error; such a file in a folder is logged, and leaves the catalogue.
   Result<std::optional<Catalogue>> complete(std::stop_token stop = {});
 
   // Reads the folders again. Returns the new catalogue, or nullopt if nothing changed. A new or changed file is
@@ -57,7 +58,7 @@ class CatalogueWatcher {
   };
   Result<void> load_file(const std::filesystem::path& path, Catalogue::Volume& volume, const ParallelFor& parallel);
   Result<void> load_folder(const std::filesystem::path& folder, const ParallelFor& parallel);
-  [[nodiscard]] Catalogue::Volume load_coarse(const std::filesystem::path& path, const ParallelFor& parallel);
+  [[nodiscard]] Catalogue::Volume load_coarse(const std::filesystem::path& path, const Catalogue::Volume& held, const ParallelFor& parallel);
   bool poll_file(const std::filesystem::path& path, File& file, const ParallelFor& parallel);
   [[nodiscard]] Result<Catalogue> catalogue(bool is_start) const;
 

@@ -22,24 +22,26 @@ namespace {
 using protocol::CloseCode;
 using ::testing::HasSubstr;
 
-// Noise of four bytes a sample, in two scales of pages.
+// Four bytes a sample.
+std::vector<std::byte> noise(const std::array<std::int32_t, 3>& dims) {
+  // The thread sanitizer takes what oneTBB's threads tell each other for races, and does not come to an end.
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  std::mt19937 random(1);
+  std::vector<float> samples(std::size_t(dims[0]) * std::size_t(dims[1]) * std::size_t(dims[2]));
+  for (float& v : samples) v = std::ldexp(float(random()), -32);
+  Volume volume = testing::volume_of_type(SampleType::f32, dims, samples);
+  const auto format = choose_value_format(volume, 0);
+  return encode_values(build_value_volume(volume, *format));
+}
+
+// In two scales of pages.
 const std::vector<std::byte>& large() {
-  static const std::vector<std::byte> file = [] {
-    // The thread sanitizer takes what oneTBB's threads tell each other for races, and does not come to an end.
-    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-    constexpr std::array<std::int32_t, 3> kDims{70, 68, 67};
-    std::mt19937 random(1);
-    std::vector<float> samples(std::size_t(kDims[0]) * kDims[1] * kDims[2]);
-    for (float& v : samples) v = std::ldexp(float(random()), -32);
-    Volume volume = testing::volume_of_type(SampleType::f32, kDims, samples);
-    const auto format = choose_value_format(volume, 0);
-    return encode_values(build_value_volume(volume, *format));
-  }();
+  static const std::vector<std::byte> file = noise({70, 68, 67});
   return file;
 }
 
-std::filesystem::path write(const TempDir& folder, const std::vector<std::byte>& bytes) {
-  return folder.file("large.ivm", std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+std::filesystem::path write(const TempDir& folder, const std::vector<std::byte>& bytes, const std::string& name = "large.ivm") {
+  return folder.file(name, std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
 struct LargeFiles : ::testing::Test {
@@ -64,6 +66,44 @@ TEST_F(LargeFiles, AreOpenedByTheirCoarseScales) {
     EXPECT_TRUE(last && !*last);
     EXPECT_FALSE(watcher.poll());
   }
+}
+
+TEST_F(LargeFiles, AreReadScaleByScaleAndThoseWithFewestUpdatesFirst) {
+  write(folder, large());
+  write(folder, noise({134, 130, 129}), "larger.ivm");
+  const auto server = start();
+  CatalogueWatcher watcher({folder.path()}, server->memory());
+  auto catalogue = watcher.load().value();
+  std::size_t size = catalogue.find("larger")->size();
+  EXPECT_FALSE(catalogue.find("larger")->is_whole());
+  server->offer(catalogue);
+  RawClient client(server->port());
+  client.send(protocol::Open{"larger", "test", protocol::kMaxWindow});
+  protocol::View view{1, {}};
+  view.shown = {{{-1, 2}}, Refine::uniform};
+  view.early = true;
+  client.send(view);
+  const std::uint64_t all = client.expect<protocol::Opened>().description.updates;
+  std::uint64_t updates = 0;
+  const auto read_on = [&] {
+    while (updates < size) updates += client.expect<protocol::Batch>().updates;
+    EXPECT_EQ(updates, size);
+    catalogue = **watcher.complete();
+    server->offer(catalogue);
+  };
+  read_on();
+  EXPECT_GT(catalogue.find("larger")->size(), size) << "its coarse scales have fewer updates than those of the other file";
+  EXPECT_FALSE(catalogue.find("larger")->is_whole());
+  EXPECT_FALSE(catalogue.find("large")->is_whole());
+  size = catalogue.find("larger")->size();
+  read_on();
+  EXPECT_EQ(catalogue.find("larger")->size(), size);
+  EXPECT_TRUE(catalogue.find("large")->is_whole());
+  catalogue = **watcher.complete();
+  EXPECT_TRUE(catalogue.find("larger")->is_whole());
+  server->offer(catalogue);
+  EXPECT_EQ(updates + client.stream_to_end(), all);
+  EXPECT_FALSE(*watcher.complete());
 }
 
 TEST_F(LargeFiles, AreReadWholeAtOnceWhereThatIsAsked) {
