@@ -112,7 +112,7 @@ Result<FromSource> fetch_from(const RemoteUrl& url, const FetchCommand& options,
   fmt::print(stderr, "intervale-client: no server: reads what the view needs of {}\n", url.shown);
   Progress progress("reading " + url.shown);
   const RemoteLimits limits;
-  RemoteVolume file(url, *access, limits);
+  RemoteVolume file(url, *access, limits, asked_for(fetch.shown, fetch.prefers_uniform ? Refine::uniform : Refine::boundary));
   bool has_begun = false;
   const NextVolume next = [&](ReadOn how, const ParallelFor& parallel) -> Result<std::shared_ptr<const IntervalVolume>> {
     auto read = how == ReadOn::all ? file.whole(parallel) : file.next(parallel);

@@ -28,6 +28,38 @@ struct BrickRun {
 // The blocks of a set, ascending.
 [[nodiscard]] std::vector<BrickRun> blocks_of(const SupercubeSet& set);
 
+// Where a block is: in blocks of its scale, not negative.
+struct BlockPlace {
+  int scale = 0;
+  Vertex at;
+};
+[[nodiscard]] inline BlockPlace place_of(BlockKey block) {
+  const SupercubeKey key = block << kBlockBits;
+  const Vertex p = position_of_key(key);
+  return {scale_of_key(key), {p.x >> 4, p.y >> 4, p.z >> 4}};
+}
+[[nodiscard]] inline BlockKey block_at(const BlockPlace& place) {
+  return block_of(supercube_key(place.scale, {place.at.x << 4, place.at.y << 4, place.at.z << 4}));
+}
+
+// Calls visit(block) for the blocks of coarser scales, whether or not they exist, that may have vertices of a block's
+// diamonds: those lie at 0 to 64 in units of the block's scale, in up to 8 blocks of each.
+template <class Visit>
+void for_each_coarser_block(BlockKey block, Visit&& visit) {
+  constexpr int kBlockShift = 6;
+  const BlockPlace place = place_of(block);
+  for (int coarser = place.scale + 1; coarser < kMaxLevels; ++coarser) {
+    const int shift = kBlockShift + coarser - place.scale;
+    const auto first = [shift](std::int32_t p) { return (p << kBlockShift) >> shift; };
+    const auto last = [shift](std::int32_t p) { return ((p + 1) << kBlockShift) >> shift; };
+    for (std::int32_t z = first(place.at.z); z <= last(place.at.z); ++z) {
+      for (std::int32_t y = first(place.at.y); y <= last(place.at.y); ++y) {
+        for (std::int32_t x = first(place.at.x); x <= last(place.at.x); ++x) visit(block_at({coarser, {x, y, z}}));
+      }
+    }
+  }
+}
+
 class BlockLattice {
  public:
   static constexpr int kSide = 66;  // points on an axis, from -1 to 64
@@ -43,9 +75,10 @@ class BlockLattice {
   // Sets the points that exist; all others become kNoKey.
   void move_to(BlockKey block, Load load);
 
-  // A point's number. at(): of the first point of one of the block's supercubes; of_slot(): a diamond's centre, and
-  // its vertices, from there.
+  // A point's number, from its coordinates in the block, -1 to 64. at(): of the first point of one of the block's supercubes; of_slot(): a diamond's
+  // centre, and its vertices, from there.
   using Point = std::int32_t;
+  static constexpr Point point_of(std::int32_t x, std::int32_t y, std::int32_t z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
   [[nodiscard]] Point at(SupercubeKey key) const;
   [[nodiscard]] static Point of_slot(Slot slot) { return offsets().centre[slot]; }
   // A vertex, from the centre of the diamond.
@@ -70,7 +103,6 @@ class BlockLattice {
     return table;
   }
   static Offsets make_offsets();
-  static constexpr Point point_of(std::int32_t x, std::int32_t y, std::int32_t z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
   void load_scale(int scale, bool own_only);
 
   const std::array<ValueKey, kRootVertices>& corners_;

@@ -45,12 +45,13 @@ constexpr std::uint32_t kCommon =
     bit_of(StreamType::field) | bit_of(StreamType::weights) | bit_of(StreamType::page_index) | bit_of(StreamType::pages) | bit_of(StreamType::labels);
 constexpr std::uint32_t kStatistics = bit_of(StreamType::histogram) | bit_of(StreamType::volumes);
 constexpr std::uint32_t kChannels = bit_of(StreamType::channels) | bit_of(StreamType::channel_pages);
-constexpr std::uint32_t kNotNeeded =
-    kStatistics | bit_of(StreamType::labels) | kChannels | bit_of(StreamType::update_slopes);  // what a mesh can do without
-constexpr std::uint32_t kSometimes = bit_of(StreamType::value_table) | kChannels | bit_of(StreamType::update_slopes);
+constexpr std::uint32_t kNotNeeded = kStatistics | bit_of(StreamType::labels) | kChannels | bit_of(StreamType::update_slopes) |
+                                     bit_of(StreamType::page_bounds);  // what a mesh can do without
+constexpr std::uint32_t kSometimes =
+    bit_of(StreamType::value_table) | kChannels | bit_of(StreamType::update_slopes) | bit_of(StreamType::page_bounds);
 constexpr std::uint32_t types_of(FileScope scope) {
   if (scope == FileScope::every_range) return kCommon | kStatistics | (kSometimes & ~bit_of(StreamType::update_slopes));
-  return ((std::uint32_t(1) << kStreamTypes) - 2) & ~kStatistics;
+  return ((std::uint32_t(1) << kStreamTypes) - 2) & ~(kStatistics | bit_of(StreamType::page_bounds));
 }
 
 std::uint64_t head_checksum(std::span<const std::byte> head) {

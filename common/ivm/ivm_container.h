@@ -42,8 +42,10 @@ enum class StreamType : std::uint32_t {
   channel_pages = 17,
   // one range only, if they are known
   update_slopes = 18,
+  // every range only, if there are several pages; files of older programs have none
+  page_bounds = 19,
 };
-inline constexpr std::uint32_t kStreamTypes = 19;  // and one more, as 0 is none
+inline constexpr std::uint32_t kStreamTypes = 20;  // and one more, as 0 is none
 
 enum class FileScope { every_range, one_range };  // of which ranges a data set is
 
@@ -93,7 +95,7 @@ struct ContainerFrame {
 
 // A file from outside: its header, table and checksums are in order, and it has the streams of its scope; optional ones
 // of an unknown type are skipped, once their checksums were checked. Pages have checksums of their own, which whoever
-// reads them must check. value_table, update_slopes and the streams of channels are empty if the file has none.
+// reads them must check. value_table, update_slopes, page_bounds and the streams of channels are empty if the file has none.
 class Container {
  public:
   // The file must outlive the result. Fails, in one line, if it is not a file of this scope. room: of bytes, for claim().

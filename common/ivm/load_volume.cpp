@@ -21,6 +21,12 @@ Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::stri
   return of_every_range(std::move(*values).take(), parallel);
 }
 
+Result<IntervalVolume> decode_needed_volume(const FileEnds& file, std::string name, const std::vector<bool>& pages, const ParallelFor& parallel) {
+  auto values = decode_needed_values(file, std::move(name), pages, parallel);
+  if (!values) return tl::unexpected(values.error());
+  return of_every_range(std::move(*values).take(), parallel);
+}
+
 Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel, PageFaults* faults) {
   const auto bytes = read_volume_file(path, parallel);
   if (!bytes) return tl::unexpected(bytes.error());

@@ -25,6 +25,10 @@ namespace intervale {
 [[nodiscard]] Result<IntervalVolume> decode_volume(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
                                                    std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
+// What some ranges need of a data set of every range: as decode_needed_values() has it (value_file.h). Not for other ranges.
+[[nodiscard]] Result<IntervalVolume> decode_needed_volume(const FileEnds& file, std::string name, const std::vector<bool>& pages,
+                                                          const ParallelFor& parallel = serial);
+
 // Both. The name is the file's, without folders and extension. Errors begin with the path.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_volume(const std::filesystem::path& path, const ParallelFor& parallel = serial,
                                                                         PageFaults* faults = nullptr);

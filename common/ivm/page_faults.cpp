@@ -7,15 +7,7 @@
 namespace intervale {
 namespace {
 
-constexpr int kBlockShift = 6;  // a block has 64 points of its lattice on each axis
-
 SupercubeKey key_of(const SupercubeSet& set, const BrickRun& block) { return set.bricks()[block.first].key; }
-
-// In blocks of its scale.
-Vertex position_of(SupercubeKey key) {
-  const Vertex p = position_of_key(key);
-  return {p.x >> 4, p.y >> 4, p.z >> 4};
-}
 
 std::string place(const std::array<std::int32_t, 3>& p) {
   return "(" + std::to_string(p[0]) + ", " + std::to_string(p[1]) + ", " + std::to_string(p[2]) + ")";
@@ -37,37 +29,22 @@ std::string to_text(const PageFaults& faults) {
   return count <= kMostNamed ? text : text + " and " + std::to_string(count - kMostNamed) + " more";
 }
 
-void LostPages::lose(std::size_t page) {
-  is_lost_[page] = true;
-  for (const BrickRun& block : pages_[page]) blocks_.push_back(block_of(key_of(set_, block)));
+void LostPages::lose(std::span<const std::size_t> pages) {
+  for (const std::size_t page : pages) {
+    is_lost_[page] = true;
+    for (const BrickRun& block : pages_[page]) blocks_.push_back(block_of(key_of(set_, block)));
+  }
   std::sort(blocks_.begin(), blocks_.end());
 }
 
-bool LostPages::is_lost(int scale, const Vertex& block) const {
-  return std::binary_search(blocks_.begin(), blocks_.end(), block_of(supercube_key(scale, {block.x << 4, block.y << 4, block.z << 4})));
-}
-
-// The vertices of coarser scales lie at 0 to 64 in units of the block's scale (block_lattice.h): in up to 8 blocks of each.
 bool LostPages::needs_lost(std::size_t page) const {
   if (blocks_.empty()) return false;
-  return std::any_of(pages_[page].begin(), pages_[page].end(), [this](const BrickRun& block) {
-    const SupercubeKey key = key_of(set_, block);
-    const int scale = scale_of_key(key);
-    const Vertex at = position_of(key);
-    for (int coarser = scale + 1; coarser < kMaxLevels; ++coarser) {
-      const int shift = kBlockShift + coarser - scale;
-      const auto first = [shift](std::int32_t p) { return (p << kBlockShift) >> shift; };
-      const auto last = [shift](std::int32_t p) { return ((p + 1) << kBlockShift) >> shift; };
-      for (std::int32_t z = first(at.z); z <= last(at.z); ++z) {
-        for (std::int32_t y = first(at.y); y <= last(at.y); ++y) {
-          for (std::int32_t x = first(at.x); x <= last(at.x); ++x) {
-            if (is_lost(coarser, {x, y, z})) return true;
-          }
-        }
-      }
-    }
-    return false;
-  });
+  bool needs = false;
+  for (const BrickRun& block : pages_[page]) {
+    for_each_coarser_block(block_of(key_of(set_, block)),
+                           [&](BlockKey coarser) { needs = needs || std::binary_search(blocks_.begin(), blocks_.end(), coarser); });
+  }
+  return needs;
 }
 
 DamagedPage place_of(const SupercubeSet& set, std::span<const ValuePage> pages, std::size_t page, const std::array<std::int32_t, 3>& dims) {

@@ -46,12 +46,10 @@ class LostPages {
   // Page after page: whether a coarser one that it may need is lost. Then it is lost, too.
   [[nodiscard]] bool needs_lost(std::size_t page) const;
   // Before any finer page is asked for.
-  void lose(std::size_t page);
+  void lose(std::span<const std::size_t> pages);
   [[nodiscard]] const std::vector<bool>& lost() const { return is_lost_; }
-  [[nodiscard]] bool any() const { return !blocks_.empty(); }
 
  private:
-  [[nodiscard]] bool is_lost(int scale, const Vertex& block) const;
   const SupercubeSet& set_;
   std::span<const ValuePage> pages_;
   std::vector<bool> is_lost_;

@@ -1,5 +1,6 @@
 #include "common/ivm/value_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include "common/codec/coding_rate.h"
 #include "common/ivm/channel_file.h"
 #include "common/ivm/ivm_container.h"
+#include "common/ivm/value_page.h"
 #include "common/ivm/value_streams.h"
 
 namespace intervale {
@@ -121,10 +123,15 @@ Streams encode_field(const ValueVolume::Parts& parts) {
   return streams;
 }
 
+void append_bounds(Streams& streams, std::span<const PageBounds> bounds) {
+  if (bounds.size() > 1) append(streams[StreamType::page_bounds], bounds);
+}
+
 std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel, KeptPages* kept) {
   const FieldDescription& d = volume.description();
   Streams streams = encode_field(volume.parts());
   append_pages(volume.parts(), streams[StreamType::page_index], streams[StreamType::pages], parallel, {kept, 0});
+  append_bounds(streams, bounds_of_pages(volume.parts(), pages_of(volume.set()), parallel));
   append_channels(streams, d.grid, volume.set(), d.channels, volume.parts().channel_keys, parallel, kept);
   return make_container(FileScope::every_range, streams);
 }
@@ -163,6 +170,96 @@ Result<ValueVolume> decode_coarse_values(const FileEnds& ends, std::string name,
   parts->keys = ValueKeys(0, parts->description.format.last);
   auto index = (*file)[StreamType::page_index], pages = (*file)[StreamType::pages];
   if (auto ok = take_pages(index, pages, *parts, parallel, nullptr); !ok) return tl::unexpected(ok.error());
+  return ValueVolume(std::move(*parts));
+}
+
+namespace {
+
+static_assert(sizeof(PageBounds) == 8, "no padding");
+
+Result<std::vector<PageBounds>> read_bounds(const Container& file, const ValueFormat& format, std::size_t pages) {
+  const auto bytes = file.stream(StreamType::page_bounds, pages * sizeof(PageBounds));
+  if (!bytes) return tl::unexpected(bytes.error());
+  std::vector<PageBounds> bounds = numbers_of<PageBounds>(*bytes);
+  const auto is_valid = [&](const PageBounds& b) { return b.least <= b.greatest && b.greatest <= format.last; };
+  if (!std::all_of(bounds.begin(), bounds.end(), is_valid)) return fail("the bounds of the pages are damaged");
+  return bounds;
+}
+
+constexpr std::uint64_t kLittle = 16 << 10;  // bytes that come sooner than the answer to another request
+
+// Adds the pages that begin within the first `there` bytes, and those between two others that are no more than kLittle together.
+void add_little_between(std::vector<bool>& pages, std::span<const std::uint64_t> lengths, std::uint64_t there) {
+  std::uint64_t between = 0;
+  std::size_t before = 0;  // the last one that is to be read
+  for (std::size_t page = 0; page < pages.size(); ++page) {
+    if (!pages[page] && there == 0) {
+      between = between > kLittle ? between : between + std::min(lengths[page], kLittle + 1);
+      continue;
+    }
+    there -= std::min(there, lengths[page]);
+    if (between <= kLittle) std::fill(pages.begin() + std::ptrdiff_t(before), pages.begin() + std::ptrdiff_t(page) + 1, true);
+    pages[page] = true;
+    before = page;
+    between = 0;
+  }
+}
+
+}  // namespace
+
+Result<std::optional<NeededPages>> needed_pages(const FileEnds& ends, const ShownRanges& shown) {
+  const auto file = Container::open_ends(ends, FileScope::every_range);
+  if (!file) return tl::unexpected(file.error());
+  if ((*file)[StreamType::page_bounds].empty() || !(*file)[StreamType::channels].empty()) return std::nullopt;
+  FieldDescription d;
+  if (auto ok = read_field(*file, d); !ok) return tl::unexpected(ok.error());
+  const std::vector<std::uint64_t> lengths = page_lengths((*file)[StreamType::page_index]);
+  const auto bounds = read_bounds(*file, d.format, lengths.size());
+  if (!bounds) return tl::unexpected(bounds.error());
+  const auto place = place_of(StreamType::pages, ends.first, ends.file_bytes, FileScope::every_range);
+  if (!place) return tl::unexpected(place.error());
+  NeededPages needed{pages_for(*bounds, d.format, shown), {}};
+  const std::uint64_t there = ends.first.size();
+  add_little_between(needed.pages, lengths, place->offset < there ? there - place->offset : 0);
+  std::uint64_t at = place->offset, bytes = 0;
+  for (std::size_t page = 0; page < lengths.size(); at += lengths[page++]) {
+    if (lengths[page] > place->offset + place->bytes - at) return fail("the index of the pages is damaged");
+    if (!needed.pages[page]) continue;
+    bytes += lengths[page];
+    const std::uint64_t begin = std::max(at, there), end = at + lengths[page];
+    if (begin >= end) continue;
+    if (needed.places.empty() || needed.places.back().offset + needed.places.back().bytes != begin) needed.places.push_back({begin, 0});
+    needed.places.back().bytes += end - begin;
+  }
+  if (at != place->offset + place->bytes) return fail("the index of the pages is damaged");
+  if (least_values(d.grid, 0) > most_coded_bits(bytes) + kRootVertices) return std::nullopt;
+  return needed;
+}
+
+// What the other pages hold does not matter, but for the side of each range's ends: any value within their bounds is on the
+// right one.
+Result<ValueVolume> decode_needed_values(const FileEnds& ends, std::string name, const std::vector<bool>& pages, const ParallelFor& parallel) {
+  const auto file = Container::open_ends(ends, FileScope::every_range);
+  if (!file) return tl::unexpected(file.error());
+  auto parts = read_description(*file, std::move(name), 0);
+  if (!parts) return tl::unexpected(parts.error());
+  parts->set = all_diamonds(Domain(parts->description.grid.dims), parallel);
+  const std::vector<ValuePage> all = pages_of(parts->set);
+  if (pages.size() != all.size()) return fail("the index of the pages is damaged");
+  const auto bounds = read_bounds(*file, parts->description.format, all.size());
+  if (!bounds) return tl::unexpected(bounds.error());
+  parts->keys = ValueKeys(0, parts->description.format.last);
+  const auto decoded = take_some_pages((*file)[StreamType::page_index], (*file)[StreamType::pages], pages, *parts, parallel);
+  if (!decoded) return tl::unexpected(decoded.error());
+  for (std::size_t page = 0; page < all.size(); ++page) {
+    if ((*decoded)[page]) continue;
+    for (const BrickRun& block : all[page]) {
+      for (BrickIndex brick = block.first; brick < block.end; ++brick) {
+        const std::size_t first = parts->set.bricks()[brick].first;
+        for (std::size_t i = first; i < first + parts->set.updates(brick); ++i) parts->keys.set(i, (*bounds)[page].least);
+      }
+    }
+  }
   return ValueVolume(std::move(*parts));
 }
 

@@ -5,14 +5,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/ivm/ivm_container.h"
 #include "common/ivm/kept_pages.h"
+#include "common/ivm/page_bounds.h"
 #include "common/ivm/page_faults.h"
 #include "common/ivm/value_volume.h"
+#include "common/patch/shown_range.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 
@@ -26,8 +29,10 @@ namespace intervale {
 // encode_ivm().
 [[nodiscard]] std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFor& parallel = serial, KeptPages* kept = nullptr);
 
-// All streams but those of pages, of their index and of channels. Of the parts, description and weights.
+// All streams but those of pages, of their index, of their bounds and of channels. Of the parts, description and weights.
 [[nodiscard]] Streams encode_field(const ValueVolume::Parts& parts);
+// The stream of the bounds of all pages; none for a single one.
+void append_bounds(Streams& streams, std::span<const PageBounds> bounds);
 
 // The inverse, for bytes from outside: checks every checksum, and that the bytes can hold as many values as they claim
 // before it allocates. `parallel`, room and faults: as of decode_ivm(); what of_every_range() takes is included.
@@ -37,6 +42,20 @@ namespace intervale {
 // Of a file whose ends are there (coarse_scales.h): the scales from `finest` on, 1 at least, whose pages the first end has.
 // Channels are left out. Checks all that is there as decode_values() does.
 [[nodiscard]] Result<ValueVolume> decode_coarse_values(const FileEnds& file, std::string name, int finest, const ParallelFor& parallel = serial);
+
+// What some ranges need of a file, which is not all of its pages (page_bounds.h).
+struct NeededPages {
+  std::vector<bool> pages;          // for each whether it is to be read, with those that are little between two others
+  std::vector<StreamPlace> places;  // where in the file those are, without what file.first has; ascending, neighbours as one
+};
+// file: all but its pages, at least. nullopt: all of the file is to be read, which has no bounds, or has channels, or claims
+// more values than what is needed may hold.
+[[nodiscard]] Result<std::optional<NeededPages>> needed_pages(const FileEnds& file, const ShownRanges& shown);
+// Of these pages: file.first ends with their bytes, in order. The values for other ranges than `shown` are wrong; for these all
+// is as in the whole file: relevant updates, their values and errors, and where surfaces are. Checks all that is there as
+// decode_values() does.
+[[nodiscard]] Result<ValueVolume> decode_needed_values(const FileEnds& file, std::string name, const std::vector<bool>& pages,
+                                                       const ParallelFor& parallel = serial);
 
 // Writes a temporary file and renames it. Returns the number of bytes.
 [[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial,

@@ -82,8 +82,8 @@ struct StoredPage {
   std::uint64_t checksum = 0;
 };
 
-// lost: it may need what is. invalid: intact, but no page; no writer makes it.
-enum class PageState : std::uint8_t { intact, damaged, lost, invalid };
+// absent: not among those that are there. lost: it may need what is, or is absent. invalid: intact, but no page; no writer makes it.
+enum class PageState : std::uint8_t { intact, absent, damaged, lost, invalid };
 
 constexpr std::size_t kPagesAtOnce = 16;  // whose values are allocated together, or as many as were decoded before
 
@@ -98,8 +98,9 @@ void grow(const DecodedValues& to, const ValuePage& last) {
   if (to.error_levels != nullptr) to.error_levels->resize(std::min<std::size_t>(values, coarse_diamonds(set)));
 }
 
-// Takes so many pages off the front of an index and of the pages.
-Result<std::vector<StoredPage>> take_stored(std::span<const std::byte>& index, std::span<const std::byte>& pages, std::size_t count) {
+// Takes so many pages off the front of an index and of the pages. there: which have their bytes there; null: all.
+Result<std::vector<StoredPage>> take_stored(std::span<const std::byte>& index, std::span<const std::byte>& pages, std::size_t count,
+                                            const std::vector<bool>* there) {
   if (index.size() / sizeof(PageRecord) < count) return fail("the index of the pages is damaged");
   std::vector<StoredPage> stored;
   stored.reserve(count);
@@ -107,6 +108,10 @@ Result<std::vector<StoredPage>> take_stored(std::span<const std::byte>& index, s
     PageRecord r;
     std::memcpy(&r, index.data(), sizeof r);
     index = index.subspan(sizeof r);
+    if (there != nullptr && !(*there)[page]) {
+      stored.emplace_back();
+      continue;
+    }
     if (r.bytes > pages.size()) return fail("the index of the pages is damaged");
     stored.push_back({pages.first(r.bytes), r.checksum});
     pages = pages.subspan(r.bytes);
@@ -192,13 +197,16 @@ Result<void> read_pages(const Container& file, const DecodedValues& to, const Pa
   return {};
 }
 
+namespace {
+
 // Pages of one scale in parallel: they depend on coarser ones only. What is allocated grows with what was decoded, so a
-// file that claims more than it holds is found out before it takes much.
-Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& from, const DecodedValues& to, const ParallelFor& parallel,
-                        PageFaults* faults, const std::string& channel) {
+// file that claims more than it holds is found out before it takes much. there: null for all. Returns for each page whether
+// it is lost, or not there.
+Result<std::vector<bool>> take(std::span<const std::byte>& index, std::span<const std::byte>& from, const std::vector<bool>* there,
+                               const DecodedValues& to, const ParallelFor& parallel, PageFaults* faults, const std::string& channel) {
   const SupercubeSet& set = to.values.set;
   const std::vector<ValuePage> pages = pages_of(set);
-  const auto stored = take_stored(index, from, pages.size());
+  const auto stored = take_stored(index, from, pages.size(), there);
   if (!stored) return tl::unexpected(stored.error());
   const auto scale = [&](std::size_t page) { return scale_of_key(set.bricks()[pages[page].front().first].key); };
   LostPages lost(set, pages);
@@ -208,28 +216,51 @@ Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::
     std::vector<PageState> states(end - first);
     parallel(end - first, [&](std::size_t i) {
       const auto& [bytes, checksum] = (*stored)[first + i];
-      if (XXH3_64bits(bytes.data(), bytes.size()) != checksum)
+      if (there != nullptr && !(*there)[first + i])
+        states[i] = PageState::absent;
+      else if (XXH3_64bits(bytes.data(), bytes.size()) != checksum)
         states[i] = PageState::damaged;
       else if (lost.needs_lost(first + i))
         states[i] = PageState::lost;
       else if (!decode_page(to, pages[first + i], octets(bytes)))
         states[i] = PageState::invalid;
     });
+    std::vector<std::size_t> lost_now;
     for (std::size_t i = 0; i < states.size(); ++i) {
       if (states[i] == PageState::intact) continue;
-      if (states[i] != PageState::lost) {
+      if (states[i] == PageState::damaged || states[i] == PageState::invalid) {
         DamagedPage page = place_of(set, pages, first + i, to.values.grid.dims);
         page.channel = channel;
         if (faults == nullptr || first + i == 0 || states[i] == PageState::invalid) return fail(to_text(page) + " is damaged");
         faults->damaged.push_back(std::move(page));
       }
-      lost.lose(first + i);
+      lost_now.push_back(first + i);
     }
+    lost.lose(lost_now);
   }
-  if (!lost.any()) return {};
-  faults->lost.resize(pages.size());
-  for (std::size_t page = 0; page < pages.size(); ++page) faults->lost[page] = faults->lost[page] || lost.lost()[page];
+  return lost.lost();
+}
+
+}  // namespace
+
+Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& pages, const DecodedValues& to, const ParallelFor& parallel,
+                        PageFaults* faults, const std::string& channel) {
+  const auto lost = take(index, pages, nullptr, to, parallel, faults, channel);
+  if (!lost) return tl::unexpected(lost.error());
+  if (faults == nullptr || std::find(lost->begin(), lost->end(), true) == lost->end()) return {};
+  faults->lost.resize(lost->size());
+  for (std::size_t page = 0; page < lost->size(); ++page) faults->lost[page] = faults->lost[page] || (*lost)[page];
   return {};
+}
+
+Result<std::vector<bool>> take_some_pages(std::span<const std::byte> index, std::span<const std::byte> pages, const std::vector<bool>& there,
+                                          const DecodedValues& to, const ParallelFor& parallel) {
+  if (there.empty() || !there[0]) return fail("the first page is not there");
+  auto decoded = take(index, pages, &there, to, parallel, nullptr, {});
+  if (!decoded) return decoded;
+  if (!index.empty() || !pages.empty()) return fail("the index of the pages is damaged");
+  decoded->flip();
+  return decoded;
 }
 
 std::vector<std::uint64_t> page_lengths(std::span<const std::byte> index) {

@@ -35,4 +35,11 @@ struct RangeRequest {
   friend bool operator==(const RangeRequest&, const RangeRequest&) = default;
 };
 
+// The ranges that are asked for, of a data set of every range. refine: where that is not said.
+[[nodiscard]] inline ShownRanges asked_for(const RangeRequest& request, Refine refine) {
+  ShownRanges shown;
+  for (const Range& range : request.ranges) shown.push_back({range, request.refine.value_or(refine)});
+  return shown;
+}
+
 }  // namespace intervale

@@ -1,14 +1,21 @@
 #include "common/remote/load_remote.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
+#include "common/ivm/ivm_container.h"
 #include "common/ivm/load_volume.h"
+#include "common/ivm/value_file.h"
 
 namespace intervale {
 
-Result<std::shared_ptr<const IntervalVolume>> load_remote_volume(const RemoteUrl& url, const RemoteAccess& access, const ParallelFor& parallel,
-                                                                 PageFaults* faults) {
+Result<std::shared_ptr<const IntervalVolume>> load_remote_volume(const RemoteUrl& url, const RemoteAccess& access, const ShownRanges& shown,
+                                                                 const ParallelFor& parallel, PageFaults* faults) {
+  if (faults == nullptr) {
+    const RemoteLimits limits;
+    return RemoteVolume(url, access, limits, shown).whole(parallel);
+  }
   const auto contents = read_remote(url, access, {}, parallel);
   if (!contents) return tl::unexpected(contents.error());
   auto volume = decode_volume(contents->bytes, url.name, parallel, kAnyRoom, faults);
@@ -19,8 +26,8 @@ Result<std::shared_ptr<const IntervalVolume>> load_remote_volume(const RemoteUrl
 Result<std::shared_ptr<const IntervalVolume>> RemoteVolume::next(const ParallelFor& parallel) { return go_on(false, parallel); }
 Result<std::shared_ptr<const IntervalVolume>> RemoteVolume::whole(const ParallelFor& parallel) { return go_on(true, parallel); }
 
-RemoteVolume::RemoteVolume(const RemoteUrl& url, const RemoteAccess& access, const RemoteLimits& limits)
-    : url_(url), access_(access), limits_(limits), file_(url, access, limits) {}
+RemoteVolume::RemoteVolume(const RemoteUrl& url, const RemoteAccess& access, const RemoteLimits& limits, ShownRanges shown)
+    : url_(url), access_(access), limits_(limits), shown_(std::move(shown)), file_(url, access, limits) {}
 
 std::uint64_t RemoteVolume::file_bytes() const { return file_.ends().file_bytes; }
 
@@ -29,7 +36,29 @@ std::uint64_t RemoteVolume::bytes_here() const {
   return ends.first.size() + ends.last.size();
 }
 
+// Reads all but the pages. False: that is not to be done, since the file has no bounds, or too much besides its pages.
+RemoteOutcome<bool> RemoteVolume::has_bounds(const ParallelFor& parallel) {
+  const FileEnds start = file_.ends();
+  const auto place = [&](StreamType type) { return place_of(type, start.first, start.file_bytes, FileScope::every_range).value_or(StreamPlace()); };
+  const StreamPlace pages = place(StreamType::pages);
+  const std::uint64_t after = start.file_bytes - pages.offset - pages.bytes;
+  if (place(StreamType::page_bounds).bytes == 0 || place(StreamType::channels).bytes != 0 || after > limits_.range_bytes) return false;
+  if (start.first.size() > start.file_bytes - after) return false;  // it is there
+  if (auto read = file_.read(pages.offset, after, parallel); !read) return tl::unexpected(read.error());
+  return true;
+}
+
 RemoteVolume::Next RemoteVolume::read_whole(const ParallelFor& parallel) {
+  if (!shown_.empty()) {
+    const auto bounds = has_bounds(parallel);
+    if (!bounds) return tl::unexpected(bounds.error());
+    auto needed = *bounds ? needed_pages(file_.ends(), shown_) : Result<std::optional<NeededPages>>();
+    if (!needed) return Result<IntervalVolume>(tl::unexpected(needed.error()));
+    if (*needed) {
+      if (auto read = file_.read_places((*needed)->places, parallel); !read) return tl::unexpected(read.error());
+      return decode_needed_volume(file_.ends(), url_.name, (*needed)->pages, parallel);
+    }
+  }
   if (auto all = file_.read_all(parallel); !all) return tl::unexpected(all.error());
   return decode_volume(file_.ends().first, url_.name, parallel);
 }

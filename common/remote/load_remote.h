@@ -8,21 +8,24 @@
 #include "common/ivm/coarse_scales.h"
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/page_faults.h"
+#include "common/patch/shown_range.h"
 #include "common/remote/read_remote.h"
 
 namespace intervale {
 
-// Reads the file, and checks it as decode_volume() does. The name is the URL's. Errors begin with the URL. faults: as of
-// decode_ivm().
+// Reads the file, and checks it as decode_volume() does. The name is the URL's. Errors begin with the URL. shown: as of
+// RemoteVolume. faults: as of decode_ivm(); then all of the file is read.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_remote_volume(const RemoteUrl& url, const RemoteAccess& access,
-                                                                               const ParallelFor& parallel = serial, PageFaults* faults = nullptr);
+                                                                               const ShownRanges& shown = {}, const ParallelFor& parallel = serial,
+                                                                               PageFaults* faults = nullptr);
 
-// The same, from coarse to fine: a data set of every range is there as soon as its coarse scales are (coarse_scales.h). All
-// others are read whole, and those on servers that know no ranges. One thread at a time.
+// The same, from coarse to fine: a data set of every range is there as soon as its coarse scales are (coarse_scales.h), and of
+// its finer ones only those pages are read that some ranges need (page_bounds.h). All others are read whole, and those on
+// servers that know no ranges. One thread at a time.
 class RemoteVolume {
  public:
-  // What is given must outlive it.
-  RemoteVolume(const RemoteUrl& url, const RemoteAccess& access, const RemoteLimits& limits);
+  // What is given must outlive it. shown: the only ranges that it is for; none: all.
+  RemoteVolume(const RemoteUrl& url, const RemoteAccess& access, const RemoteLimits& limits, ShownRanges shown = {});
 
   // Reads on: the data set as far as the next scale, the last time IntervalVolume::is_whole(); not to be called after
   // that, or after an error. What is returned stays valid. If the file changes meanwhile, it is read from its beginning: then the
@@ -40,11 +43,13 @@ class RemoteVolume {
   [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> go_on(bool to_end, const ParallelFor& parallel);
   [[nodiscard]] Next read_next(bool to_end, const ParallelFor& parallel);
   [[nodiscard]] Next read_whole(const ParallelFor& parallel);
+  [[nodiscard]] RemoteOutcome<bool> has_bounds(const ParallelFor& parallel);
   [[nodiscard]] std::uint64_t bytes_here() const;
 
   const RemoteUrl& url_;
   const RemoteAccess& access_;
   const RemoteLimits& limits_;
+  ShownRanges shown_;
   RemoteFile file_;
   bool is_begun_ = false;
   std::vector<CoarseScales> scales_;  // that can be had of it

@@ -65,9 +65,19 @@ class RemoteFile::Reader {
     pieces_.clear();
     if (last_.empty() && last_bytes > 0) {
       last_.resize(std::size_t(std::min(last_bytes, stamp_.bytes - bytes_.size())));
-      add_pieces(stamp_.bytes - last_.size(), stamp_.bytes, true);
+      add_pieces(stamp_.bytes - last_.size(), stamp_.bytes, true, 0);
     }
-    add_pieces(bytes_.size(), std::min(first_bytes, stamp_.bytes - last_.size()), false);
+    add_pieces(bytes_.size(), std::min(first_bytes, stamp_.bytes - last_.size()), false, bytes_.size());
+    return transfer_all(parallel);
+  }
+
+  Outcome<void> read_places(std::span<const StreamPlace> places, const ParallelFor& parallel) {
+    pieces_.clear();
+    std::uint64_t to = bytes_.size();
+    for (const StreamPlace& place : places) {
+      add_pieces(place.offset, place.offset + place.bytes, false, to);
+      to += place.bytes;
+    }
     return transfer_all(parallel);
   }
 
@@ -87,13 +97,16 @@ class RemoteFile::Reader {
   struct Piece {
     std::uint64_t first = 0, bytes = 0;
     bool is_last = false;  // one of the file's last bytes
+    std::uint64_t to = 0;  // where in last_ or bytes_ its first byte is
     std::uint64_t received = 0;
     unsigned attempts = 0;
     Clock::time_point due{};
   };
 
-  void add_pieces(std::uint64_t from, std::uint64_t end, bool is_last) {
-    for (std::uint64_t at = from; at < end; at += limits_.range_bytes) pieces_.push_back({at, std::min(limits_.range_bytes, end - at), is_last});
+  // to: where in last_ or bytes_ they begin.
+  void add_pieces(std::uint64_t from, std::uint64_t end, bool is_last, std::uint64_t to) {
+    for (std::uint64_t at = from; at < end; at += limits_.range_bytes)
+      pieces_.push_back({.first = at, .bytes = std::min(limits_.range_bytes, end - at), .is_last = is_last, .to = to + (at - from)});
   }
 
   // Runs requests for all pieces until each has succeeded.
@@ -127,7 +140,7 @@ class RemoteFile::Reader {
     if (is_begun_) {
       // Pieces start in order: never more is allocated than has arrived and is under way. The capacity is reserved, so
       // that the bytes stay where other transfers put them.
-      if (!piece.is_last) bytes_.resize(std::max(bytes_.size(), std::size_t(piece.first + piece.bytes)));
+      if (!piece.is_last) bytes_.resize(std::max(bytes_.size(), std::size_t(piece.to + piece.bytes)));
       transfers_.start(id, request,
                        [this, &piece](const RemoteAnswer& answer, std::span<const std::byte> bytes) { return take(piece, answer, bytes); });
       return;
@@ -267,7 +280,7 @@ class RemoteFile::Reader {
         return refuse("the server sends the file compressed (Content-Encoding)");
     }
     if (bytes.size() > piece.bytes - piece.received) return refuse("the server sends more bytes than it says");
-    std::byte* const to = piece.is_last ? last_.data() + (piece.first - (stamp_.bytes - last_.size())) : bytes_.data() + piece.first;
+    std::byte* const to = (piece.is_last ? last_ : bytes_).data() + piece.to;
     std::memcpy(to + piece.received, bytes.data(), bytes.size());
     piece.received += bytes.size();
     return {};
@@ -319,6 +332,9 @@ RemoteFile::~RemoteFile() = default;
 RemoteOutcome<void> RemoteFile::begin(const ParallelFor& parallel) { return reader_->begin(parallel); }
 RemoteOutcome<void> RemoteFile::read(std::uint64_t first_bytes, std::uint64_t last_bytes, const ParallelFor& parallel) {
   return reader_->read(first_bytes, last_bytes, parallel);
+}
+RemoteOutcome<void> RemoteFile::read_places(std::span<const StreamPlace> places, const ParallelFor& parallel) {
+  return reader_->read_places(places, parallel);
 }
 RemoteOutcome<void> RemoteFile::read_all(const ParallelFor& parallel) { return reader_->read_all(parallel); }
 FileEnds RemoteFile::ends() const { return reader_->ends(); }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,7 +67,9 @@ class RemoteFile {
   [[nodiscard]] RemoteOutcome<void> begin(const ParallelFor& parallel);
   // Then: until so many bytes at both ends are there. last_bytes: the same with each call.
   [[nodiscard]] RemoteOutcome<void> read(std::uint64_t first_bytes, std::uint64_t last_bytes, const ParallelFor& parallel);
-  // Until all of it is there, as the first bytes.
+  // Then, and last: these places, ascending and none of them there. Their bytes follow the first ones, in order.
+  [[nodiscard]] RemoteOutcome<void> read_places(std::span<const StreamPlace> places, const ParallelFor& parallel);
+  // Until all of it is there, as the first bytes; not after read_places().
   [[nodiscard]] RemoteOutcome<void> read_all(const ParallelFor& parallel);
 
   // What is there; valid until the next call.

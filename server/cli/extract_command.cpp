@@ -47,13 +47,16 @@ struct ExtractCommand {
 
 using Clock = std::chrono::steady_clock;
 
+// Whether the inside is refined where that is not said, and the data set has it.
+bool prefers_uniform(const ExtractCommand& options) { return options.picture && options.picture->render == Render::volume; }
+
 // What is to be shown of a data set.
 Result<ShownRanges> shown_of(const ExtractCommand& options, const Description& d) {
   const auto ranges = parse_ranges(options.range);
   if (!ranges) return tl::unexpected(ranges.error());
   if (d.has_every_range && ranges->empty()) return misuse("'" + shown_url(options.file) + "' has every range: say which with --range LO HI");
   auto refine = parse_refine(options.refine);
-  if (options.picture && options.picture->render == Render::volume && !refine && d.refine == Refine::uniform) refine = Refine::uniform;
+  if (prefers_uniform(options) && !refine && d.refine == Refine::uniform) refine = Refine::uniform;
   ShownRanges shown = resolve(d, {*ranges, refine});
   if (auto held = check_held(d, shown); !held) return tl::unexpected(held.error());
   return shown;
@@ -104,17 +107,19 @@ Result<bool> draw(const PictureOptions& picture, const PictureSubject& subject, 
   return write_picture(picture, subject, camera, with_progress(progress, on_all_cores));
 }
 
-Result<std::shared_ptr<const IntervalVolume>> load(const ExtractCommand& options, PageFaults* faults) {
+Result<std::shared_ptr<const IntervalVolume>> load(const ExtractCommand& options, const std::vector<Range>& ranges, PageFaults* faults) {
   if (!is_remote_url(options.file)) return load_volume(options.file, on_all_cores, faults);
   const auto url = parse_remote_url(options.file);
   if (!url) return tl::unexpected(url.error());
   const auto access = read_access(options.remote);
   if (!access) return tl::unexpected(access.error());
-  return load_remote_volume(*url, *access, on_all_cores, faults);
+  const ShownRanges shown = asked_for({ranges, parse_refine(options.refine)}, prefers_uniform(options) ? Refine::uniform : Refine::boundary);
+  return load_remote_volume(*url, *access, shown, on_all_cores, faults);
 }
 
 Result<void> run(const ExtractCommand& options) {
-  if (const auto ranges = parse_ranges(options.range); !ranges) return tl::unexpected(ranges.error());
+  const auto ranges = parse_ranges(options.range);
+  if (!ranges) return tl::unexpected(ranges.error());
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
@@ -124,7 +129,7 @@ Result<void> run(const ExtractCommand& options) {
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   PageFaults faults;
-  const auto volume = load(options, options.tolerates_damage ? &faults : nullptr);
+  const auto volume = load(options, *ranges, options.tolerates_damage ? &faults : nullptr);
   if (!volume) return tl::unexpected(volume.error());
   if (faults.any()) {
     fmt::print(stderr, "intervale: warning: {}: {}; {} of {} updates are left out\n", printable(shown_url(options.file)), to_text(faults),

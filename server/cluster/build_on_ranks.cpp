@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/ivm/page_bounds.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_page.h"
 #include "common/ivm/value_streams.h"
@@ -264,6 +265,22 @@ class Part {
     parts_.weights = all.solve();
   }
 
+  // Of all pages.
+  std::vector<PageBounds> find_bounds() {
+    std::vector<BlockKey> own;
+    std::vector<std::vector<BlockKey>> pages;
+    for (const Shares::Page& page : shares_.pages()) {
+      pages.push_back(page.blocks);
+      if (page.rank == ranks_.rank()) own.insert(own.end(), page.blocks.begin(), page.blocks.end());
+    }
+    std::vector<BlockValues> blocks(own.size());
+    on_all_cores(own.size(), [&](std::size_t i) {
+      BlockLattice lattice(parts_);
+      blocks[i] = values_in(lattice, own[i]);
+    });
+    return bounds_of_pages(joined<BlockValues>(ranks_, blocks), pages);
+  }
+
   // The own pages, each at its place in the file.
   Result<BuiltByRanks> write() {
     std::vector<std::vector<std::uint8_t>> coded(pages_.size());
@@ -288,6 +305,7 @@ class Part {
     std::sort(written.begin(), written.end(), [](const Written& a, const Written& b) { return a.page < b.page; });
 
     Streams streams = encode_field(parts_);
+    append_bounds(streams, find_bounds());
     std::uint64_t pages_bytes = 0;
     std::vector<std::uint64_t> offset;  // of each page, from the first
     for (const Written& page : written) {

@@ -19,6 +19,7 @@
 #include "common/parallel/all_cores.h"
 #include "common/remote/load_remote.h"
 #include "server/builder/value_builder.h"
+#include "tests/support/analytic_fields.h"
 #include "tests/support/file_server.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/value_fields.h"
@@ -132,6 +133,49 @@ TEST(RemoteVolume, TellsHowMuchItHasRead) {
   ASSERT_TRUE(all && (*all)->is_whole());
   EXPECT_EQ(file.read_bytes(), contents().size());
   EXPECT_EQ(file.requests(), server.requests().size());
+}
+
+// A ramp along x: pages lie side by side, and a narrow range needs one or two.
+TEST(RemoteVolume, ReadsOnlyThePagesThatRangesNeed) {
+  constexpr std::array<std::int32_t, 3> kDims{260, 66, 66};
+  std::vector<float> samples;
+  samples.reserve(std::size_t(kDims[0]) * kDims[1] * kDims[2]);
+  for (int i = 0; i < kDims[0] * kDims[1] * kDims[2]; ++i) samples.push_back(float(i % kDims[0]) + float(i % 7) / 8);
+  Volume volume = testing::volume_of_type(SampleType::f32, kDims, samples);
+  const std::string file = text_of_bytes(encode_values(build_value_volume(volume, testing::value_field(volume, 0.125).format), on_all_cores));
+  const SharedVolume all = whole(file);
+  const RemoteAccess access;
+  const RemoteLimits limits = hasty();
+  FetchOptions options;
+  options.shown = {{{20, 30}}, {}};
+  for (const bool has_camera : {false, true}) {
+    if (has_camera) {
+      options.lod.camera = Camera{};
+      options.lod.camera->eye = {-100, 30, 30};
+      options.lod.camera->look_at = {20, 30, 30};
+      options.lod.camera->pixel_error = 2;
+    }
+    const FileServer server(file);
+    const RemoteUrl url = parse_remote_url(server.url()).value();
+    RemoteVolume remote(url, access, limits, asked_for(options.shown, Refine::boundary));
+    const NextVolume next = [&](ReadOn how, const ParallelFor& parallel) {
+      return how == ReadOn::all ? remote.whole(parallel) : remote.next(parallel);
+    };
+    const auto fetched = fetch_growing(next, options, {}, on_all_cores);
+    ASSERT_TRUE(fetched) << fetched.error().message;
+    const auto local = fetch_local(all, options, {});
+    ASSERT_TRUE(local);
+    EXPECT_EQ(mesh_digest(fetched->client.meshes()[0]), mesh_digest(local->client.meshes()[0]));
+    EXPECT_LT(remote.read_bytes(), file.size() * 3 / 4);
+    EXPECT_EQ(remote.requests(), server.requests().size());
+  }
+  const FileServer server(file);
+  const RemoteUrl url = parse_remote_url(server.url()).value();
+  const auto extracted = load_remote_volume(url, access, asked_for(options.shown, Refine::boundary), on_all_cores);
+  ASSERT_TRUE(extracted) << extracted.error().message;
+  std::size_t asked = 0;
+  for (const auto& [first, end] : ranges_of(server, file.size())) asked += end - first;
+  EXPECT_LT(asked, file.size() * 3 / 4);
 }
 
 TEST(RemoteVolume, OthersAreReadWhole) {
