@@ -21,13 +21,6 @@
 
 namespace intervale {
 
-// Of a page: no key around its diamonds, their parents of the same scale, and all descendants of both is less than the
-// least, or greater than the greatest.
-struct PageBounds {
-  ValueKey least = 0, greatest = 0;
-  friend bool operator==(const PageBounds&, const PageBounds&) = default;
-};
-
 // The keys at the points of a block and of its faces, 0 to 64 on each axis.
 struct BlockValues {
   static constexpr int kParts = 3;

@@ -275,6 +275,11 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
   parts.set = all_diamonds(domain, parallel);
   parts.keys = ValueKeys(0, d.format.last);
   if (auto ok = read_pages(*file, parts, parallel, faults); !ok) return tl::unexpected(ok.error());
+  if (!(*file)[StreamType::page_bounds].empty()) {
+    auto bounds = read_bounds(*file, d.format, pages_of(parts.set).size());
+    if (!bounds) return tl::unexpected(bounds.error());
+    parts.page_bounds = *std::move(bounds);
+  }
   auto channels = read_channels(*file, d.grid, parts.set, parallel, faults);
   if (!channels) return tl::unexpected(channels.error());
   d.channels = std::move(channels->channels);

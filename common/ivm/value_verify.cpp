@@ -2,12 +2,30 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/diamond/supercube_neighbours.h"
+#include "common/ivm/page_bounds.h"
+#include "common/ivm/value_page.h"
 
 namespace intervale {
 
-Result<void> validate(const ValueVolume& volume) {
+namespace {
+
+Result<void> check_bounds(const ValueVolume& volume, const ParallelFor& parallel) {
+  const std::vector<PageBounds>& stored = volume.parts().page_bounds;
+  if (stored.empty()) return {};
+  const std::vector<PageBounds> found = bounds_of_pages(volume.parts(), pages_of(volume.set()), parallel);
+  for (std::size_t page = 0; page < found.size(); ++page) {
+    if (stored[page].least > found[page].least || stored[page].greatest < found[page].greatest)
+      return fail("values around page " + std::to_string(page) + " of " + std::to_string(found.size()) + " are outside of its bounds");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> validate(const ValueVolume& volume, const ParallelFor& parallel) {
   const SupercubeSet& set = volume.set();
   const ValueKey last = volume.description().format.last;
   const auto& levels = volume.parts().error_levels;
@@ -29,7 +47,7 @@ Result<void> validate(const ValueVolume& volume) {
     });
   }
   if (wrong) return tl::unexpected(*wrong);
-  return {};
+  return check_bounds(volume, parallel);
 }
 
 }  // namespace intervale

@@ -2,12 +2,13 @@
 #pragma once
 
 #include "common/ivm/value_volume.h"
+#include "common/util/parallel.h"
 #include "common/util/result.h"
 
 namespace intervale {
 
-// Checks that keys lie in the format's range, and that no diamond's error level is lower than a child's. Fails with the
-// first violation.
-[[nodiscard]] Result<void> validate(const ValueVolume& volume);
+// Checks that keys lie in the format's range, that no diamond's error level is lower than a child's, and that the bounds of
+// pages hold what lies around them. Fails with the first violation.
+[[nodiscard]] Result<void> validate(const ValueVolume& volume, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

@@ -58,6 +58,13 @@ struct FieldDescription {
   return std::abs(format.value(centre) - (format.value(end_0) / 2 + format.value(end_1) / 2));
 }
 
+// Of a page (value_page.h): no key around its diamonds, their parents of the same scale, and all descendants of both is
+// less than the least, or greater than the greatest.
+struct PageBounds {
+  ValueKey least = 0, greatest = 0;
+  friend bool operator==(const PageBounds&, const PageBounds&) = default;
+};
+
 class ValueVolume {
  public:
   struct Parts {
@@ -68,6 +75,7 @@ class ValueVolume {
     std::vector<ErrorLevel> error_levels;        // by number; of all diamonds of scale 1 and coarser, which come first
     std::vector<ChannelKeys> channel_keys = {};  // by channel of the description, and component
     std::vector<std::uint64_t> left = {};        // as in IntervalVolume::Parts
+    std::vector<PageBounds> page_bounds = {};    // as the file has them that it was read from; empty: it has none
     std::size_t finer = 0;                       // diamonds of finer scales than the set has: it has those of all others
   };
   explicit ValueVolume(Parts parts);

@@ -14,6 +14,7 @@
 #include "common/ivm/ivm_container.h"
 #include "common/ivm/load_volume.h"
 #include "common/ivm/value_file.h"
+#include "common/ivm/value_verify.h"
 #include "common/mesh/mesh_digest.h"
 #include "common/parallel/all_cores.h"
 #include "common/ranges/extract_meshes.h"
@@ -224,6 +225,18 @@ TEST(PageBounds, AllIsReadWhereThatIsNeeded) {
   ASSERT_TRUE(all && *all);
   ASSERT_EQ((*all)->places.size(), 1U);
   EXPECT_EQ((*all)->places[0].bytes, file().pages.bytes);
+}
+
+TEST(PageBounds, AreVerified) {
+  auto read = decode_values(file().bytes, "made", on_all_cores);
+  ASSERT_TRUE(read);
+  EXPECT_TRUE(validate(*read, on_all_cores));
+  ValueVolume::Parts parts = std::move(*read).take();
+  ASSERT_GT(parts.page_bounds.size(), 3U);
+  ++parts.page_bounds[3].least;
+  const auto wrong = validate(ValueVolume(std::move(parts)), on_all_cores);
+  ASSERT_FALSE(wrong);
+  EXPECT_EQ(wrong.error().message, "values around page 3 of 6 are outside of its bounds");
 }
 
 TEST(PageBounds, DamageIsFound) {
