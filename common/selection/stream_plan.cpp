@@ -307,4 +307,6 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
   return batch;
 }
 
+Batch StreamPlan::no_updates() const { return {encode_batch(*volume_, shown_, sent_, {}), 0, {}}; }
+
 }  // namespace intervale

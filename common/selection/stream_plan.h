@@ -104,6 +104,8 @@ class StreamPlan {
   // max_visits: of supercubes and updates, after which the batch ends; 2^15 take about a quarter of a millisecond. Few cut
   // what a drag of a range needs, a few updates in many places, into small batches that name the same supercubes again.
   std::optional<Batch> next(std::size_t max_bytes, std::uint32_t max_visits = kMostVisits);
+  // A batch that says only how much is left.
+  [[nodiscard]] Batch no_updates() const;
   [[nodiscard]] bool done() const { return !search_ && !lacks_values() && !has_more(); }
   // More is wanted than the client may hold.
   [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }

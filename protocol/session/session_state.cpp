@@ -223,27 +223,29 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   auto batch = plan_->next(size, others_wait ? kContendedVisits : StreamPlan::kMostVisits);
   if (!batch) {
     const bool is_last = !measurement_ && (volume_->is_whole() || is_grown_);
-    waits_ = plan_->done() && !is_last;
-    if (!plan_->done() || !is_last) return {};
+    if (!plan_->done()) return {};
+    if (!is_last && view_ == ViewState::unanswered) return message_of(plan_->no_updates());  // nothing lacks, as far as is known
+    waits_ = !is_last;
+    if (!is_last) return {};
     if (is_ahead && !plan_->is_full()) ahead_percent_ = coarse_percent_;
     is_new_ = !is_ahead && volume_->is_whole() && goes_ahead();
     view_ = is_new_ ? ViewState::ahead : ViewState::done;
     if (is_ahead) return {};
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }
-  if (!is_ahead) view_ = ViewState::streaming;
   view_bytes_ += others_wait ? size : batch->payload.size();  // fewer and larger batches take less processor time
+  return message_of(*std::move(batch));
+}
+
+// The message of a batch that is within the credit.
+protocol::Batch SessionState::message_of(Batch batch) {
+  const bool is_ahead = view_ == ViewState::ahead;
+  if (!is_ahead) view_ = ViewState::streaming;
   StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();
   if (measurement_) remaining.pixels = std::max(remaining.pixels, lod_.camera->pixel_error);  // what is not measured may move as far
-  protocol::Batch message{epoch_,
-                          sequence_++,
-                          batch->updates,
-                          remaining.error,
-                          remaining.pixels,
-                          remaining.updates,
-                          std::move(batch->payload),
-                          std::move(batch->channels)};
-  credit_ -= protocol::cost_of(message);  // does not underflow: the payload is at most `size`
+  protocol::Batch message{
+      epoch_, sequence_++, batch.updates, remaining.error, remaining.pixels, remaining.updates, std::move(batch.payload), std::move(batch.channels)};
+  credit_ -= protocol::cost_of(message);
   return message;
 }
 

@@ -77,6 +77,7 @@ class SessionState {
   bool measure();
   [[nodiscard]] bool goes_ahead() const;
   void begin_ahead();
+  protocol::Batch message_of(Batch batch);
   void set_relevant(const RangeAnswer::Relevant& relevant, bool is_measured);
 
   Find find_;

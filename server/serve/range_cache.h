@@ -87,6 +87,7 @@ class RangeCache {
     std::weak_ptr<const RelevantUpdates> relevant;
   };
   using Request = std::shared_ptr<Answer>;
+  class Cores;
   struct Queue {
     std::vector<std::weak_ptr<Answer>> requests;  // the newest is the last
     std::condition_variable_any has_requests;
@@ -97,10 +98,10 @@ class RangeCache {
   [[nodiscard]] Relevant counted(Relevant relevant) const;
   [[nodiscard]] Relevant get_part(PartFinder& finder, const Volume& volume, const RangePart& part);
   [[nodiscard]] std::list<Entry> take_old(const Volume& volume, const RangePart& found);
-  void serve(Queue& queue, const std::stop_token& stop);
+  void serve(Queue& queue, bool rests, const std::stop_token& stop);
   [[nodiscard]] Request next_request(Queue& queue) const;
   [[nodiscard]] std::vector<Request> take_complete(const Volume& volume, const RangePart& part, const Relevant& relevant);
-  void work_for(Request request, PartFinder& finder);
+  void work_for(Request request, PartFinder& finder, Cores& cores);
   void answer(Answer& request);
   void find_now(Answer& request);
 

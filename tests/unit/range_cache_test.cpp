@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <boost/asio/bind_executor.hpp>
+#include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -179,6 +181,26 @@ TEST_F(RangeCacheTest, WithFewKeysWhatIsMeasuredDoesForAllRangesBetweenTwoKeys) 
   (void)get(cache, volume, between(2.5, 8.25));
   EXPECT_EQ(found, 3) << "better known than by estimates";
   EXPECT_TRUE(measure(cache, between(2.75, 8.25))->is_soon());
+}
+
+// Its threads rest then, but they are not put off.
+TEST_F(RangeCacheTest, MeasuresWhileSessionsWait) {
+  boost::asio::io_context io;
+  FairScheduler::Flow works(payer), waits(payer);
+  for (auto* const flow : {&works, &waits})
+    scheduler.async_acquire(*flow, FairScheduler::Priority::interactive, boost::asio::bind_executor(io, [](FairScheduler::Lane) {}));
+  ASSERT_TRUE(scheduler.has_waiters());
+  RangeCache cache(memory, scheduler, find);
+  const auto measured = get(cache, volume, above(1), Distances::measured);
+  const auto parts = parts_of(volume->description().format, above(1)[0], Distances::measured);
+  PartFinder finder(*volume);
+  const auto expected = finder.find(parts[0]);
+  for (BrickIndex b{0}; b < volume->set().bricks().size(); ++b) {
+    EXPECT_EQ(measured->bound(b).updates, expected->bound(b).updates);
+    EXPECT_EQ(measured->bound(b).object_error, expected->bound(b).object_error);
+  }
+  EXPECT_TRUE(scheduler.has_waiters());
+  scheduler.clear();
 }
 
 TEST_F(RangeCacheTest, StopsWhileItMeasures) {

@@ -143,6 +143,32 @@ TEST_F(MeasuredLate, OtherViewsWait) {
   may_measure.release(2);
 }
 
+// A client that has all that the estimates find is told so at once, and by Done when it is certain.
+TEST_F(MeasuredLate, AnEarlyViewThatLacksNothingIsAnsweredAtOnce) {
+  ViewRequest all = view_of({-1, 1}, true);
+  all.shown.refine = Refine::uniform;
+  all.lod = {};
+  ASSERT_TRUE(session.look(all));
+  run_while_it_waits();
+  ASSERT_EQ(session.state(), ClientSession::State::idle);
+  const std::uint64_t updates = session.mesh()->updates(), messages = session.stats().messages;
+  ASSERT_TRUE(session.look(view_of({-0.3, 0.2}, false)));
+  run_while_it_waits();
+  EXPECT_EQ(session.stats().messages, messages) << "this one does not take estimates";
+  ASSERT_TRUE(session.look(view_of({-0.3, 0.2}, true)));
+  run_while_it_waits();
+  EXPECT_EQ(session.stats().messages, messages + 1);
+  EXPECT_EQ(session.state(), ClientSession::State::viewing);
+  EXPECT_EQ(session.stats().updates_to_go, 0u);
+  EXPECT_EQ(session.stats().remaining_pixels, 1);
+  may_measure.release(2);
+  server.run();
+  EXPECT_EQ(session.state(), ClientSession::State::idle);
+  EXPECT_EQ(session.stats().remaining_pixels, 0);
+  EXPECT_EQ(session.stats().messages, messages + 2);
+  EXPECT_EQ(session.mesh()->updates(), updates);
+}
+
 // A range that was left is not measured, if its turn had not come; the end that was not dragged is known.
 TEST_F(MeasuredLate, ADragIsMeasuredWhereItRests) {
   for (const double alpha : {-0.4, -0.35, -0.3, -0.25}) {
