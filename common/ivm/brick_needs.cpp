@@ -75,6 +75,27 @@ BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<co
   if (is_all) slots_ = {};
 }
 
+void BrickNeeds::add_parts(std::vector<const BrickNeeds*>& to) const {
+  const auto add = [&](const BrickNeeds* part) {
+    if (std::find(to.begin(), to.end(), part) == to.end()) to.push_back(part);
+  };
+  if (parts_.empty()) add(this);
+  for (const BrickNeeds* const part : parts_) add(part);
+}
+
+BrickNeeds::OfSupercube BrickNeeds::of_supercube(std::size_t supercube, std::uint64_t relevant) const {
+  static constexpr std::array<std::uint8_t, std::size_t(64) * kSlots> kNotKnown{};  // of as many as a brick has
+  OfSupercube result;
+  const auto add = [&](const BrickNeeds& part) {
+    if (part.first_.empty()) return;
+    result.parts_[result.count_++] = {part.slots(supercube, relevant), part.distances_.empty() ? kNotKnown.data() : part.distances_.data(),
+                                      part.slopes_.empty() ? kNotKnown.data() : part.slopes_.data(), part.first_[supercube]};
+  };
+  if (parts_.empty()) add(*this);
+  for (const BrickNeeds* const part : parts_) add(*part);
+  return result;
+}
+
 std::size_t BrickNeeds::memory_bytes() const {
   return sizeof *this + highest_.size() * sizeof highest_[0] + slots_.size() * sizeof slots_[0] + first_.size() * sizeof first_[0] + slopes_.size() +
          distances_.size() + parts_.size() * sizeof(void*);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -29,9 +30,13 @@ class BrickNeeds {
   };
   // needs: of each supercube of the brick. steps: the error steps of all updates of the set, by number.
   BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs, Surface surface);
-  // What each of the parts needs, of one brick: of an update the most that is known of it. They must outlive it; one at
-  // least, and all or none have slopes, and distances.
+  // What each of the parts needs, of one brick: of an update the most that is known of it. They must outlive it; one to
+  // kMostParts, none of several parts itself, and all or none have slopes, and distances.
+  static constexpr std::size_t kMostParts = 8;
   BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<const BrickNeeds*> parts);
+
+  // Adds those that have what is known of updates: its parts, or this; none twice.
+  void add_parts(std::vector<const BrickNeeds*>& to) const;
 
   // Relevant ones. occupancy: of that supercube.
   [[nodiscard]] std::uint64_t slots(std::size_t supercube, std::uint64_t occupancy) const { return slots_.empty() ? occupancy : slots_[supercube]; }
@@ -50,11 +55,36 @@ class BrickNeeds {
     for (const BrickNeeds* const part : parts_) {
       const std::uint64_t slots = part->slots(supercube, relevant);
       if ((slots >> slot & 1) == 0) continue;
-      const OfUpdate one = part->of_update(supercube, slots, slot);
+      const OfUpdate one = part->own_update(supercube, count_below(slots, slot));
       most = {std::max(most.distance, one.distance), std::max(most.slope, one.slope)};
     }
     return most;
   }
+  // of_update() of one supercube, for a loop over its updates. Not for longer than this exists.
+  class OfSupercube {
+   public:
+    [[nodiscard]] OfUpdate operator()(Slot slot) const {
+      OfUpdate most;
+      for (std::size_t i = 0; i < count_; ++i) {  // without branches on which parts have it: that is hard to foresee
+        const Part& one = parts_[i];
+        const std::size_t has = one.slots >> slot & 1U, at = has * (one.first + std::size_t(count_below(one.slots, slot)));
+        most.distance = std::max(most.distance, std::uint8_t(has * one.distances[at]));
+        most.slope = std::max(most.slope, std::uint8_t(has * (one.slopes[at / 2] >> (at % 2 * 4) & 15U)));
+      }
+      return most;
+    }
+
+   private:
+    friend class BrickNeeds;
+    struct Part {
+      std::uint64_t slots = 0;
+      const std::uint8_t *distances = nullptr, *slopes = nullptr;
+      std::size_t first = 0;  // of the supercube's updates
+    };
+    std::array<Part, kMostParts> parts_;
+    std::size_t count_ = 0;
+  };
+  [[nodiscard]] OfSupercube of_supercube(std::size_t supercube, std::uint64_t relevant) const;
   [[nodiscard]] unsigned updates() const { return updates_; }  // that are relevant
   [[nodiscard]] std::size_t memory_bytes() const;
 

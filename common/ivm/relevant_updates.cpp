@@ -93,10 +93,10 @@ BrickNeeds Union::operator()(BrickIndex b) const {
   for (const auto& one : each) {
     if (one->bound(b).updates == 0) continue;
     parts.push_back({*one, one->brick(b)});
-    needs_of_parts.push_back(&parts.back().needs);
+    parts.back().needs.add_parts(needs_of_parts);
     are_alike = are_alike && one->has_slopes() == known.slopes && one->has_distances() == known.distances;
   }
-  if (are_alike && !parts.empty()) return {set, b, std::move(needs_of_parts)};
+  if (are_alike && !parts.empty() && needs_of_parts.size() <= BrickNeeds::kMostParts) return {set, b, std::move(needs_of_parts)};
   const double width = diamond_width(volume.description().grid);
   const int scale = scale_of_key(set.bricks()[b].key);
   std::vector<BrickNeeds::Supercube> needs;

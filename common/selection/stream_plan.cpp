@@ -227,10 +227,12 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   builder.visited += count;
   rest = {};
   if (!add_band(ranking, in, first, candidates, builder, rest)) return {};
-  const std::uint64_t others = unsent & ~candidates, relevant = in.needs.slots(in.number, occupancy);
+  const std::uint64_t others = unsent & ~candidates;
+  if (others == 0) return rest;
+  const auto known = in.needs.of_supercube(in.number, in.needs.slots(in.number, occupancy));
   auto number = set_bits(others).begin();
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(others, occupancy))) {
-    rest.highest.raise(of_update(in, first.index + *number, relevant, slot));
+    rest.highest.raise(of_update(in, first.index + *number, known, slot));
     ++number;
   }
   return rest;
@@ -241,7 +243,8 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
                           Unsent& rest) {
   const float in_band = ranking.least(band_), least = budget_ ? ranking.least(1) : 0;
   const UpdateIndex first = place.index;
-  const std::uint64_t occupancy = volume_->set().occupancy()[place.supercube], relevant = in.needs.slots(in.number, occupancy);
+  const std::uint64_t occupancy = volume_->set().occupancy()[place.supercube];
+  const auto known = in.needs.of_supercube(in.number, in.needs.slots(in.number, occupancy));
   SlotGroup in_it{place.brick, place.supercube, place.key, 0};
   Highest highest;  // in registers, like all that this loop changes
   unsigned wanted = 0;
@@ -249,7 +252,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
   auto number = set_bits(candidates).begin();
   // Without branches on what is in the band: that is hard to foresee.
   for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
-    const Highest own = of_update(in, first + *number, relevant, slot);
+    const Highest own = of_update(in, first + *number, known, slot);
     ++number;
     float importance = ranking.importance(own.error_step, own.distance, std::max(own.slope, own.slope_below));
     if (importance > 0 && !ranking.meets_roi(slot)) importance = 0;

@@ -187,9 +187,9 @@ class StreamPlan {
   // Keeps what is pending, of which so many are wanted from now on; pending.wanted: until now.
   void set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted);
   [[nodiscard]] InBrick in_brick(BrickIndex brick, SupercubeIndex s) const;
-  // relevant: the slots of the supercube that are.
-  [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, std::uint64_t relevant, Slot slot) const {
-    const BrickNeeds::OfUpdate known = in.needs.of_update(in.number, relevant, slot);
+  // known: of the update's supercube.
+  [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, const BrickNeeds::OfSupercube& of_supercube, Slot slot) const {
+    const BrickNeeds::OfUpdate known = of_supercube(slot);
     Highest own{std::uint8_t(volume_->error_step(i)), known.distance, known.slope};
     const float error = relevant_->object_error(in.needs.to_distance(in.number), in.scale, own.error_step, own.distance);
     if (error <= in.limit) std::swap(own.slope, own.slope_below);

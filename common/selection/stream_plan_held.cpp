@@ -51,7 +51,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     if ((relevant >> slot & 1) == 0) return;
     Pending pending = this->pending(here.brick);
     pending.set_unsent(pending.unsent + 1);
-    const Highest again = of_update(in, i, relevant, slot);
+    const Highest again = of_update(in, i, in.needs.of_supercube(in.number, relevant), slot);
     pending.raise_to(again, relevant_->object_error(in.needs.to_distance(in.number), in.scale, again.error_step, again.distance));
     keep(here.brick, pending);
     Bounds bounds = bounds_of(here.brick, in.needs);

@@ -58,7 +58,10 @@ class United : public ::testing::TestWithParam<unsigned> {
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
         const std::size_t n = testing::number_in_brick(*volume_, b, s);
         unsigned step = 0, slope = 0, distance = 0;
+        const auto known = needs.of_supercube(n, testing::slots_of(all, *volume_, b, s));
         for (const Slot slot : set_bits<Slot>(testing::slots_of(all, *volume_, b, s))) {
+          ASSERT_EQ(known(slot).slope, testing::slope_of(all, *volume_, set.place_in(b, s, key, slot)));
+          ASSERT_EQ(known(slot).distance, testing::distance_of(all, *volume_, set.place_in(b, s, key, slot)));
           const Place p = set.place_in(b, s, key, slot);
           ++relevant;
           step = std::max(step, volume_->error_step(p.index));
