@@ -30,9 +30,9 @@ class BrickNeeds {
   };
   // needs: of each supercube of the brick. steps: the error steps of all updates of the set, by number.
   BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs, Surface surface);
+  static constexpr std::size_t kMostParts = 8;  // two surfaces of each of the most ranges that a view shows
   // What each of the parts needs, of one brick: of an update the most that is known of it. They must outlive it; one to
   // kMostParts, none of several parts itself, and all or none have slopes, and distances.
-  static constexpr std::size_t kMostParts = 8;
   BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<const BrickNeeds*> parts);
 
   // Adds those that have what is known of updates: its parts, or this; none twice.

@@ -187,7 +187,7 @@ class StreamPlan {
   // Keeps what is pending, of which so many are wanted from now on; pending.wanted: until now.
   void set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted);
   [[nodiscard]] InBrick in_brick(BrickIndex brick, SupercubeIndex s) const;
-  // known: of the update's supercube.
+  // of_supercube: what is known there.
   [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, const BrickNeeds::OfSupercube& of_supercube, Slot slot) const {
     const BrickNeeds::OfUpdate known = of_supercube(slot);
     Highest own{std::uint8_t(volume_->error_step(i)), known.distance, known.slope};

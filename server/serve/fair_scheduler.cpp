@@ -161,11 +161,12 @@ void FairScheduler::promote(Flow& flow) {
   enqueue(flow, Priority::interactive, std::move(resume), Clock::now());
 }
 
-bool FairScheduler::has_waiters() const {
+bool FairScheduler::has_waiters() const { return has_waiters(Lane::usual) || has_waiters(Lane::heavy); }
+
+bool FairScheduler::has_waiters(Lane lane) const {
   const std::lock_guard lock(mutex_);
-  return std::any_of(lanes_.begin(), lanes_.end(), [](const Workers& lane) {
-    return std::any_of(lane.waiting.begin(), lane.waiting.end(), [](const Waiting& all) { return !all.empty(); });
-  });
+  const auto& waiting = lanes_[std::size_t(lane)].waiting;
+  return std::any_of(waiting.begin(), waiting.end(), [](const Waiting& all) { return !all.empty(); });
 }
 
 void FairScheduler::clear() {

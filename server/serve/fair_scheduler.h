@@ -116,6 +116,7 @@ class FairScheduler {
   [[nodiscard]] static bool is_heavy(const Account& account) { return account.is_heavy_.load(std::memory_order_relaxed); }
 
   [[nodiscard]] bool has_waiters() const;
+  [[nodiscard]] bool has_waiters(Lane lane) const;
 
   // Destroys the handlers of all waiting requests. No thread may hold a worker.
   void clear();

@@ -16,16 +16,18 @@ namespace {
 // A hand that drags a range asks again soon: the field that was restored for it is kept so long.
 constexpr std::chrono::seconds kFinderKept(5);
 
-// Rests after each piece of work while sessions wait for a worker, so that they have nine tenths of each core. Low priority
-// alone does not do: where the system has put two workers on one core, what measures keeps the other for half a second.
-// time: of the piece, on this thread.
+// Rests after each piece of work while sessions wait for a worker, so that they have nine tenths of each core. Those of
+// heavy accounts do not count: their workers have low priority, too, and must not put off what others wait for. Low
+// priority alone does not do: where the system has put two workers on one core, what measures keeps the other for half a
+// second. time: of the piece, on this thread.
 void rest_after(FairScheduler::Time time, const FairScheduler& scheduler, const std::stop_token& stop) {
   constexpr FairScheduler::Time kSlice = std::chrono::milliseconds(1), kRest = std::chrono::milliseconds(2);
   thread_local FairScheduler::Time worked{0};
   worked += time;
   if (worked < kSlice) return;
   const auto until = FairScheduler::Clock::now() + 9 * std::exchange(worked, FairScheduler::Time(0));
-  while (scheduler.has_waiters() && !stop.stop_requested() && FairScheduler::Clock::now() < until) std::this_thread::sleep_for(kRest);
+  while (scheduler.has_waiters(FairScheduler::Lane::usual) && !stop.stop_requested() && FairScheduler::Clock::now() < until)
+    std::this_thread::sleep_for(kRest);
 }
 
 }  // namespace

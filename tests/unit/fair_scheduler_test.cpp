@@ -259,6 +259,21 @@ TEST(FairScheduler, AnAccountIsHeavyBesideOneThatSpentMuchLess) {
   EXPECT_FALSE(FairScheduler::is_heavy(heavy)) << "the other one spent as much";
 }
 
+TEST_F(FairSchedulerTest, WhatHeavyAccountsWaitForIsToldApart) {
+  Account light;
+  const auto now = FairScheduler::Clock::now();
+  scheduler_.charge(light, milliseconds(1), now);
+  scheduler_.charge(*account_, milliseconds(10'000), now);
+  ASSERT_TRUE(FairScheduler::is_heavy(*account_));
+  for (const int session : {0, 1}) acquire(session, Priority::bulk);
+  EXPECT_FALSE(scheduler_.has_waiters());
+  acquire(2, Priority::bulk);
+  EXPECT_TRUE(scheduler_.has_waiters());
+  EXPECT_TRUE(scheduler_.has_waiters(Lane::heavy));
+  EXPECT_FALSE(scheduler_.has_waiters(Lane::usual));
+  scheduler_.clear();
+}
+
 TEST_F(FairSchedulerTest, WhatWasSpentCountsHalfAfterAHalfLife) {
   const auto now = FairScheduler::Clock::now();
   const auto seconds = [&](FairScheduler::Clock::time_point when) {
