@@ -324,6 +324,7 @@ TEST(FairScheduler, RunsNoMoreWorkThanThereAreWorkersOnAnyNumberOfThreads) {
   };
   for (int session = 0; session < kSessions; ++session) asio::post(io, [&go, session] { go(session, 0); });
   std::vector<std::thread> threads;
+  threads.reserve(4);
   for (int i = 0; i < 4; ++i) threads.emplace_back([&io] { io.run(); });
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(done, kSessions * kRounds);
