@@ -1,6 +1,9 @@
 #include "client/view/coarse_front.h"
 
+#include <bit>
 #include <cassert>
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
@@ -41,6 +44,17 @@ Front coarse_shown_front(const StreamClient& client, const Front& fine, int leve
   std::vector<SlotGroup> groups = fine.splits();
   for (SlotGroup& group : groups) group.slots &= fine.shown_slots(group.key);
   return without_finest(std::move(groups), client.description(), fine, levels);
+}
+
+std::vector<std::uint64_t> counts_without_finest(const StreamClient& client) {
+  std::vector<std::uint64_t> counts{0};  // first: of each level by itself
+  for (const SlotGroup& group : client.front().splits()) {
+    const auto level = std::size_t(3 * scale_of_key(group.key));
+    if (counts.size() < level + 4) counts.resize(level + 4);
+    for (std::size_t cls = 0; cls < 3; ++cls) counts[level + 2 - cls] += std::uint64_t(std::popcount(group.slots & kSlotsOfClass[cls]));
+  }
+  for (std::size_t level = counts.size() - 1; level > 0; --level) counts[level - 1] += counts[level];
+  return counts;
 }
 
 }  // namespace intervale

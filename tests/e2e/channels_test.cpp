@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -20,15 +21,15 @@ namespace {
 using ::testing::HasSubstr;
 constexpr int kSide = 20;
 
-// `components` floats at each sample of a cube: 0, 1, ... times its x. header: more lines.
-std::string nrrd(int side, int components, const std::string& header = {}) {
+// `components` floats at each sample of a cube: 0, 1, ... times its x. header: more lines. hole: the first float is NaN.
+std::string nrrd(int side, int components, const std::string& header = {}, bool hole = false) {
   std::string text = "NRRD0004\ntype: float\nencoding: raw\nendian: little\n" + header;
   const std::string sizes = std::to_string(side) + " " + std::to_string(side) + " " + std::to_string(side) + "\n";
   text += components == 1 ? "dimension: 3\nsizes: " + sizes : "dimension: 4\nkinds: vector domain domain domain\nsizes: 3 " + sizes;
   text += "\n";
   for (int i = 0; i < side * side * side; ++i) {
     for (int c = 0; c < components; ++c) {
-      const float value = float(c + 1) * float(i % side);
+      const float value = hole && i == 0 && c == 0 ? std::numeric_limits<float>::quiet_NaN() : float(c + 1) * float(i % side);
       char bytes[sizeof value];
       std::memcpy(bytes, &value, sizeof value);
       text.append(bytes, sizeof value);
@@ -119,6 +120,15 @@ TEST_F(Channels, APictureHasTheirColours) {
     const Arguments span{"--color-span", channel.at("values").at("least").dump(), channel.at("values").at("greatest").dump()};
     EXPECT_EQ(run(Arguments{program("intervale"), "extract", every} + look + Arguments{name} + span).status, 0);
     EXPECT_EQ(text_of(folder / "a.png"), extracted);
+  }
+}
+
+TEST_F(Channels, SamplesThatAreNoNumbersAreRefusedOrReplaced) {
+  for (const int components : {1, 3}) {
+    folder.file("hole.nrrd", nrrd(kSide, components, {}, true));
+    const Arguments hole{"--channel", "hole=" + path("hole.nrrd")};
+    expect_complaint(build(folder / "x.ivm", hole), 1, "--nan VALUE", "intervale: ");
+    EXPECT_EQ(build(folder / "x.ivm", hole + Arguments{"--nan", "7"}).status, 0);
   }
 }
 

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "client/view/boundary_surface.h"
 #include "client/view/drawn_range.h"
@@ -40,10 +43,15 @@ class CoarseFrontOf : public ::testing::TestWithParam<unsigned> {
 TEST_P(CoarseFrontOf, EachLevelIsPartOfTheNextFinerOne) {
   Front finer = coarse_front(client_, 0);
   EXPECT_EQ(canonical(finer.mesh()), canonical(client_.mesh()));
+  const std::vector<std::uint64_t> counts = counts_without_finest(client_);
+  EXPECT_EQ(counts.front(), finer.split_count());
+  EXPECT_EQ(counts.back(), 0U);
   for (int levels = 1; finer.split_count() > 0; ++levels) {
     Front coarse = coarse_front(client_, levels);
     ASSERT_EQ(coarse.validate(), std::nullopt);
     ASSERT_TRUE(coarse.is_part_of(finer));
+    ASSERT_LT(std::size_t(levels), counts.size());
+    ASSERT_EQ(coarse.split_count(), counts[std::size_t(levels)]);
     ASSERT_LE(coarse.split_count(), finer.split_count());
     finer = std::move(coarse);
     ASSERT_LE(levels, 24) << "in the end nothing is left";

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/view/coarse_front.h"
 #include "client/view/cross_section.h"
 #include "client/view/drawn_range.h"
 #include "client/view/point_values.h"
@@ -109,6 +110,14 @@ class Viewer {
       }
     }
     return {};
+  }
+  // How many updates stay without the finest levels, by the number of those (coarse_front.h).
+  val level_counts() const {
+    val counts = val::array();
+    if (!drawn_.empty()) {
+      for (const std::uint64_t count : counts_without_finest(*session_.mesh())) counts.call<void>("push", double(count));
+    }
+    return counts;
   }
   void connected(double now) { session_.connected(time_of(now)); }
   void disconnected() { session_.disconnected(); }
@@ -357,6 +366,7 @@ EMSCRIPTEN_BINDINGS(intervale) {
       .constructor<const std::string&>()
       .function("look", &Viewer::look)
       .function("preview", &Viewer::preview)
+      .function("levelCounts", &Viewer::level_counts)
       .function("connected", &Viewer::connected)
       .function("disconnected", &Viewer::disconnected)
       .function("inbox", &Viewer::inbox)

@@ -298,18 +298,28 @@ test('numbers have the digits that are significant', () => {
 test('a preview gets coarser until a step is done in time, and not finer again if that would be too slow', () => {
   for (let i = 0; i < 50; ++i) {
     const pace = new PreviewPace();
-    const updates = 10 ** random(3, 7);
+    const counts = [10 ** random(3, 7)]; // of meshes whose levels have between a hundredth and half of their updates
+    while (counts.at(-1) > 1) counts.push(Math.floor(counts.at(-1) * random(0.5, 0.99)));
     const msPerUpdate = 10 ** random(-4, -2.5);
-    const msOf = (levels) => (updates * msPerUpdate) / 2 ** levels;
-    pace.begin(updates);
-    const levels = Array.from({ length: 30 }, () => {
-      pace.took(msOf(pace.levels));
-      return pace.levels;
-    });
-    const last = levels.at(-1);
-    assert.ok(msOf(last) <= 40 || last === 15, `${msOf(last)} ms`);
-    assert.ok(last === 0 || msOf(last - 1) > 19, 'no coarser than needed');
-    assert.deepEqual(new Set(levels.slice(15)), new Set([last]), 'at rest');
+    const msOf = (levels) => counts[levels] * msPerUpdate;
+    const most = Math.max(0, counts.findLastIndex((count) => count >= 1000));
+    let made = null; // levels of the coarse mesh that is there
+    const step = () => {
+      const ms = made === pace.levels ? msOf(pace.levels) : 1.5 * msOf(pace.levels);
+      made = pace.levels;
+      pace.took(ms);
+      return { levels: made, ms };
+    };
+    pace.begin(counts);
+    const steps = Array.from({ length: 60 }, step);
+    const last = steps.at(-1).levels;
+    assert.ok(msOf(last) <= 40 || last === most, `${msOf(last)} ms`);
+    assert.ok(last === 0 || msOf(last - 1) > 20, 'no coarser than needed');
+    assert.deepEqual(new Set(steps.slice(45).map(({ levels }) => levels)), new Set([last]), 'at rest');
+    made = null;
+    pace.begin(counts);
+    const { levels, ms } = step();
+    assert.ok(ms <= 31 || levels === most, `the first step of the next drag: ${ms} ms`);
   }
 });
 

@@ -1,28 +1,45 @@
-// How fine a preview of a range may be so that a step of it is done in time: chosen from how long the last ones took.
-// The finest levels of the mesh are left out, and each has about half of its updates.
+// How fine a preview of a range may be so that a step of it is done in time: chosen from how many updates stay without
+// the mesh's finest levels, and from how long the last steps took.
 
 const kStepMs = 30; // for the worker's part of a step; uploading and drawing take about as long again
-const kFirstMsPerUpdate = 0.002; // until a step was measured
-const kMostLevels = 15; // five scales
+const kFirstMsPerUpdate = 0.0013; // until a step was measured
+const kMaking = 1.5; // times as long takes a step that makes the coarse mesh first
+const kLeast = 1000; // updates, if the mesh has as many: that much is always done in time
 
 export class PreviewPace {
   levels = 0; // to leave out, of the next step
-  private isMeasured = false;
+  private counts = [0];
+  private makes = true; // the next step has to make the coarse mesh
+  private msPerUpdate = kFirstMsPerUpdate;
 
-  // A preview begins. updates: of the mesh that it is a preview of.
-  begin(updates: number): void {
-    if (!this.isMeasured) this.adapt(updates * kFirstMsPerUpdate);
+  // A preview begins. counts: of updates that stay, by the number of levels left out.
+  begin(counts: number[]): void {
+    this.counts = counts;
+    this.makes = true;
+    this.levels = this.levelsFor(0);
   }
 
-  // The worker's part of a step with `levels` left out took so long.
+  // The worker's part of a step with `levels` left out took so long. Finer only where the next finer level would surely
+  // do, so that steps do not alternate between two levels.
   took(ms: number): void {
-    this.isMeasured = true;
-    this.adapt(ms);
+    const { levels } = this;
+    const step = this.makes ? ms / kMaking : ms;
+    this.makes = false;
+    if (this.counts[levels]! > 0) this.msPerUpdate = step / this.counts[levels]!;
+    if (step > 1.3 * kStepMs) this.levels = this.levelsFor(levels + 1);
+    else if (levels > 0 && this.msOf(levels - 1) < 0.7 * kStepMs) this.levels = levels - 1;
+    this.makes = this.levels !== levels;
   }
 
-  // Finer only where the next finer level would surely do, so that steps do not alternate between two levels.
-  private adapt(ms: number): void {
-    if (ms > 1.3 * kStepMs) this.levels = Math.min(kMostLevels, this.levels + Math.max(1, Math.round(Math.log2(ms / kStepMs))));
-    else if (ms < kStepMs / 3) this.levels = Math.max(0, this.levels - 1);
+  private msOf(levels: number): number {
+    return this.counts[levels]! * this.msPerUpdate;
+  }
+
+  // The fewest, from `least` on, with which a step that makes the mesh is done in time.
+  private levelsFor(least: number): number {
+    const most = this.counts.filter((count) => count >= kLeast).length - 1;
+    let levels = least;
+    while (levels < most && kMaking * this.msOf(levels) > kStepMs) ++levels;
+    return Math.max(0, Math.min(levels, most));
   }
 }

@@ -115,7 +115,7 @@ export class StreamSession {
   }
 
   private showPreview(ranges: [number, number][]): void {
-    if (!this.isPreviewing) this.pace.begin(this.viewer.progress().updatesShown);
+    if (!this.isPreviewing) this.pace.begin(this.viewer.levelCounts());
     this.isPreviewing = true;
     this.dropStandIn();
     const start = performance.now();

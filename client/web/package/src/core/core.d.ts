@@ -7,6 +7,7 @@ export interface Viewer {
   // Shown until the next look(), of the updates that are here; the ranges that differ from the last view's without this
   // number of finest levels.
   preview(ranges: [number, number][], levels: number): string;
+  levelCounts(): number[]; // how many updates stay without the finest levels, by the number of those: from 0 to all
   connected(now: number): void; // the WebSocket was opened
   disconnected(): void; // ... or closed
   inbox(bytes: number): Uint8Array; // to be filled with one message; valid until the next call of any function
