@@ -78,9 +78,6 @@ Result<IntervalVolume> decode_coarse(const FileEnds& file, const CoarseScales& s
 // the finest scale's last level has an error above the threshold, none of a finer scale has. The levels before the last need
 // not be looked at: their errors may be above it, but they are held.
 //
-// Finer values may still make more of the held updates relevant to a range: those of whose own values, and of those of held
-// descendants, none counts. No mesh shows such an update (front.h), so that the mesh is the same without it.
-//
 // With a camera, how far surfaces move is measured in the whole data set.
 bool wants_finer(const IntervalVolume& volume, const Lod& lod) {
   if (volume.is_whole()) return false;

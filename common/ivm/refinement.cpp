@@ -41,7 +41,6 @@ SplitSet select(const IntervalVolume& volume, const RelevantUpdates& relevant, c
       }
     });
   }
-  if (!lod.roi && !lod.camera) return wanted;  // saturated errors are closed under parents
   return select(set, [&wanted](const Place& p) { return wanted.contains(p.index); });
 }
 
@@ -51,22 +50,22 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const RelevantUp
   std::vector<Ranking::Rank> ranks(volume.size());
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     const Ranking::Brick brick = ranking.of_brick(b);
+    std::size_t n = 0;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
       const Ranking::Supercube rank = brick.supercube(s, key);
+      const std::uint64_t occupancy = set.occupancy()[s], slots = relevant.brick(b).slots(n++, occupancy);
       UpdateIndex i = set.first(b, s);
-      for (const Slot slot : set_bits<Slot>(set.occupancy()[s])) {
-        if (updates.contains(i)) ranks[i] = rank(i, slot);
+      for (const Slot slot : set_bits<Slot>(occupancy)) {
+        if ((slots >> slot & 1) != 0 && updates.contains(i)) ranks[i] = rank(i, slot);
         ++i;
       }
     });
   }
-  if (lod.roi || lod.camera) {
-    SetNeighbours around(set);
-    set.for_each_up([&](const Place& p) {
-      if (!updates.contains(p.index)) return;
-      for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
-    });
-  }
+  SetNeighbours around(set);
+  set.for_each_up([&](const Place& p) {
+    if (!updates.contains(p.index)) return;
+    for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
+  });
   // A counting sort over the coarse to fine order.
   constexpr std::size_t kRanks = std::numeric_limits<Ranking::Rank>::max() + std::size_t(1);
   std::vector<std::size_t> begin(kRanks + 1, 0);

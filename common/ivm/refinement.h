@@ -1,7 +1,8 @@
 // Which updates a level of detail needs, and in which order. Pure functions of the updates' errors and positions.
 //
-// Weiss and De Floriani 2008, section 7. Errors are saturated, so the updates with an error above a threshold are
-// closed under parents. A selection that depends on positions too is closed by one pass from fine to coarse.
+// Weiss and De Floriani 2008, section 7. Errors are saturated, so all updates with an error above a threshold are closed
+// under parents. A selection of those that count for a range, or that depends on positions, is closed by one pass from
+// fine to coarse.
 #pragma once
 
 #include <array>
@@ -21,7 +22,7 @@ namespace intervale {
 // The updates of `set` for which `wants` returns true, and all their ancestors.
 [[nodiscard]] SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>& wants);
 
-// The relevant updates that a level of detail needs, closed under parents. Budgets are not applied.
+// The relevant updates that a level of detail needs, and all their ancestors. Budgets are not applied.
 [[nodiscard]] SplitSet select(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod);
 // The same, for the range of the data set.
 [[nodiscard]] inline SplitSet select(const IntervalVolume& volume, const Lod& lod) { return select(volume, volume.relevant(), lod); }

@@ -62,9 +62,20 @@ RelevantSlots::RelevantSlots(const IntervalVolume& volume, const ShownRange& sho
       first_fine_(set_.of_scale(0)[0]),
       counting_(set_.bricks().size() - first_fine_) {}
 
+std::vector<std::uint64_t> RelevantSlots::with_ancestors(BrickIndex brick) const {
+  if (!has_any(brick)) return none(brick);
+  return without_lost(brick, brick < first_fine_ ? of_coarse(brick) : of_fine(brick));
+}
+
 std::vector<std::uint64_t> RelevantSlots::of(BrickIndex brick) const {
-  if (!has_any(brick)) return Words(std::size_t(std::popcount(set_.bricks()[brick].mask)));
-  Words words = brick < first_fine_ ? of_coarse(brick) : of_fine(brick);
+  if (!has_any(brick)) return none(brick);
+  const Words* const known = brick < first_fine_ ? nullptr : counting_.find(brick - first_fine_);
+  return without_lost(brick, known != nullptr ? *known : find_counting(brick));
+}
+
+RelevantSlots::Words RelevantSlots::none(BrickIndex brick) const { return Words(std::size_t(std::popcount(set_.bricks()[brick].mask))); }
+
+RelevantSlots::Words RelevantSlots::without_lost(BrickIndex brick, Words words) const {
   const BrickNeeds& left = volume_.relevant().brick(brick);
   const SupercubeIndex first = set_.bricks()[brick].first_supercube;
   for (std::size_t n = 0; n < words.size(); ++n) words[n] &= left.slots(n, set_.occupancy()[first + n]);
@@ -116,12 +127,6 @@ RelevantSlots::Words RelevantSlots::find_counting(BrickIndex brick) const {
 const RelevantSlots::Words& RelevantSlots::fine_counting(BrickIndex brick) const {
   const Words* const known = counting_.find(brick - first_fine_);
   return known != nullptr ? *known : counting_.keep(brick - first_fine_, find_counting(brick)).value;
-}
-
-std::vector<std::uint64_t> RelevantSlots::counting(BrickIndex brick) const {
-  Words words = brick < first_fine_ ? find_counting(brick) : fine_counting(brick);
-  words.resize(std::size_t(std::popcount(set_.bricks()[brick].mask)));
-  return words;
 }
 
 std::vector<std::uint64_t> RelevantSlots::of_fine(BrickIndex brick) const {

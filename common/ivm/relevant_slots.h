@@ -15,24 +15,25 @@ namespace intervale {
 
 class SplitLattice;
 
-// What counts for the range, and all ancestors of that; without those whose values are lost (page_faults.h). Of scale 1
-// and coarser, the bounds of values tell. Of scale 0, a diamond is relevant if it or a descendant of the same scale
-// counts; whether it counts itself is found once for each brick and kept, since the bricks before it need it, too. Any
-// thread.
+// What counts for the range (front.h): splits that change its mesh, if their ancestors are split. Without those whose values
+// are lost (page_faults.h). Any thread.
 class RelevantSlots {
  public:
   // The volume was refined uniformly, and must outlive it. The first of a volume takes O(updates): IntervalVolume::bounds().
   RelevantSlots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel = serial);
 
-  // By supercube of the brick, in order. Some 30 microseconds of scale 0 where the surface is, otherwise a few.
+  // By supercube of the brick, in order. Some 20 microseconds where the surface is.
   [[nodiscard]] std::vector<std::uint64_t> of(BrickIndex brick) const;
-  // Likewise, only what counts itself, lost values included.
-  [[nodiscard]] std::vector<std::uint64_t> counting(BrickIndex brick) const;
-  // Whether a brick has any at all.
+  // Likewise, with all ancestors. Of scale 1 and coarser, the bounds of values tell. Of scale 0 it is those of the same
+  // scale; what counts is found once for each brick and kept, since the bricks before it need it, too.
+  [[nodiscard]] std::vector<std::uint64_t> with_ancestors(BrickIndex brick) const;
+  // Whether a brick has any of those at all.
   [[nodiscard]] bool has_any(BrickIndex brick) const { return bounds_.is_relevant(counts_, brick); }
 
  private:
   using Words = std::vector<std::uint64_t>;  // by supercube of a brick
+  [[nodiscard]] Words none(BrickIndex brick) const;
+  [[nodiscard]] Words without_lost(BrickIndex brick, Words words) const;
   [[nodiscard]] Words of_coarse(BrickIndex brick) const;
   [[nodiscard]] Words of_fine(BrickIndex brick) const;
   [[nodiscard]] Words find_counting(BrickIndex brick) const;  // empty: none

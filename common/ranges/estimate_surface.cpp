@@ -64,8 +64,8 @@ void add_estimates(const IntervalVolume& volume, const SplitLattice& lattice, co
 
 }  // namespace
 
-EstimatedSurface estimate_surface(const IntervalVolume& volume, const CountingKeys& counts, BrickIndex brick, std::span<const std::uint64_t> relevant,
-                                  std::span<const std::uint64_t> counting) {
+EstimatedSurface estimate_surface(const IntervalVolume& volume, const CountingKeys& counts, BrickIndex brick,
+                                  std::span<const std::uint64_t> relevant) {
   const SupercubeSet& set = volume.set();
   const Grid& grid = volume.description().grid;
   const int scale = scale_of_key(set.bricks()[brick].key);
@@ -81,7 +81,7 @@ EstimatedSurface estimate_surface(const IntervalVolume& volume, const CountingKe
   set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     const std::size_t n = result.to_distance.size();
     Estimates estimates;
-    if (const std::uint64_t slots = relevant[n] & counting[n]; slots != 0) {
+    if (const std::uint64_t slots = relevant[n]; slots != 0) {
       lattice.move_to(key);
       (void)lattice.splittable(slots);
       const UpdateIndex first = set.first(brick, s);

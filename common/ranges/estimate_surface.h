@@ -17,14 +17,14 @@ namespace intervale {
 
 struct EstimatedSurface {
   std::vector<ErrorToDistance> to_distance;  // by supercube; none is far
-  BrickNeeds::Surface of_updates;            // of relevant updates; those that do not count themselves have 0
+  BrickNeeds::Surface of_updates;            // of relevant updates
 };
 
-// Of a brick of a volume that was refined uniformly. counts: for a range with one surface. relevant, counting: by supercube
+// Of a brick of a volume that was refined uniformly. counts: for a range with one surface. relevant: by supercube
 // (RelevantSlots). Of ten distances of scale 0, saturated, eight are between a half and eight times what is measured, and
 // one of a hundred is more than 40 times too large. Some microseconds.
 [[nodiscard]] EstimatedSurface estimate_surface(const IntervalVolume& volume, const CountingKeys& counts, BrickIndex brick,
-                                                std::span<const std::uint64_t> relevant, std::span<const std::uint64_t> counting);
+                                                std::span<const std::uint64_t> relevant);
 
 // Upper bounds of what is estimated for an update of this scale.
 struct EstimateBound {

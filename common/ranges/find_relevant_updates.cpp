@@ -85,13 +85,15 @@ SurfaceErrors PartFinder::measure(const Range& range, const std::vector<std::uin
 std::shared_ptr<const RelevantUpdates> PartFinder::find_measured(const RangePart& part) {
   const SupercubeSet& set = volume_.set();
   const RelevantSlots relevant(volume_, part.shown, parallel_);
-  std::vector<std::uint64_t> slots(set.supercubes());
+  std::vector<std::uint64_t> slots(set.supercubes()), closed(set.supercubes());
   parallel_(set.bricks().size(), [&](std::size_t b) {
     const BrickIndex brick{std::uint32_t(b)};
-    const std::vector<std::uint64_t> words = relevant.of(brick);
-    std::copy(words.begin(), words.end(), slots.begin() + set.bricks()[brick].first_supercube);
+    const SupercubeIndex first = set.bricks()[brick].first_supercube;
+    const std::vector<std::uint64_t> with_ancestors = relevant.with_ancestors(brick), counting = relevant.of(brick);
+    std::copy(with_ancestors.begin(), with_ancestors.end(), closed.begin() + first);
+    std::copy(counting.begin(), counting.end(), slots.begin() + first);
   });
-  const SurfaceErrors surface = measure(part.shown.range, slots);
+  const SurfaceErrors surface = measure(part.shown.range, closed);
   return std::make_shared<const RelevantUpdates>(volume_.description().grid, set, UpdateErrors{volume_.steps(), volume_.error_steps()},
                                                  ShownRanges{part.shown}, slots, surface);
 }
@@ -120,7 +122,7 @@ std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
     for (std::size_t n = 0; n < needs.size(); ++n) needs[n].slots = relevant[n];
     BrickNeeds::Surface surface;
     if (is_estimated) {
-      EstimatedSurface estimated = estimate_surface(volume, counts, brick, relevant, slots->counting(brick));
+      EstimatedSurface estimated = estimate_surface(volume, counts, brick, relevant);
       for (std::size_t n = 0; n < needs.size(); ++n) needs[n].to_distance = estimated.to_distance[n];
       surface = std::move(estimated.of_updates);
     }

@@ -50,7 +50,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const std::uint64_t relevant = in.needs.slots(in.number, here.occupancy);
     if ((relevant >> slot & 1) == 0) return;
     Pending pending = this->pending(here.brick);
-    pending.set_unsent(pending.unsent + 1);
+    pending.set_unsent(std::min<unsigned>(pending.unsent + 1U, in.needs.updates()));
     const Highest again = of_update(in, i, in.needs.of_supercube(in.number, relevant), slot);
     pending.raise_to(again, relevant_->object_error(in.needs.to_distance(in.number), in.scale, again.error_step, again.distance));
     keep(here.brick, pending);

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "common/ivm/every_range.h"
+#include "common/ivm/refinement.h"
 #include "common/mesh/mesh_digest.h"
 #include "common/ranges/find_relevant_updates.h"
 #include "server/builder/field_hierarchy.h"
@@ -89,7 +90,7 @@ TEST_P(RangeExtraction, ErrorsAreSaturated) {
   EXPECT_EQ(volume->error_steps().back(), float(volume->description().max_error));
 }
 
-// What is relevant is what a data set of that range holds; distances are as far as errors are alike.
+// What is relevant, with its ancestors, is what a data set of that range holds; distances are as far as errors are alike.
 TEST_P(RangeExtraction, FindsWhatADataSetOfOneRangeHolds) {
   for (int i = 0; i < 4; ++i) {
     const Range range = testing::random_range(field, random);
@@ -99,11 +100,12 @@ TEST_P(RangeExtraction, FindsWhatADataSetOfOneRangeHolds) {
     const auto relevant = find_relevant_updates(volume, {{range, refine}}, Distances::measured);
     const auto crossed = find_relevant_updates(volume, {{range, Refine::boundary}}, Distances::none);
     const SupercubeSet& all = volume->set();
+    const SplitSet closed = select(all, [&](const Place& p) { return testing::is_relevant(*relevant, *volume, p); });
     std::uint64_t updates = 0;
     for (BrickIndex b{0}; b < all.bricks().size(); ++b) {
       all.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
         const auto found = one->set().find_supercube(scale_of_key(key), position_of_key(key));
-        const std::uint64_t slots = testing::slots_of(*relevant, *volume, b, s);
+        const std::uint64_t slots = closed.slots(all.first(b, s), all.occupancy()[s]);
         updates += std::uint64_t(std::popcount(slots));
         EXPECT_EQ(slots, found ? one->set().occupancy()[found->supercube] : 0);
         if (!found) return;
