@@ -10,8 +10,7 @@
 namespace intervale {
 
 // The front of a client's splits without those of its finest levels, for the same range. A level is the diamonds of one
-// scale and class. levels: at least 0; 3 for each scale.
-// O(the client's splits).
+// scale and class. levels: at least 0; 3 for each scale. O(the client's splits).
 [[nodiscard]] Front coarse_front(const StreamClient& client, int levels);
 
 // The same of what one of the client's fronts shows, for its range: nothing that this front hides.

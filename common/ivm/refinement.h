@@ -19,6 +19,12 @@
 
 namespace intervale {
 
+// Whether all that a level of detail wants of these updates is closed under parents, and no rank above its ancestors': so it
+// is by error alone, if no ancestors are left out.
+[[nodiscard]] inline bool is_closed(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod) {
+  return &relevant == &volume.relevant() && !lod.roi && !lod.camera;
+}
+
 // The updates of `set` for which `wants` returns true, and all their ancestors.
 [[nodiscard]] SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>& wants);
 

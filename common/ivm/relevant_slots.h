@@ -15,8 +15,8 @@ namespace intervale {
 
 class SplitLattice;
 
-// What counts for the range (front.h): splits that change its mesh, if their ancestors are split. Without those whose values
-// are lost (page_faults.h). Any thread.
+// What counts for the range (front.h): splits that change its mesh, if their ancestors are split. Without those whose
+// values are lost (page_faults.h). Any thread.
 class RelevantSlots {
  public:
   // The volume was refined uniformly, and must outlive it. The first of a volume takes O(updates): IntervalVolume::bounds().

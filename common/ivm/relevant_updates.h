@@ -3,9 +3,9 @@
 // Weiss and De Floriani 2008, section 6. A data set of one range holds only what its range needs: all of it is relevant.
 // Of a data set that was refined uniformly, or that has every range, any range within needs a part: the updates that count
 // for it (front.h). Their ancestors have to be split before them, but are not wanted for their own sake: where all that
-// counts below an update is finer than what is wanted, it would change no mesh. Several ranges need
-// what each of them needs. What a brick needs is known from the start, or found when it is first asked for; until then
-// there are bounds. Shared by all sessions that look at those ranges.
+// counts below an update is finer than what is wanted, it would change no mesh. Several ranges need what each of them
+// needs. What a brick needs is known from the start, or found when it is first asked for; until then there are bounds.
+// Shared by all sessions that look at those ranges.
 #pragma once
 
 #include <algorithm>
@@ -43,8 +43,8 @@ struct UpdateErrors {
 // Any thread. Copies share what is found.
 class RelevantUpdates {
  public:
-  // All of it is known. slots: by supercube; empty: all updates of the set. shown: what they are
-  // relevant to, one range at least. The set must outlive the constructor only.
+  // All of it is known. slots: by supercube; empty: all updates of the set. shown: what they are relevant to, one range at
+  // least. The set must outlive the constructor only.
   RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown, const std::vector<std::uint64_t>& slots,
                   const SurfaceErrors& surface);
 

@@ -141,11 +141,8 @@ void StreamPlan::put(const SlotGroup& updates, BatchBuilder& builder) {
   builder.put(updates, count);
   sent_count_ += count;
   if (!relevant_->is_found(updates.brick)) return;  // bounds stay as they are: these are ancestors
-  const SupercubeIndex s = updates.supercube;
-  const std::uint64_t relevant =
-      relevant_->brick(updates.brick).slots(s - volume_->set().bricks()[updates.brick].first_supercube, volume_->set().occupancy()[s]);
   Pending w = pending(updates.brick);
-  w.set_unsent(w.unsent - std::min(unsigned(w.unsent), unsigned(std::popcount(updates.slots & relevant))));
+  w.set_unsent(w.unsent - unsigned(std::popcount(updates.slots & relevant_slots(updates.brick, updates.supercube))));
   if (w.wanted > w.unsent)
     set_pending(updates.brick, w, viewed_[updates.brick].rank, w.unsent);
   else

@@ -187,6 +187,9 @@ class StreamPlan {
   // Keeps what is pending, of which so many are wanted from now on; pending.wanted: until now.
   void set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted);
   [[nodiscard]] InBrick in_brick(BrickIndex brick, SupercubeIndex s) const;
+  [[nodiscard]] std::uint64_t relevant_slots(BrickIndex brick, SupercubeIndex s) const {
+    return relevant_->brick(brick).slots(s - volume_->set().bricks()[brick].first_supercube, volume_->set().occupancy()[s]);
+  }
   // of_supercube: what is known there.
   [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, const BrickNeeds::OfSupercube& of_supercube, Slot slot) const {
     const BrickNeeds::OfUpdate known = of_supercube(slot);

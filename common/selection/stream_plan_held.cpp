@@ -17,8 +17,7 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   sent_.insert(first, occupancy, added);
   sent_count_ += std::uint64_t(std::popcount(added));
   Pending pending = this->pending(found->brick);
-  const InBrick in = in_brick(found->brick, found->supercube);
-  pending.set_unsent(pending.unsent - unsigned(std::popcount(added & in.needs.slots(in.number, occupancy))));
+  pending.set_unsent(pending.unsent - unsigned(std::popcount(added & relevant_slots(found->brick, found->supercube))));
   keep(found->brick, pending);
   return true;
 }

@@ -121,6 +121,13 @@ Result<Case> sample_case(std::string_view name, int size) {
   return c;
 }
 
+void for_each_case(int argc, char** argv, const std::function<void(const Case&)>& measure) {
+  if (argc < 2) {
+    for (const char* name : {"gyroid", "buckyball"}) measure(or_throw(sample_case(name, 97)));
+  }
+  for (int i = 1; i < argc; ++i) measure(or_throw(read_case(argv[i])));
+}
+
 BoxFrame frame_of(const Grid& grid) {
   const Vec3 spacing = grid.affine.spacing();
   BoxFrame frame{.middle = grid.affine.origin()};

@@ -1,6 +1,7 @@
 // What is measured: volumes, and a range of each.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -33,6 +34,10 @@ inline constexpr const char* kCaseSyntax =
 
 // One of the product's own samples, with a range that suits it.
 [[nodiscard]] Result<Case> sample_case(std::string_view name, int size);
+
+// Calls measure() for each case of a command line, or without any for two of the product's own samples. Throws what is
+// wrong with one.
+void for_each_case(int argc, char** argv, const std::function<void(const Case&)>& measure);
 
 // Where cameras look at, and how far away they are measured in: of an axis-parallel box.
 struct BoxFrame {

@@ -126,10 +126,7 @@ int run(int argc, char** argv) {
   fmt::print(
       "| range | alpha moves | updates held | levels left out | updates that stay | first step | next step | triangles "
       "|\n|---|---|--:|--:|--:|--:|--:|--:|\n");
-  if (argc < 2) {
-    for (const char* name : {"gyroid", "buckyball"}) measure(or_throw(sample_case(name, 97)));
-  }
-  for (int i = 1; i < argc; ++i) measure(or_throw(read_case(argv[i])));
+  for_each_case(argc, argv, measure);
   return 0;
 }
 

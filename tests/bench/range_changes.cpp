@@ -145,10 +145,7 @@ int run(int argc, char** argv) {
   fmt::print(
       "| range | held | splits held | shown | set_range | mesh | together | surface | splits again | mesh "
       "|\n|---|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
-  if (argc < 2) {
-    for (const char* name : {"gyroid", "buckyball"}) measure_case(or_throw(sample_case(name, 97)));
-  }
-  for (int i = 1; i < argc; ++i) measure_case(or_throw(read_case(argv[i])));
+  for_each_case(argc, argv, measure_case);
   return 0;
 }
 

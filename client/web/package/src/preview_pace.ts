@@ -24,7 +24,6 @@ export class PreviewPace {
   took(ms: number): void {
     const { levels } = this;
     const step = this.makes ? ms / kMaking : ms;
-    this.makes = false;
     if (this.counts[levels]! > 0) this.msPerUpdate = step / this.counts[levels]!;
     if (step > 1.3 * kStepMs) this.levels = this.levelsFor(levels + 1);
     else if (levels > 0 && this.msOf(levels - 1) < 0.7 * kStepMs) this.levels = levels - 1;
