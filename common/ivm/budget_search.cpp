@@ -4,7 +4,6 @@
 #include <bit>
 #include <utility>
 
-#include "common/ivm/refinement.h"
 #include "common/util/bits.h"
 
 namespace intervale {
@@ -19,7 +18,6 @@ BudgetSearch::BudgetSearch(std::shared_ptr<const IntervalVolume> volume, std::sh
       relevant_owner_(std::move(relevant)),
       ranking_(volume_, relevant_, lod),
       around_(volume_.set()),
-      is_closed_(is_closed(volume_, relevant_, lod)),
       budget_(lod.max_updates.value_or(0)),
       page_(volume_.size() / kPage + 1),
       result_(volume_.size()),
@@ -127,7 +125,7 @@ Slices BudgetSearch::search() {
     rank_brick(b);
     if (is_time()) co_await Slices::kPause;
   }
-  for (int scale = 0; scale < kMaxLevels && !is_closed_; ++scale) {
+  for (int scale = 0; scale < kMaxLevels; ++scale) {
     const auto [begin, end] = set.of_scale(scale);
     for (int cls = 2; cls >= 0; --cls) {
       for (BrickIndex b = begin; b < end; ++b) {

@@ -59,7 +59,6 @@ class BudgetSearch {
   const RelevantUpdates& relevant_ = *relevant_owner_;
   Ranking ranking_;
   SetNeighbours around_;
-  bool is_closed_;                             // no rank is above its ancestors' (refinement.h)
   std::uint64_t budget_;                       // updates that are left
   Rank last_ = 0;                              // all of a higher rank are within the budget, and none of a lower one
   std::vector<std::uint32_t> page_;            // of each kPage numbers, counted from 1; 0: their ranks are 0

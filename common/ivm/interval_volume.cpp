@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <mutex>
 
 #include "common/ivm/paged_values.h"
+#include "common/ivm/relevant_slots.h"
 #include "common/ivm/value_bounds.h"
 
 namespace intervale {
@@ -26,6 +28,15 @@ std::vector<ScreenError::Region> regions_of_bricks(const Domain& domain, const S
   return regions;
 }
 
+// What counts for the data set's range, but for lost updates; empty: all. left: see IntervalVolume::Parts.
+std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const std::vector<std::uint64_t>& left) {
+  const Description& d = volume.description();
+  if (d.has_every_range) return left;
+  std::vector<std::uint64_t> slots = counting_slots(volume, CountingKeys(KeySides(d.format, d.range), d.refine));
+  for (std::size_t s = 0; s < left.size(); ++s) slots[s] &= left[s];
+  return slots;
+}
+
 }  // namespace
 
 IntervalVolume::IntervalVolume(Parts parts)
@@ -35,7 +46,8 @@ IntervalVolume::IntervalVolume(Parts parts)
       keys_(std::move(parts.keys)),
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
-      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, parts.left, parts.surface),
+      left_(std::move(parts.left)),
+      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, relevant_slots(*this, left_), parts.surface),
       brick_regions_(description_.grid, regions_of_bricks(domain_, set_)),
       bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
@@ -96,8 +108,8 @@ Result<void> IntervalVolume::set_channels(std::vector<Channel> channels, std::ve
 }
 
 std::uint64_t IntervalVolume::lost_updates() const {
-  std::uint64_t lost = size();
-  for (BrickIndex brick{0}; brick < set_.bricks().size(); ++brick) lost -= relevant_.bound(brick).updates;
+  std::uint64_t lost = 0;
+  for (std::size_t s = 0; s < left_.size(); ++s) lost += std::uint64_t(std::popcount(set_.occupancy()[s] & ~left_[s]));
   return lost;
 }
 
@@ -107,8 +119,8 @@ std::size_t IntervalVolume::memory_bytes() const {
     for (const ValueKeys& keys : channel) of_channels += keys.memory_bytes();
   }
   return of_channels + sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
-         error_steps_.size() * sizeof(float) + relevant_.memory_bytes() + brick_regions_.memory_bytes() + bounds_->bytes +
-         (statistics_ ? statistics_->memory_bytes() : 0);
+         error_steps_.size() * sizeof(float) + left_.size() * sizeof(std::uint64_t) + relevant_.memory_bytes() + brick_regions_.memory_bytes() +
+         bounds_->bytes + (statistics_ ? statistics_->memory_bytes() : 0);
 }
 
 }  // namespace intervale

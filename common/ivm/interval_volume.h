@@ -63,11 +63,13 @@ class IntervalVolume {
   [[nodiscard]] std::span<const std::uint8_t> steps() const { return steps_; }
   [[nodiscard]] ValueKey key(UpdateIndex i) const { return keys_[i]; }  // of the value at the diamond's centre
   [[nodiscard]] const ValueKeys& keys() const { return keys_; }
-  // What the range of the description needs: all updates, but for those that a damaged file has lost (page_faults.h).
+  // What counts for the range of the description (front.h), but for lost updates.
   [[nodiscard]] const RelevantUpdates& relevant() const { return relevant_; }
   // By brick: where its diamonds are.
   [[nodiscard]] const ScreenError::Regions& brick_regions() const { return brick_regions_; }
-  // How many updates relevant() lacks for that reason. O(bricks).
+  // Of a supercube: the slots whose values a damaged file has not lost (page_faults.h). Closed under parents.
+  [[nodiscard]] std::uint64_t left(SupercubeIndex s) const { return left_.empty() ? set_.occupancy()[s] : left_[s]; }
+  // How many updates a damaged file has lost. O(supercubes) if there are any.
   [[nodiscard]] std::uint64_t lost_updates() const;
   // For other ranges than its own; it must have been refined uniformly. The first call finds them, in O(updates);
   // calls meanwhile wait for it. Any thread.
@@ -91,6 +93,7 @@ class IntervalVolume {
   ValueKeys keys_;
   std::vector<std::uint8_t> steps_;
   std::vector<float> error_steps_;
+  std::vector<std::uint64_t> left_;  // by supercube; empty: all
   RelevantUpdates relevant_;
   ScreenError::Regions brick_regions_;
   std::shared_ptr<LazyBounds> bounds_;  // not null; of all copies

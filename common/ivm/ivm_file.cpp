@@ -82,7 +82,7 @@ std::vector<std::uint8_t> coded_update_slopes(const IntervalVolume& volume) {
     std::size_t n = 0;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
       const BrickNeeds& needs = volume.relevant().brick(b);
-      const std::uint64_t relevant = needs.slots(n, set.occupancy()[s]);  // all, unless some were lost
+      const std::uint64_t relevant = needs.slots(n, set.occupancy()[s]);  // those of others are never read
       for (const Slot slot : set_bits<Slot>(set.occupancy()[s]))
         slopes.push_back((relevant >> slot & 1) != 0 ? needs.of_update(n, relevant, slot).slope : std::uint8_t(0));
       ++n;

@@ -41,7 +41,6 @@ SplitSet select(const IntervalVolume& volume, const RelevantUpdates& relevant, c
       }
     });
   }
-  if (is_closed(volume, relevant, lod)) return wanted;
   return select(set, [&wanted](const Place& p) { return wanted.contains(p.index); });
 }
 
@@ -62,13 +61,11 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const RelevantUp
       }
     });
   }
-  if (!is_closed(volume, relevant, lod)) {
-    SetNeighbours around(set);
-    set.for_each_up([&](const Place& p) {
-      if (!updates.contains(p.index)) return;
-      for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
-    });
-  }
+  SetNeighbours around(set);
+  set.for_each_up([&](const Place& p) {
+    if (!updates.contains(p.index)) return;
+    for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
+  });
   // A counting sort over the coarse to fine order.
   constexpr std::size_t kRanks = std::numeric_limits<Ranking::Rank>::max() + std::size_t(1);
   std::vector<std::size_t> begin(kRanks + 1, 0);

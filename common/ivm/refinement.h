@@ -1,8 +1,7 @@
 // Which updates a level of detail needs, and in which order. Pure functions of the updates' errors and positions.
 //
-// Weiss and De Floriani 2008, section 7. Errors are saturated, so all updates with an error above a threshold are closed
-// under parents. A selection of those that count for a range, or that depends on positions, is closed by one pass from
-// fine to coarse.
+// Weiss and De Floriani 2008, section 7. What is wanted for its own sake counts for a range (front.h) and is coarse enough;
+// one pass from fine to coarse adds all ancestors.
 #pragma once
 
 #include <array>
@@ -18,12 +17,6 @@
 #include "common/view/lod.h"
 
 namespace intervale {
-
-// Whether all that a level of detail wants of these updates is closed under parents, and no rank above its ancestors': so it
-// is by error alone, if no ancestors are left out.
-[[nodiscard]] inline bool is_closed(const IntervalVolume& volume, const RelevantUpdates& relevant, const Lod& lod) {
-  return &relevant == &volume.relevant() && !lod.roi && !lod.camera;
-}
 
 // The updates of `set` for which `wants` returns true, and all their ancestors.
 [[nodiscard]] SplitSet select(const SupercubeSet& set, const std::function<bool(const Place&)>& wants);

@@ -52,7 +52,44 @@ const std::array<Vertex, 64>& places_in_brick() {
   return kTable;
 }
 
+// Which of the slots count. first: the number of the supercube's first update.
+template <int Class>
+std::uint64_t counting_of(const IntervalVolume& volume, const CountingKeys& counts, const SplitLattice& lattice, std::uint64_t slots,
+                          UpdateIndex& next) {
+  VertexKeys around;
+  std::uint64_t word = 0;
+  for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[Class])) {
+    KeySpan span = lattice.gather<Class>(slot, around);
+    span.add(volume.key(next++));
+    word |= std::uint64_t(counts(span.least, span.greatest)) << slot;
+  }
+  return word;
+}
+
+std::uint64_t counting_slots(const IntervalVolume& volume, const CountingKeys& counts, SplitLattice& lattice, SupercubeKey key,
+                             std::uint64_t occupancy, UpdateIndex first) {
+  lattice.move_to(key);
+  (void)lattice.splittable(occupancy);
+  std::uint64_t word = counting_of<0>(volume, counts, lattice, occupancy, first);
+  word |= counting_of<1>(volume, counts, lattice, occupancy, first);
+  word |= counting_of<2>(volume, counts, lattice, occupancy, first);
+  return word;
+}
+
 }  // namespace
+
+std::vector<std::uint64_t> counting_slots(const IntervalVolume& volume, const CountingKeys& counts) {
+  const SupercubeSet& set = volume.set();
+  std::vector<std::uint64_t> words;
+  words.reserve(set.supercubes());
+  SplitLattice lattice(volume);
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
+      words.push_back(counting_slots(volume, counts, lattice, key, set.occupancy()[s], set.first(b, s)));
+    });
+  }
+  return words;
+}
 
 RelevantSlots::RelevantSlots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel)
     : volume_(volume),
@@ -76,9 +113,8 @@ std::vector<std::uint64_t> RelevantSlots::of(BrickIndex brick) const {
 RelevantSlots::Words RelevantSlots::none(BrickIndex brick) const { return Words(std::size_t(std::popcount(set_.bricks()[brick].mask))); }
 
 RelevantSlots::Words RelevantSlots::without_lost(BrickIndex brick, Words words) const {
-  const BrickNeeds& left = volume_.relevant().brick(brick);
   const SupercubeIndex first = set_.bricks()[brick].first_supercube;
-  for (std::size_t n = 0; n < words.size(); ++n) words[n] &= left.slots(n, set_.occupancy()[first + n]);
+  for (std::size_t n = 0; n < words.size(); ++n) words[n] &= volume_.left(first + n);
   return words;
 }
 
@@ -93,32 +129,12 @@ std::vector<std::uint64_t> RelevantSlots::of_coarse(BrickIndex brick) const {
   return words;
 }
 
-template <int Class>
-std::uint64_t RelevantSlots::counting_of(const SplitLattice& lattice, std::uint64_t occupancy, UpdateIndex& next) const {
-  VertexKeys around;
-  std::uint64_t word = 0;
-  for (const Slot slot : set_bits<Slot>(occupancy & kSlotsOfClass[Class])) {
-    KeySpan span = lattice.gather<Class>(slot, around);
-    span.add(volume_.key(next++));
-    word |= std::uint64_t(counts_(span.least, span.greatest)) << slot;
-  }
-  return word;
-}
-
 RelevantSlots::Words RelevantSlots::find_counting(BrickIndex brick) const {
   Words words;
   if (!has_any(brick)) return words;
   SplitLattice lattice(volume_);
   set_.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-    words.push_back(0);
-    if (!bounds_.is_relevant(counts_, s)) return;
-    const std::uint64_t occupancy = set_.occupancy()[s];
-    lattice.move_to(key);
-    (void)lattice.splittable(occupancy);
-    UpdateIndex next = set_.first(brick, s);
-    words.back() |= counting_of<0>(lattice, occupancy, next);
-    words.back() |= counting_of<1>(lattice, occupancy, next);
-    words.back() |= counting_of<2>(lattice, occupancy, next);
+    words.push_back(bounds_.is_relevant(counts_, s) ? counting_slots(volume_, counts_, lattice, key, set_.occupancy()[s], set_.first(brick, s)) : 0);
   });
   return words;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/ivm/interval_volume.h"
+#include "common/ivm/value_bounds.h"
 #include "common/util/bits.h"
 
 namespace intervale::testing {
@@ -19,6 +20,22 @@ inline ErrorToDistance to_distance_of(const RelevantUpdates& relevant, const Int
 inline bool is_relevant(const RelevantUpdates& relevant, const IntervalVolume& v, const Place& p) {
   return (slots_of(relevant, v, p.brick, p.supercube) >> unsigned(p.slot) & 1U) != 0;
 }
+
+// Whether an update counts, by what the values around its diamond say: the definition.
+inline bool counts_naively(const IntervalVolume& v, const ShownRange& shown, const Place& p) {
+  const CountingKeys counts(KeySides(v.description().format, shown.range), shown.refine);
+  const Diamond d(SupercubeSet::centre(p));
+  KeySpan span{v.key(p.index), v.key(p.index)};
+  for (int i = 0; i < int(d.row->vertices); ++i) {
+    const int corner = v.domain().corner_number(d.vertex(i));
+    const auto place = corner < 0 ? v.set().find(d.vertex(i)) : std::nullopt;
+    if (corner >= 0) span.add(v.description().corners[std::size_t(corner)]);
+    if (place) span.add(v.key(place->index));
+  }
+  return counts(span.least, span.greatest);
+}
+// Likewise, for the range of the data set.
+inline bool counts_naively(const IntervalVolume& v, const Place& p) { return counts_naively(v, v.description().whole(), p); }
 
 // Of an update; 0 if it is not relevant.
 inline BrickNeeds::OfUpdate of_update(const RelevantUpdates& relevant, const IntervalVolume& v, const Place& p) {

@@ -42,9 +42,12 @@ inline std::optional<Camera> random_ahead(const Lod& lod, const Grid& g, std::mt
   return random_camera(g, random);
 }
 
+// Of what is relevant to the volume's range.
 using VisitRank = std::function<void(const Place&, Ranking::Rank)>;
 inline void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const VisitRank& visit) {
-  v.set().for_each_down([&](const Place& p) { visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot)); });
+  v.set().for_each_down([&](const Place& p) {
+    if (is_relevant(v.relevant(), v, p)) visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot));
+  });
 }
 
 }  // namespace intervale::testing

@@ -58,7 +58,7 @@ void expect_right_values(const IntervalVolume& left, const IntervalVolume& whole
   const SupercubeSet& set = left.set();
   std::uint64_t count = 0;
   set.for_each_down([&](const Place& p) {
-    const auto has = [&](const Place& q) { return testing::is_relevant(left.relevant(), left, q); };
+    const auto has = [&](const Place& q) { return (left.left(q.supercube) >> unsigned(q.slot) & 1U) != 0; };
     if (!has(p)) return;
     ++count;
     ASSERT_EQ(left.key(p.index), whole.key(p.index));
@@ -81,8 +81,8 @@ void expect_mesh_of_what_is_left(const Shared& left, const Shared& whole, const 
   EXPECT_EQ(mesh->front().front.validate(), std::nullopt);
   const auto all = find_relevant_updates(whole, {shown}, Distances::none, on_all_cores);
   std::vector<std::uint64_t> slots;
-  const auto of_all = testing::slots_of(*all, *whole), of_left = testing::slots_of(left->relevant(), *left);
-  for (std::size_t s = 0; s < of_all.size(); ++s) slots.push_back(of_all[s] & of_left[s]);
+  const auto of_all = testing::slots_of(*all, *whole);
+  for (SupercubeIndex s{0}; s < of_all.size(); ++s) slots.push_back(of_all[s] & left->left(s));
   const RelevantUpdates expected(whole->description().grid, whole->set(), {whole->steps(), whole->error_steps()}, {shown}, slots,
                                  {std::vector<ErrorToDistance>(whole->set().supercubes())});
   const auto other = extract(*whole, expected, {shown}, {}, on_all_cores);

@@ -134,26 +134,14 @@ TEST_P(United, OrderAndRepetitionDoNotMatter) {
   EXPECT_TRUE(std::ranges::equal(codes, others, {}, &ErrorToDistance::code, &ErrorToDistance::code));
 }
 
-// Against what the values around each diamond say: the definition.
 TEST_P(United, APartHasWhatCounts) {
   const SupercubeSet& set = volume_->set();
   PartFinder finder(*volume_);
   for (const Refine refine : {Refine::boundary, Refine::uniform}) {
     const double alpha = std::uniform_real_distribution(-1.5, 1.5)(random_);
     const ShownRange shown{{alpha, alpha + 0.3}, refine};
-    const CountingKeys counts(KeySides(volume_->description().format, shown.range), refine);
     SplitSet expected(set.size());
-    const auto counts_itself = [&](const Place& p) {
-      const Diamond d(SupercubeSet::centre(p));
-      KeySpan span{volume_->key(p.index), volume_->key(p.index)};
-      for (int v = 0; v < int(d.row->vertices); ++v) {
-        const int corner = volume_->domain().corner_number(d.vertex(v));
-        const auto place = corner < 0 ? set.find(d.vertex(v)) : std::nullopt;
-        if (corner >= 0) span.add(volume_->description().corners[std::size_t(corner)]);
-        if (place) span.add(volume_->key(place->index));
-      }
-      return counts(span.least, span.greatest);
-    };
+    const auto counts_itself = [&](const Place& p) { return testing::counts_naively(*volume_, shown, p); };
     set.for_each_up([&](const Place& p) {
       if (counts_itself(p)) expected.insert(p.index);
     });

@@ -12,6 +12,7 @@
 #include "tests/support/batches.h"
 #include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/needs.h"
 
 namespace intervale {
 namespace {
@@ -91,6 +92,7 @@ class Receiver {
     Own own;
     for (UpdateIndex i : left()) {
       const Place p = volume_->set().place(i);
+      if (!testing::is_relevant(volume_->relevant(), *volume_, p)) continue;
       if (ranking.of_brick(p.brick).supercube(p.supercube, p.key)(i, p.slot) == 0) continue;
       ++own.updates;
       own.error = std::max(own.error, double(volume_->error(i)));
