@@ -1,4 +1,4 @@
-// What the client holds without having been sent it, and what it gives up.
+// What the client holds without having been sent it, what it gives up, and what is kept while it rests.
 #include <algorithm>
 #include <bit>
 
@@ -60,6 +60,31 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     keep(here.brick, bounds);
   });
   return true;
+}
+
+StreamPlan::Resting StreamPlan::rest() const {
+  Resting resting{{{volume_->set(), sent_}, sent_count_}, std::vector<Resting::Held>(channels_.size()), relevant_, shown_};
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    if (channels_[i].count != 0) resting.channels[i] = {{volume_->set(), channels_[i].held}, channels_[i].count};
+  }
+  return resting;
+}
+
+StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume, const Resting& resting)
+    : volume_(std::move(volume)),
+      sent_(resting.sent.updates.unpack(volume_->set())),
+      channels_(resting.channels.size()),
+      sent_count_(resting.sent.count) {
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    if (resting.channels[i].count != 0) channels_[i] = {resting.channels[i].updates.unpack(volume_->set()), resting.channels[i].count};
+  }
+  set_relevant(resting.relevant, resting.shown);
+}
+
+std::size_t StreamPlan::Resting::memory_bytes() const {
+  std::size_t bytes = sizeof *this + sent.updates.memory_bytes();
+  for (const Held& channel : channels) bytes += sizeof channel + channel.updates.memory_bytes();
+  return bytes;
 }
 
 }  // namespace intervale

@@ -65,6 +65,20 @@ tl::expected<bool, Fault> SessionState::grow() {
   return true;
 }
 
+void SessionState::rest() {
+  if (!may_rest()) return;
+  resting_ = plan_->rest();
+  plan_.reset();
+  search_.reset();
+  depth_.reset();
+}
+
+void SessionState::wake() {
+  if (!resting_) return;
+  plan_.emplace(volume_, *resting_);
+  resting_.reset();
+}
+
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
   if (!opened() || view_ != ViewState::none) return Fault{CloseCode::out_of_order, "Have is allowed between Open and the first View only"};
   if (!resumed_) return {};
@@ -89,6 +103,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (auto held = check_held(volume_->description(), shown); !held) return Fault{CloseCode::no_such_range, held.error().message};
   const auto channels = find_channels(volume_->description().channels, view.channels);
   if (!channels) return Fault{CloseCode::no_such_range, channels.error().message.substr(0, protocol::kMaxText)};
+  wake();
   if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
   if (!view.forget.empty()) ahead_percent_.reset();
   room_ = view.room.value_or(UINT64_MAX);

@@ -39,6 +39,8 @@ constexpr std::chrono::microseconds kMaxUnscheduled{200};
 constexpr std::chrono::milliseconds kFaultCost{100};
 // Work for a view that goes before that of other sessions: until its first message, but not for longer.
 constexpr std::chrono::milliseconds kUrgentWork{10};
+// A session that has all that its view wants, and gets no message for so long, rests (SessionState::rest()).
+constexpr std::chrono::seconds kRest{2};
 // Payloads while other sessions wait for a worker: the first of a view, and the others.
 constexpr std::size_t kContendedFirstPayload = 1 << 10, kContendedPayload = 16 << 10;
 
@@ -334,15 +336,24 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return message;
   }
 
-  // Until a message arrives, or the client's time to send Open or Credit is over.
+  // Until a message arrives, the client's time to send Open or Credit is over, or it is time to rest.
   asio::awaitable<void> wait() {
     auto deadline = Clock::time_point::max();
     if (!state_.opened()) deadline = open_deadline_;
     if (state_.needs_credit()) deadline = stalled_since_ + context_.options.stall_time;
+    const bool may_rest = state_.may_rest();
+    if (may_rest) deadline = Clock::now() + kRest;
     writer_wakeup_.expires_at(deadline);
     const auto [error] = co_await writer_wakeup_.async_wait(kAwait);
-    if (!error && Clock::now() >= deadline)
+    if (error || Clock::now() < deadline) co_return;
+    if (may_rest) {
+      const auto lane = co_await context_.scheduler.async_acquire(flow_, FairScheduler::Priority::bulk, asio::use_awaitable);
+      const ScheduledWork work{context_.scheduler, flow_, lane, FairScheduler::Priority::bulk};
+      state_.rest();  // unless a message has arrived meanwhile
+      memory_.resize(state_.memory_bytes());
+    } else {
       close({CloseCode::timed_out, state_.opened() ? "no credit was granted in time" : "no Open was received in time"});
+    }
   }
 
   asio::awaitable<bool> send(const protocol::ServerMessage& message) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -71,6 +72,27 @@ TEST(Crowds, WhenTheyHaveLeftTheMemoryIsBack) {
   EXPECT_TRUE(within(std::chrono::seconds(10), [&] { return resident() < before + (32 << 20); })) << resident() - before;
   EXPECT_EQ(upgrade_status(server.port(), {}), 101u);
   EXPECT_TRUE(eventually([&] { return counted() < 64 << 10; })) << "what remains are the connections that ask";
+}
+
+// What a client has is kept in fewer bytes while it rests, and nothing of it is sent again.
+TEST(Crowds, WhoRestsTakesLessMemory) {
+  ServerProgram server(buckyball().string());
+  const auto counted = [&] { return metric(server.port(), "intervale_memory_bytes{holder=\"sessions\"}"); };
+  const auto view = [](std::uint64_t epoch, double percent) {
+    Lod lod;
+    lod.error_percent = percent;
+    return protocol::View{.epoch = epoch, .lod = lod};
+  };
+  RawClient client(server.port()), other(server.port());
+  for (RawClient* const one : {&client, &other}) one->send(protocol::Open{"buckyball", "test", protocol::kDefaultWindow});
+  client.send(view(1, 5));
+  const std::uint64_t coarse = client.stream_to_end();
+  const double awake = counted();
+  EXPECT_TRUE(eventually([&] { return counted() < awake - 4096; })) << awake;
+  client.send(view(2, 0));
+  const std::uint64_t more = client.stream_to_end();
+  other.send(view(1, 0));
+  EXPECT_EQ(coarse + more, other.stream_to_end());
 }
 
 }  // namespace

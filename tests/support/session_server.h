@@ -48,7 +48,10 @@ class SessionServer {
         if (is_woken(may_wait ? std::chrono::seconds(60) : std::chrono::milliseconds(500))) continue;
         EXPECT_FALSE(may_wait) << "the server has forgotten the session";
       }
-      if (!message) return;
+      if (!message) {
+        if (rests_ = !rests_; rests_) state_.rest();  // every other time: what the client sees is the same
+        return;
+      }
       now_ += std::chrono::milliseconds(1);
       const auto event = client_.receive(protocol::encode(*message), now_);
       ASSERT_TRUE(event) << event.error().message;
@@ -89,7 +92,7 @@ class SessionServer {
   SessionState state_{find_granted(catalogue_, Scope::everything()), threads_};
   Client& client_;
   std::vector<protocol::ClientMessage> received_;
-  bool resumed_ = false;
+  bool resumed_ = false, rests_ = false;
   CreditWindow::Clock::time_point now_{};
 };
 
