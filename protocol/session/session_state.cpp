@@ -18,6 +18,10 @@ Fault other_version(std::uint32_t payload) {
                                         (theirs < protocol::kPayloadVersion ? ": update the client" : ": update the server")};
 }
 
+// Once a view is so exact, updates of every range with at least such errors go ahead of the rest of it: few, so that it is
+// not put off for long.
+constexpr double kCoarsePixels = 16, kAheadOfRestPercent = 40;
+constexpr std::uint64_t kAmpleRoom = 1 << 16;         // updates; in less room, ancestors may be most of what a view wants
 constexpr std::uint32_t kContendedVisits = 24 << 10;  // while other sessions wait: a fifth of a millisecond
 
 }  // namespace
@@ -184,21 +188,44 @@ bool SessionState::measure() {
   return true;
 }
 
-// After this view, which is complete.
-bool SessionState::goes_ahead() const {
-  const bool is_known = ahead_percent_ && coarse_percent_ && *ahead_percent_ <= *coarse_percent_;
-  return volume_->description().has_every_range && coarse_percent_ && !is_known && !plan_->is_full();
+// Down to which error updates of every range go ahead.
+double SessionState::percent_ahead(ViewState state) const {
+  return state == ViewState::ahead ? *coarse_percent_ : std::max(*coarse_percent_, kAheadOfRestPercent);
+}
+
+// Whether the client wants those, and may lack some.
+bool SessionState::lacks_ahead(ViewState state) const {
+  return coarse_percent_ && volume_->is_whole() && volume_->description().has_every_range && !plan_->is_full() &&
+         !(ahead_percent_ && *ahead_percent_ <= percent_ahead(state));
+}
+
+// Whether all that the view wants at kCoarsePixels is sent, and something goes before the rest, which surely finds room
+// afterwards.
+bool SessionState::goes_ahead_of_rest() const {
+  if (view_ != ViewState::streaming || !lod_.camera || lod_.camera->pixel_error >= kCoarsePixels || lod_.max_updates) return false;
+  if (!lacks_ahead(ViewState::ahead_of_rest) || (plan_->done() && !measurement_)) return false;
+  const StreamPlan::Remaining remaining = plan_->remaining();
+  return remaining.pixels <= kCoarsePixels && room_ >= kAmpleRoom && plan_->sent() + remaining.updates <= room_ / 2;
 }
 
 // A client that keeps a quarter of its room free for the next view gives up nothing for what goes ahead.
 void SessionState::begin_ahead() {
   if (!std::exchange(is_new_, false)) return;
+  rest_ = view_ == ViewState::ahead ? StreamPlan::Remaining() : plan_->remaining();
   plan_->set_relevant({volume_, &volume_->relevant()}, shown_);
   planned_.clear();  // no view's: not even one of every range has the same if other ranges are shown now
   Lod lod;
-  lod.error_percent = coarse_percent_;
+  lod.error_percent = percent_ahead(view_);
   plan_->set_lod(lod);
-  plan_->set_room(std::min(room_ - room_ / 4, lod_.max_updates.value_or(UINT64_MAX)));
+  const std::uint64_t room = view_ == ViewState::ahead ? room_ - room_ / 4 : plan_->sent() + room_ / 4;
+  plan_->set_room(std::min(room, lod_.max_updates.value_or(UINT64_MAX)));
+}
+
+void SessionState::end_ahead() {
+  if (!plan_->is_full()) ahead_percent_ = percent_ahead(view_);
+  plan_->set_room(room_);
+  is_new_ = view_ == ViewState::ahead_of_rest;
+  view_ = is_new_ ? ViewState::streaming : ViewState::done;
 }
 
 // Whether it is not known yet what is within the view's budget.
@@ -217,9 +244,8 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   if (!has_grown) return has_grown.error();
   if (*has_grown) return {};  // what follows is has_work()
   if (!has_work()) return {};
-  const bool is_ahead = view_ == ViewState::ahead;
   waits_ = false;
-  if (is_ahead) {
+  if (is_ahead()) {
     begin_ahead();
   } else if (!begin_view()) {
     waits_ = true;
@@ -237,26 +263,32 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   const bool others_wait = max_payload < protocol::kMaxBatchPayload;
   auto batch = plan_->next(size, others_wait ? kContendedVisits : StreamPlan::kMostVisits);
   if (!batch) {
-    const bool is_last = !measurement_ && (volume_->is_whole() || is_grown_);
     if (!plan_->done()) return {};
+    if (is_ahead()) {
+      end_ahead();
+      return {};
+    }
+    const bool is_last = !measurement_ && (volume_->is_whole() || is_grown_);
     if (!is_last && view_ == ViewState::unanswered) return message_of(plan_->no_updates());  // nothing lacks, as far as is known
     waits_ = !is_last;
     if (!is_last) return {};
-    if (is_ahead && !plan_->is_full()) ahead_percent_ = coarse_percent_;
-    is_new_ = !is_ahead && volume_->is_whole() && goes_ahead();
+    is_new_ = lacks_ahead(ViewState::ahead);
     view_ = is_new_ ? ViewState::ahead : ViewState::done;
-    if (is_ahead) return {};
     return protocol::Done{epoch_, plan_->sent(), plan_->is_full()};
   }
   view_bytes_ += others_wait ? size : batch->payload.size();  // fewer and larger batches take less processor time
-  return message_of(*std::move(batch));
+  auto message = message_of(*std::move(batch));
+  if (goes_ahead_of_rest()) {
+    view_ = ViewState::ahead_of_rest;
+    is_new_ = true;
+  }
+  return message;
 }
 
 // The message of a batch that is within the credit.
 protocol::Batch SessionState::message_of(Batch batch) {
-  const bool is_ahead = view_ == ViewState::ahead;
-  if (!is_ahead) view_ = ViewState::streaming;
-  StreamPlan::Remaining remaining = is_ahead ? StreamPlan::Remaining() : plan_->remaining();
+  if (!is_ahead()) view_ = ViewState::streaming;
+  StreamPlan::Remaining remaining = is_ahead() ? rest_ : plan_->remaining();
   if (measurement_) remaining.pixels = std::max(remaining.pixels, lod_.camera->pixel_error);  // what is not measured may move as far
   protocol::Batch message{
       epoch_, sequence_++, batch.updates, remaining.error, remaining.pixels, remaining.updates, std::move(batch.payload), std::move(batch.channels)};

@@ -67,9 +67,10 @@ class SessionState {
   [[nodiscard]] std::uint64_t updates_sent() const { return resting_ ? resting_->sent.count : plan_ ? plan_->sent() : 0; }
 
  private:
-  // Of the last view: there is none yet; nothing, or something, was sent for it; Done was sent, and coarse updates of
-  // every range follow; nothing more follows.
-  enum class ViewState { none, unanswered, streaming, ahead, done };
+  // Of the last view: there is none yet; nothing, or something, was sent for it; all that it wants at kCoarsePixels was, and
+  // the coarsest updates of every range go before the rest of it; Done was sent, and coarse updates of every range follow;
+  // nothing more follows.
+  enum class ViewState { none, unanswered, streaming, ahead_of_rest, ahead, done };
 
   // Sets of more updates are nearly whole and gain little, and packing them takes long.
   static constexpr std::uint64_t kMostAtRest = 1 << 18;
@@ -86,8 +87,12 @@ class SessionState {
   [[nodiscard]] bool is_searching();
   bool estimate();
   bool measure();
-  [[nodiscard]] bool goes_ahead() const;
+  [[nodiscard]] bool is_ahead() const { return view_ == ViewState::ahead || view_ == ViewState::ahead_of_rest; }
+  [[nodiscard]] double percent_ahead(ViewState state) const;
+  [[nodiscard]] bool lacks_ahead(ViewState state) const;
+  [[nodiscard]] bool goes_ahead_of_rest() const;
   void begin_ahead();
+  void end_ahead();
   protocol::Batch message_of(Batch batch);
   void set_relevant(const RangeAnswer::Relevant& relevant, bool is_measured);
 
@@ -107,6 +112,7 @@ class SessionState {
   std::optional<double> ahead_percent_;                        // the client has every range down to this error
   bool is_early_ = false;                                      // the last view takes estimates
   bool is_new_ = false;                                        // the plan does not have the last view yet, or what goes ahead
+  StreamPlan::Remaining rest_;                                 // of the view, while something goes ahead of it
   ShownRanges planned_;                                        // that the plan has; none while it goes ahead
   bool is_measured_ = true;                                    // how far surfaces move, of those
   std::shared_ptr<const RangeAnswer> estimate_, measurement_;  // of shown_; nullptr if there is no need

@@ -166,6 +166,20 @@ TEST_F(EveryRange, ADragFindsWhatFollowedDone) {
   EXPECT_EQ(client.end().code, static_cast<unsigned>(protocol::CloseCode::malformed));
 }
 
+TEST_F(EveryRange, TheCoarsestOfEveryRangeGoAheadOfTheRestOfAView) {
+  const ServerProgram server(every);
+  Lod lod;
+  lod.camera = Camera{.eye = {60, -50, 40}, .look_at = {16, 16, 16}, .up = {0, 0, 1}, .fov = 45, .viewport = {1920, 1080}, .pixel_error = 0.25};
+  const auto updates = [&](std::optional<double> percent) {
+    RawClient client(server.port());
+    client.send(protocol::Open{"every", "test", protocol::kDefaultWindow});
+    client.send(protocol::View{.epoch = 1, .lod = lod, .shown = {{{-0.5, 0.25}}, {}}, .coarse_error_percent = percent});
+    return client.stream_to_end();
+  };
+  EXPECT_GT(updates(10), updates({}));
+  EXPECT_EQ(updates(100), updates({})) << "no error is above";
+}
+
 TEST_F(EveryRange, WrongUsageIsSaid) {
   ASSERT_EQ(run({program("intervale"), "build", volume, "-o", one, "--range", "0", "1"}).status, 0);
   const auto complains = [](const std::vector<std::string>& arguments, const std::string& about, int status = 2) {
