@@ -13,6 +13,7 @@
 #include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/needs.h"
+#include "tests/support/parents.h"
 
 namespace intervale {
 namespace {
@@ -60,6 +61,18 @@ class Receiver {
   void set_lod(const Lod& lod) {
     wanted_ = in_order(*volume_, select(*volume_, lod), lod);
     if (lod.max_updates && wanted_.size() > *lod.max_updates) wanted_.resize(*lod.max_updates);
+    // At the budget's end may be ancestors of what has no room, which would change no mesh.
+    SplitSet needed(volume_->size());
+    const auto is_idle = [&](UpdateIndex i) {
+      const Place p = volume_->set().place(i);
+      if (!testing::is_relevant(volume_->relevant(), *volume_, p) && !needed.contains(i)) return true;
+      testing::for_each_parent(volume_->set(), p, [&](UpdateIndex parent) { needed.insert(parent); });
+      return false;
+    };
+    std::reverse(wanted_.begin(), wanted_.end());  // descendants first
+    std::vector<UpdateIndex> kept;
+    std::copy_if(wanted_.begin(), wanted_.end(), std::back_inserter(kept), [&](UpdateIndex i) { return !is_idle(i); });
+    wanted_.assign(kept.rbegin(), kept.rend());
   }
   // Takes a batch; what was sent before, or before its parents, is refused.
   Result<std::uint64_t> take(const Batch& batch) {
