@@ -74,8 +74,8 @@ struct View {
   // The server may begin before it is known how far the surfaces of the ranges move. The mesh may get finer than the
   // view asks for.
   bool early = false;
-  // After Done, updates of every range follow whose error is greater than this: 0 to 100 percent of the data set's
-  // max_error. Only from a data set of every range.
+  // Updates of every range, too, whose error is greater than this: 0 to 100 percent of the data set's max_error. They follow
+  // Done; the coarsest may come before. Only from a data set of every range.
   std::optional<double> coarse_error_percent = {};
   std::vector<std::string> channels = {};  // whose values are sent with the updates: names of the data set's
   // What the lod's camera sees of the client's mesh: updates that lie behind are sent last.

@@ -211,7 +211,7 @@ bool SessionState::goes_ahead_of_rest() const {
 // A client that keeps a quarter of its room free for the next view gives up nothing for what goes ahead.
 void SessionState::begin_ahead() {
   if (!std::exchange(is_new_, false)) return;
-  rest_ = view_ == ViewState::ahead ? StreamPlan::Remaining() : plan_->remaining();
+  left_of_view_ = view_ == ViewState::ahead ? StreamPlan::Remaining() : plan_->remaining();
   plan_->set_relevant({volume_, &volume_->relevant()}, shown_);
   planned_.clear();  // no view's: not even one of every range has the same if other ranges are shown now
   Lod lod;
@@ -288,7 +288,7 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
 // The message of a batch that is within the credit.
 protocol::Batch SessionState::message_of(Batch batch) {
   if (!is_ahead()) view_ = ViewState::streaming;
-  StreamPlan::Remaining remaining = is_ahead() ? rest_ : plan_->remaining();
+  StreamPlan::Remaining remaining = is_ahead() ? left_of_view_ : plan_->remaining();
   if (measurement_) remaining.pixels = std::max(remaining.pixels, lod_.camera->pixel_error);  // what is not measured may move as far
   protocol::Batch message{
       epoch_, sequence_++, batch.updates, remaining.error, remaining.pixels, remaining.updates, std::move(batch.payload), std::move(batch.channels)};

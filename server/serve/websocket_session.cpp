@@ -212,10 +212,10 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return protocol::decode_client_message(bytes);
   }
 
-  // Opening, resuming and forgetting take up to a millisecond.
-  static bool takes_long(const protocol::ClientMessage& message) {
+  // Opening, resuming and forgetting take up to a millisecond, and the first view after a rest some.
+  [[nodiscard]] bool takes_long(const protocol::ClientMessage& message) const {
     const auto* const view = std::get_if<protocol::View>(&message);
-    return view != nullptr ? !view->forget.empty()
+    return view != nullptr ? !view->forget.empty() || state_.rests()
                            : std::holds_alternative<protocol::Open>(message) || std::holds_alternative<protocol::Have>(message);
   }
 

@@ -61,18 +61,14 @@ class Receiver {
   void set_lod(const Lod& lod) {
     wanted_ = in_order(*volume_, select(*volume_, lod), lod);
     if (lod.max_updates && wanted_.size() > *lod.max_updates) wanted_.resize(*lod.max_updates);
-    // At the budget's end may be ancestors of what has no room, which would change no mesh.
+    // The last ones within the budget may be ancestors of what is not: those would change no mesh.
     SplitSet needed(volume_->size());
-    const auto is_idle = [&](UpdateIndex i) {
-      const Place p = volume_->set().place(i);
-      if (!testing::is_relevant(volume_->relevant(), *volume_, p) && !needed.contains(i)) return true;
-      testing::for_each_parent(volume_->set(), p, [&](UpdateIndex parent) { needed.insert(parent); });
-      return false;
-    };
-    std::reverse(wanted_.begin(), wanted_.end());  // descendants first
-    std::vector<UpdateIndex> kept;
-    std::copy_if(wanted_.begin(), wanted_.end(), std::back_inserter(kept), [&](UpdateIndex i) { return !is_idle(i); });
-    wanted_.assign(kept.rbegin(), kept.rend());
+    for (std::size_t k = wanted_.size(); k-- > 0;) {
+      const Place p = volume_->set().place(wanted_[k]);
+      if (testing::is_relevant(volume_->relevant(), *volume_, p)) needed.insert(p.index);
+      if (needed.contains(p.index)) testing::for_each_parent(volume_->set(), p, [&](UpdateIndex parent) { needed.insert(parent); });
+    }
+    std::erase_if(wanted_, [&](UpdateIndex i) { return !needed.contains(i); });
   }
   // Takes a batch; what was sent before, or before its parents, is refused.
   Result<std::uint64_t> take(const Batch& batch) {
