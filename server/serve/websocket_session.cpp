@@ -68,9 +68,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   WebSocketSession& operator=(const WebSocketSession&) = delete;
 
   ~WebSocketSession() override {
-    if (peer_.scope) context_.metrics.sessions.Decrement();
+    context_.metrics.count_close(close_code_);  // first: who finds no session any more finds how they ended
     context_.metrics.connections.Decrement();
-    context_.metrics.count_close(close_code_);
+    if (peer_.scope) context_.metrics.sessions.Decrement();
     log_session(id_, spdlog::level::info, "closed: dataset '{}', {} updates, {} bytes, code {}{}", state_.dataset(), state_.updates_sent(),
                 bytes_sent_, close_code_, close_note_.empty() ? "" : " (" + close_note_ + ")");
   }
