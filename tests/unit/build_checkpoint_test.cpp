@@ -160,7 +160,7 @@ TEST_F(CheckpointTest, ErrorsOfScalesAreThereUntilTheValuesAre) {
 TEST_F(CheckpointTest, EveryTruncationLeavesWhatIsWhole) {
   keep_all();
   const std::string whole = contents_of(path);
-  const std::size_t step = whole.size() / 1500 + 1;
+  const std::size_t step = whole.size() / 500 + 1;
   for (std::size_t bytes = 0; bytes < whole.size(); bytes += step) {
     folder.file("out.ivm.resume", whole.substr(0, bytes));
     EXPECT_LT(count_good(*open()), 4) << bytes;
@@ -171,7 +171,7 @@ TEST_F(CheckpointTest, EveryTruncationLeavesWhatIsWhole) {
 TEST_F(CheckpointTest, FlippedBytesAreDroppedOrRefused) {
   keep_all();
   const std::string whole = contents_of(path);
-  const std::size_t step = whole.size() / 700 + 1;
+  const std::size_t step = whole.size() / 300 + 1;
   for (std::size_t at = 0; at < whole.size(); at += at < 200 ? 1 : step) {
     std::string damaged = whole;
     damaged[at] = char(damaged[at] ^ (1 << at % 8));

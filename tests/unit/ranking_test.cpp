@@ -231,7 +231,7 @@ TEST_P(Ranks, GrowWithTheSquaredDeviationInThePicture) {
   parts.surface.slopes.clear();
   const IntervalVolume without = IntervalVolume::assemble(std::move(parts)).value();
   const double spacing = std::cbrt(g.affine.spacing()[0] * g.affine.spacing()[1] * g.affine.spacing()[2]);
-  for (int trial = 0; trial < 40; ++trial) {
+  for (int trial = 0; trial < 20; ++trial) {
     Lod lod;
     lod.camera = testing::random_camera(g, random_);
     lod.camera->pixel_error = std::pow(2.0, testing::uniform(random_, -8, 3));

@@ -240,7 +240,7 @@ TEST(RemoteVolume, AFileThatChangesIsReadAgain) {
   options.shown.ranges = {{1.3, 1.5}};
   const auto wanted = fetch_local(whole(other), options, {});
   ASSERT_TRUE(wanted);
-  for (const std::size_t from : {1, 3, 5}) {
+  for (const std::size_t from : {1, 4}) {
     FileServer server(contents());
     server.misbehave([from, has = false](const FileRequest& request, std::size_t number, FileAnswer& answer) mutable {
       if (number >= from && !request.header("if-match").empty() && !std::exchange(has, true)) answer = {.status = 412};

@@ -54,6 +54,7 @@ async function toldAt(page, i, j, k, clip) {
   await page.mouse.move(x + width / 2 + 3, y + height / 2);
   await page.mouse.move(x + (width - 1) / 2 + 0.5, y + (height - 1) / 2 + 0.5);
   await page.waitForFunction(() => document.querySelector('#probe-value').textContent !== '' && !document.querySelector('#probe-label').hidden);
+  await page.waitForFunction(() => !document.querySelector('#probe-others').textContent.includes('…'));
   await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 200)));
   return page.$$eval('#probe-label *', (parts) => parts.map((part) => part.textContent));
 }
@@ -63,16 +64,17 @@ test('at a sample the probe tells its value exactly, on the side of the box and 
   await settled(page);
   if ((await sizeOf(page))[1] % 2 === 0) await page.setViewportSize({ width: 401, height: 341 });
   for (const [i, k] of [[1, 1], [4, 6], [7, 3]]) {
-    assert.deepEqual(await toldAt(page, i, 0, k, null), [`density = ${valueAt(i, 0, k)} HU`, `${i * kSpacing}, 0, ${k * kSpacing} mm`], `sample ${i}, 0, ${k}`);
+    assert.deepEqual(await toldAt(page, i, 0, k, null), [`density = ${valueAt(i, 0, k)} HU`, `heat = ${valueAt(i, 0, k, heat)} K`, `${i * kSpacing}, 0, ${k * kSpacing} mm`], `sample ${i}, 0, ${k}`);
   }
   const [i, j, k] = [5, 4, 2];
   const cut = { normal: [0, -1, 0], offset: -j * kSpacing };
-  assert.deepEqual(await toldAt(page, i, j, k, cut), [`density = ${valueAt(i, j, k)} HU`, `${i * kSpacing}, ${j * kSpacing}, ${k * kSpacing} mm`]);
+  assert.deepEqual(await toldAt(page, i, j, k, cut), [`density = ${valueAt(i, j, k)} HU`, `heat = ${valueAt(i, j, k, heat)} K`, `${i * kSpacing}, ${j * kSpacing}, ${k * kSpacing} mm`]);
   await page.evaluate(() => window.intervale.set({ colorBy: 'value', channel: 'heat' }));
   await page.waitForFunction(() => document.querySelector('#legend-title').textContent === 'heat, K');
   await settled(page);
-  const [value] = await toldAt(page, i, j, k, cut);
+  const [value, others] = await toldAt(page, i, j, k, cut);
   assert.equal(value, `heat = ${valueAt(i, j, k, heat)} K`);
+  assert.equal(others, `density = ${valueAt(i, j, k)} HU`);
   assert.deepEqual(errors, []);
   await close();
 });

@@ -21,6 +21,7 @@
 #include "client/view/point_values.h"
 #include "client/view/stand_in.h"
 #include "client/view/tets_in_box.h"
+#include "client/view/values_at.h"
 #include "client/view/viewing_session.h"
 #include "client/view/volume_tets.h"
 #include "client/web/core/js_surface.h"
@@ -72,6 +73,7 @@ class Viewer {
     if (view["uniform"].as<bool>()) wanted.shown.refine = Refine::uniform;
     refine_ = wanted.shown.refine;
     if (const val channel = view["channel"]; !channel.isNull()) wanted.channels = {channel.as<std::string>()};
+    for (int i = 0, count = view["probed"]["length"].as<int>(); i < count; ++i) wanted.channels.push_back(view["probed"][i].as<std::string>());
     if (!view["region"].isNull()) wanted.region = box_of(view["region"]);
     wanted.budget = {limit_of(view["maxTets"]), limit_of(view["maxUpdates"])};
     wanted.is_opaque = view["opaque"].as<bool>();
@@ -292,6 +294,15 @@ class Viewer {
   val volume_order(const val& eye) const { return buffer_of(volume_.order(three(eye))); }
   void drop_volume() { volume_ = {}; }
 
+  // Of a 'probed' of messages.ts.
+  [[nodiscard]] val probe(const val& point) const {
+    const auto found = session_.mesh() == nullptr ? std::nullopt : values_at(*session_.mesh(), three(point));
+    if (!found) return val::null();
+    std::vector<double> values{found->field};
+    values.insert(values.end(), found->channels.begin(), found->channels.end());
+    return array_of(values);
+  }
+
   // The mesh as a file of the format of this path's extension: its bytes, or a text that says why there are none.
   [[nodiscard]] val save(const std::string& path) const {
     std::vector<std::byte> file;
@@ -387,6 +398,7 @@ EMSCRIPTEN_BINDINGS(intervale) {
       .function("volume", &Viewer::volume)
       .function("volumeOrder", &Viewer::volume_order)
       .function("dropVolume", &Viewer::drop_volume)
+      .function("probe", &Viewer::probe)
       .function("save", &Viewer::save)
       .function("digest", &Viewer::digest);
 }

@@ -56,7 +56,7 @@ class Page {
       this.volume?.update();
     });
     this.volume = new VolumeControls(view, status, viewer, this.valueColors);
-    this.probe = new Probe(view, status, viewer);
+    this.probe = new Probe(view, status, viewer, this.mesh);
     this.watchViewer();
     view.watch([], (value) => {
       const chosen = value.dataset !== status.value.dataset?.name && status.value.datasets?.find(({ name }) => name === value.dataset);
@@ -179,8 +179,9 @@ class Page {
     const opaque = hides && !volume && !clip && !wireframe && !tets && !thickness;
     const [ranges, uniform] = [dataset ? rangesOf(dataset, view.value) : [], volume && !!dataset?.hasRangesWithin];
     const channel = channelOf(dataset, view.value)?.name ?? null;
+    const probed = probe ? (dataset?.channels ?? []).map(({ name }) => name).filter((name) => name !== channel) : [];
     return {
-      view: { camera: { ...pose, viewport }, ranges, uniform, channel, pixelError, region, opaque, maxTets, maxUpdates: updatesIn(memory) },
+      view: { camera: { ...pose, viewport }, ranges, uniform, channel, probed, pixelError, region, opaque, maxTets, maxUpdates: updatesIn(memory) },
       plane: clip,
       tetsBox: tets ? region : null,
       edges: wireframe,

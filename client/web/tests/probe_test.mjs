@@ -6,7 +6,7 @@ const { onPage } = sharedPages();
 const kStyles = (opacities) => Object.entries(opacities).map(([name, opacity]) => `&${name}=808080,${opacity}`).join('');
 const withProbe = (hash, opacities = {}) => ({ width: 760, height: 400, hash: `#data=gyroid&show=probe${hash}${kStyles(opacities)}` });
 
-const label = async (page) => (await page.isVisible('#probe-label')) ? page.$$eval('#probe-label *', (parts) => parts.map((part) => part.textContent)) : null;
+const label = async (page) => (await page.isVisible('#probe-label')) ? page.$$eval('#probe-value, #probe-position', (parts) => parts.map((part) => part.textContent)) : null;
 // What the probe tells at points in the middle of the canvas, but where a handle is.
 async function sweep(page, columns = 5, rows = 3) {
   const { x, y, width, height } = await page.locator('#canvas').boundingBox();
@@ -49,6 +49,18 @@ onPage('tells the values of a cut, between those of the surfaces, at points of t
   assert.ok(values.every((value) => value >= -0.45 && value <= 0.75) && new Set(values).size > 2, String(values));
   assert.ok(told.every(({ position: [x] }) => Math.abs(x - 3) < 0.02), JSON.stringify(told));
 }, withProbe('&clip=1,0,0,3', { alpha: 0, beta: 0, box: 0 }));
+
+onPage('tells the values of channels beside it, as soon as they are there', async (page) => {
+  const others = () => page.textContent('#probe-others');
+  const told = await sweep(page, 3, 3);
+  assert.ok(told.length > 0);
+  await page.waitForFunction(() => document.querySelector('#probe-others').textContent === 'heat = 2.5 K');
+  await page.evaluate(() => window.intervale.set({ colorBy: 'value', channel: 'heat' }));
+  await page.waitForFunction(() => document.querySelector('#probe-others').textContent.startsWith('field = '));
+  const { value: fieldValue } = told.at(-1);
+  assert.match(await others(), /^field = [−0-9.]+$/);
+  assert.match(fieldValue, /^field = /);
+}, { ...withProbe(''), hash: '#data=any&show=probe' });
 
 onPage('a tap tells what is there, a finger that moves does not', async (page) => {
   await page.evaluate(() => (window.intervale.canvas.setPointerCapture = () => {}));

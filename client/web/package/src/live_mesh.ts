@@ -3,7 +3,7 @@
 import { type Dataset, listDatasets } from './datasets.js';
 import { fitted } from './camera.js';
 import { frameOf } from './frame.js';
-import type { Box, MeshFormat, Plane, Report, Request, View } from './messages.js';
+import type { Box, MeshFormat, Plane, Report, Request, Vec3, View } from './messages.js';
 import { type Range, rangeOf } from './ranges.js';
 
 const kIntervalMs = 100; // least time between two views, or two boxes of tetrahedra
@@ -35,6 +35,7 @@ export function viewOf(dataset: Dataset, viewport: [number, number] = kViewport,
     ranges: range ? [range] : [],
     uniform: false,
     channel: null,
+    probed: [],
     pixelError: 1,
     region: null,
     opaque: false,
@@ -155,6 +156,16 @@ export class LiveMesh extends (EventTarget as new () => Target) {
   async save(format: MeshFormat): Promise<ArrayBuffer> {
     this.send({ type: 'save', format });
     return (await this.answer('saved')).bytes;
+  }
+
+  // At a point of the world: of the field, then of the data set's channels in their order, of a vector the length; NaN where
+  // the view does not bring them along (View.probed). null outside of the data set's box, or before there is a mesh.
+  async valuesAt(at: Vec3): Promise<number[] | null> {
+    this.send({ type: 'probe', at });
+    for (;;) {
+      const { at: answered, values } = await this.answer('probed');
+      if (sameJson(answered, at)) return values;
+    }
   }
 
   // Of the mesh: equal for equal meshes, whichever program made them.

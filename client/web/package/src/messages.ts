@@ -47,6 +47,7 @@ export type Request =
   // null: none is wanted.
   | { type: 'standIn'; triangles: number | null }
   | { type: 'shown'; version: number } // the page shows this version of the surface, so the next may be made
+  | { type: 'probe'; at: Vec3 } // answered by a report 'probed'
   | { type: 'save'; format: MeshFormat }
   | { type: 'digest' }; // answered by a report of the same type
 
@@ -64,6 +65,7 @@ export interface View {
   ranges: [number, number][]; // of values, four at most; a mesh is made for each; none: the data set's own
   uniform: boolean; // whether the inside of the ranges is refined, too, and not only their surfaces; the data set must have it
   channel: string | null; // of the data set, whose values come along; null: none
+  probed: string[]; // other channels whose values come along, for 'probe'
   pixelError: number; // largest screen-space error, pixels; above 0
   region: Box | null; // outside it the mesh is as coarse as conformity allows, whatever was received
   opaque: boolean; // whether surfaces hide what is behind them, and nothing is cut away: what they hide is sent last
@@ -86,6 +88,9 @@ export type Report =
   | { type: 'volume'; volume: Volume }
   | { type: 'order'; version: number; order: ArrayBuffer } // another order of the volume of this version; see Volume
   | { type: 'preview' }
+  // Interpolated at a point of the world, in the mesh's tetrahedron there: of the field, then of the data set's channels in their
+  // order, of a vector the length; NaN where values did not come along. null: outside of the box, or there is no mesh.
+  | { type: 'probed'; at: Vec3; values: number[] | null }
   | { type: 'saved'; format: MeshFormat; name: string; bytes: ArrayBuffer }
   | { type: 'digest'; digest: string; updates: number; tets: number }
   | { type: 'error'; text: string }; // for the user; the session is closed

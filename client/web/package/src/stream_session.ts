@@ -204,6 +204,10 @@ export class StreamSession {
     this.report({ type: 'saved', format, name: `${this.request.dataset}.${format}`, bytes }, [bytes]);
   }
 
+  probe(at: Vec3): void {
+    this.report({ type: 'probed', at, values: this.viewer.probe(at) });
+  }
+
   digest(): void {
     if (!this.isOpen) return;
     const { updatesInMesh, tets } = this.viewer.progress();

@@ -51,6 +51,8 @@ async function handle(request: Request): Promise<void> {
       return session?.wantStandIn();
     case 'shown':
       return session?.pageShows(request.version);
+    case 'probe':
+      return session?.probe(request.at);
     case 'save':
       return session?.save(request.format);
     case 'digest':

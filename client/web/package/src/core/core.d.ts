@@ -31,6 +31,7 @@ export interface Viewer {
   volume(): Pick<Volume, 'points' | 'tets'>; // empty without wantValues()
   volumeOrder(eye: Vec3): ArrayBuffer; // of the last volume()
   dropVolume(): void; // frees what volumeOrder() needs
+  probe(at: Vec3): number[] | null;
   save(path: string): ArrayBuffer | string; // the file, in the format of the path's extension; or an error
   digest(): string;
   delete(): void;
