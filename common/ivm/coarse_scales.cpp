@@ -38,6 +38,15 @@ Result<std::vector<std::byte>> read_part(std::ifstream& in, std::uint64_t first,
 
 }  // namespace
 
+std::uint64_t start_bytes(std::span<const std::byte> start, std::uint64_t file_bytes) {
+  constexpr std::uint64_t kMostIndex = 16 * (kMostSamples >> 16);  // bytes; of pages a quarter as full as they may be
+  const auto scope = scope_of(start, file_bytes);
+  if (!scope || *scope != FileScope::every_range) return start.size();
+  const auto index = place_of(StreamType::page_index, start, file_bytes, *scope);
+  if (!index || index->bytes > kMostIndex || index->offset > file_bytes || index->bytes > file_bytes - index->offset) return start.size();
+  return std::max<std::uint64_t>(start.size(), index->offset + index->bytes);
+}
+
 Result<std::vector<CoarseScales>> coarse_scales(std::span<const std::byte> start, std::uint64_t file_bytes) {
   const auto scope = scope_of(start, file_bytes);
   if (!scope) return tl::unexpected(scope.error());
@@ -54,9 +63,11 @@ Result<std::vector<CoarseScales>> coarse_scales(std::span<const std::byte> start
     return scales;
   const std::vector<std::uint64_t> lengths = page_lengths(start.subspan(std::size_t(index.offset), std::size_t(index.bytes)));
   const Domain domain(grid.dims);
+  std::vector<BlockSize> blocks;
   for (int finest = domain.levels() - 1; finest > 0; --finest) {
-    const SupercubeSet set = all_diamonds(domain, serial, finest);
-    const std::size_t count = pages_of(set).size();
+    const std::vector<BlockSize> of_scale = block_sizes(domain, finest);
+    blocks.insert(blocks.end(), of_scale.begin(), of_scale.end());
+    const std::size_t count = page_starts(blocks).size();
     if (count >= lengths.size()) break;
     CoarseScales next{finest, pages.offset, file_bytes - pages.offset - pages.bytes};
     for (std::size_t page = 0; page < count; ++page) next.first_bytes += std::min(lengths[page], file_bytes);
@@ -95,8 +106,12 @@ Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::file
   const std::streamoff size = in ? std::streamoff(in.tellg()) : -1;
   if (size < 0) return fail("could not be read");
   const auto bytes = std::uint64_t(size);
-  const auto start = read_part(in, 0, std::min<std::uint64_t>(bytes, kStartBytes));
+  auto start = read_part(in, 0, std::min<std::uint64_t>(bytes, kStartBytes));
   if (!start) return tl::unexpected(start.error());
+  if (const std::uint64_t needed = start_bytes(*start, bytes); needed > start->size()) {
+    start = read_part(in, 0, needed);
+    if (!start) return tl::unexpected(start.error());
+  }
   const auto scales = coarse_scales(*start, bytes);
   if (!scales) return tl::unexpected(scales.error());
   const auto next =

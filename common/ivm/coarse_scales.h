@@ -29,10 +29,13 @@ struct CoarseScales {
 
 // The first bytes of a file that coarse_scales() needs to have of all but the largest.
 inline constexpr std::size_t kStartBytes = 64 << 10;
+// How many it needs, if `start` are kStartBytes or all: up to the end of the index of the pages, some 16 bytes for each page
+// of 262,144 diamonds. No more than `start` has where it will find none, or the index is too long to be one.
+[[nodiscard]] std::uint64_t start_bytes(std::span<const std::byte> start, std::uint64_t file_bytes);
 
 // What can be had of a file before all of it, from the coarsest on: the scales of the first page, and then each further one
 // but the finest. None of a data set of one range, one with channels, one that is a single page, and where `start` ends
-// within the index of the pages. start: the file's first bytes, kStartBytes or all. Fails if they begin no .ivm file of so
+// within the index of the pages. start: the file's first bytes, start_bytes() or all. Fails if they begin no .ivm file of so
 // many bytes.
 [[nodiscard]] Result<std::vector<CoarseScales>> coarse_scales(std::span<const std::byte> start, std::uint64_t file_bytes);
 

@@ -166,7 +166,7 @@ Result<ValueVolume> decode_coarse_values(const FileEnds& ends, std::string name,
   if (!parts) return tl::unexpected(parts.error());
   const Domain domain(parts->description.grid.dims);
   parts->set = all_diamonds(domain, parallel, finest);
-  parts->finer = count_diamonds(domain) - parts->set.size();
+  parts->finer = std::size_t(count_diamonds(domain)) - parts->set.size();
   parts->keys = ValueKeys(0, parts->description.format.last);
   auto index = (*file)[StreamType::page_index], pages = (*file)[StreamType::pages];
   if (auto ok = take_pages(index, pages, *parts, parallel, nullptr); !ok) return tl::unexpected(ok.error());

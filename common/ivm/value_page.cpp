@@ -166,6 +166,25 @@ std::vector<std::size_t> page_starts(std::span<const BlockSize> blocks) {
   return starts;
 }
 
+std::vector<BlockSize> block_sizes(const Domain& domain, int scale) {
+  const Vertex last = last_supercube(domain, scale);
+  std::vector<std::pair<BlockKey, std::uint64_t>> blocks;  // with their diamonds
+  for (BlockPlace place{scale, {}}; place.at.z <= last.z >> 4; ++place.at.z) {
+    for (place.at.y = 0; place.at.y <= last.y >> 4; ++place.at.y) {
+      for (place.at.x = 0; place.at.x <= last.x >> 4; ++place.at.x) {
+        const Vertex first{place.at.x << 4, place.at.y << 4, place.at.z << 4};
+        const Vertex end{std::min(first.x + 15, last.x), std::min(first.y + 15, last.y), std::min(first.z + 15, last.z)};
+        if (const std::uint64_t diamonds = count_diamonds(domain, scale, first, end); diamonds > 0) blocks.emplace_back(block_at(place), diamonds);
+      }
+    }
+  }
+  std::sort(blocks.begin(), blocks.end());
+  std::vector<BlockSize> sizes;
+  sizes.reserve(blocks.size());
+  for (const auto& [key, diamonds] : blocks) sizes.push_back({scale, std::uint32_t(diamonds)});
+  return sizes;
+}
+
 std::vector<ValuePage> pages_of(const SupercubeSet& set) {
   const std::vector<BrickRun> blocks = blocks_of(set);
   std::vector<BlockSize> sizes;

@@ -32,6 +32,8 @@ struct BlockSize {
   std::uint32_t diamonds = 0;
 };
 [[nodiscard]] std::vector<std::size_t> page_starts(std::span<const BlockSize> blocks);
+// The blocks of all diamonds of a scale (all_diamonds()), in order, none empty. Some microseconds for each.
+[[nodiscard]] std::vector<BlockSize> block_sizes(const Domain& domain, int scale);
 
 // The bytes of a page: the keys of its diamonds, and their error levels if the data set has them. Needs 2 MB.
 [[nodiscard]] std::vector<std::uint8_t> encode_page(const PagedValues& values, const ValuePage& page);

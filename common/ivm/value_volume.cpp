@@ -99,10 +99,41 @@ SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int sc
   return diamonds_of(domain, 0, wanted, parallel);
 }
 
-std::size_t count_diamonds(const Domain& domain) {
-  std::size_t count = 0;
-  for (int scale = 0; scale < domain.levels(); ++scale)
-    for_each_supercube(domain, scale, [&](Vertex p) { count += std::size_t(std::popcount(updated_slots(domain, scale, p))); });
+// Which diamonds have an update depends on what clamping does on each axis, and that on one coordinate alone.
+std::uint64_t count_diamonds(const Domain& domain, int scale, Vertex first, Vertex last) {
+  const std::int32_t h = std::int32_t(1) << scale, most = std::int32_t(1) << domain.levels();
+  const std::array<std::array<std::int32_t, 2>, 3> ends{{{first.x, last.x}, {first.y, last.y}, {first.z, last.z}}};
+  // By axis, by the centre's place in its supercube, and by what Domain::squeezed() tells of it.
+  std::array<std::array<std::array<std::uint64_t, 4>, 4>, 3> coordinates{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::int32_t p = ends[axis][0]; p <= ends[axis][1]; ++p) {
+      for (std::int32_t place = 0; place < 4; ++place) {
+        const std::int32_t c = (p * 4 + place) << scale;
+        if (c <= most) ++coordinates[axis][std::size_t(place)][domain.squeezed(int(axis), c, h)];
+      }
+    }
+  }
+  std::uint64_t count = 0;
+  for (Slot slot{0}; slot < kSlots; ++slot) {
+    const Vertex place = centre_of(0, {}, slot);
+    const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
+    const auto &x = coordinates[0][std::size_t(place.x)], &y = coordinates[1][std::size_t(place.y)], &z = coordinates[2][std::size_t(place.z)];
+    for (unsigned k = 0; k < 64; ++k) {
+      const std::array<unsigned, 3> squeezed{k & 3, k >> 2 & 3, k >> 4};
+      const std::uint64_t diamonds = x[squeezed[0]] * y[squeezed[1]] * z[squeezed[2]];
+      if (diamonds == 0 || Domain::tets(row, squeezed) == 0) continue;
+      // A no-op: the spine's axis is the only odd one.
+      const std::size_t odd = place.x % 2 != 0 ? 0 : place.y % 2 != 0 ? 1 : 2;
+      if (row.cls == 2 && h == 1 && squeezed[odd] != 0) continue;
+      count += diamonds;
+    }
+  }
+  return count;
+}
+
+std::uint64_t count_diamonds(const Domain& domain) {
+  std::uint64_t count = 0;
+  for (int scale = 0; scale < domain.levels(); ++scale) count += count_diamonds(domain, scale, {}, last_supercube(domain, scale));
   return count;
 }
 

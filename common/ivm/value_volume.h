@@ -104,8 +104,10 @@ class ValueVolume {
 // All diamonds of a domain that have an update, of the scale `finest` and coarser: those that exist, and whose split is
 // not a no-op. `parallel` may stop it.
 [[nodiscard]] SupercubeSet all_diamonds(const Domain& domain, const ParallelFor& parallel = serial, int finest = 0);
-// How many there are of all scales.
-[[nodiscard]] std::size_t count_diamonds(const Domain& domain);
+// How many there are in the supercubes of a scale whose positions are `first` to `last` on each axis, both included; and of
+// all scales. By coordinates, not by diamond: O(last - first).
+[[nodiscard]] std::uint64_t count_diamonds(const Domain& domain, int scale, Vertex first, Vertex last);
+[[nodiscard]] std::uint64_t count_diamonds(const Domain& domain);
 
 // All diamonds as of all_diamonds(), of those supercubes that are wanted.
 [[nodiscard]] SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int scale, Vertex position)>& wanted,

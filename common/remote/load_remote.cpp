@@ -66,6 +66,9 @@ RemoteVolume::Next RemoteVolume::read_whole(const ParallelFor& parallel) {
 RemoteVolume::Next RemoteVolume::read_next(bool to_end, const ParallelFor& parallel) {
   if (!std::exchange(is_begun_, true)) {
     if (auto begun = file_.begin(parallel); !begun) return tl::unexpected(begun.error());
+    if (const std::uint64_t needed = start_bytes(file_.ends().first, file_.ends().file_bytes); needed > file_.ends().first.size()) {
+      if (auto read = file_.read(needed, 0, parallel); !read) return tl::unexpected(read.error());
+    }
     const FileEnds start = file_.ends();
     auto scales = coarse_scales(start.first, start.file_bytes);
     if (!scales) return Result<IntervalVolume>(tl::unexpected(scales.error()));

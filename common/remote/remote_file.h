@@ -65,7 +65,7 @@ class RemoteFile {
 
   // First: reads the file's first 64 KiB, or all of it from a server that knows no ranges.
   [[nodiscard]] RemoteOutcome<void> begin(const ParallelFor& parallel);
-  // Then: until so many bytes at both ends are there. last_bytes: the same with each call.
+  // Then: until so many bytes at both ends are there. last_bytes: 0, or the same with each call.
   [[nodiscard]] RemoteOutcome<void> read(std::uint64_t first_bytes, std::uint64_t last_bytes, const ParallelFor& parallel);
   // Then, and last: these places, ascending and none of them there. Their bytes follow the first ones, in order.
   [[nodiscard]] RemoteOutcome<void> read_places(std::span<const StreamPlace> places, const ParallelFor& parallel);

@@ -189,6 +189,22 @@ TEST(CoarseScales, AreFewOfTheBytes) {
   EXPECT_TRUE(scales_of(file_of({9, 7, 5}, 0)).empty()) << "a single page";
 }
 
+TEST(CoarseScales, NeedTheIndexOfThePages) {
+  const auto scales = scales_of(large());
+  const auto index = place_of(StreamType::page_index, large(), large().size(), FileScope::every_range).value();
+  const std::uint64_t end = index.offset + index.bytes;
+  for (const std::size_t there : {std::size_t(400), std::size_t(end) - 1, std::size_t(end), kStartBytes}) {
+    const auto start = std::span(large()).first(there);
+    EXPECT_EQ(start_bytes(start, large().size()), std::max<std::uint64_t>(end, there));
+    const auto found = coarse_scales(start, large().size());
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->size(), there < end ? 0 : scales.size());
+  }
+  Bytes damaged = large();
+  damaged[100] ^= std::byte(1);
+  EXPECT_EQ(start_bytes(std::span(damaged).first(400), damaged.size()), 400U);
+}
+
 TEST(CoarseScales, RefuseWhatIsDamagedCutShortOrNoFile) {
   const Bytes file = file_of({70, 67, 66}, 0);
   const CoarseScales scales = scales_of(file).front();

@@ -39,6 +39,37 @@ TEST(AllDiamonds, AreThoseThatAnyRangeNeeds) {
   }
 }
 
+TEST(AllDiamonds, AreCountedBySupercubesAndByBlocks) {
+  std::mt19937 random(1);
+  for (const Dims& dims : {Dims{2, 2, 2}, Dims{5, 5, 5}, Dims{9, 7, 5}, Dims{17, 12, 33}, Dims{2, 3, 40}, Dims{129, 3, 2}, Dims{130, 67, 66}}) {
+    const Domain domain(dims);
+    const SupercubeSet all = all_diamonds(domain);
+    EXPECT_EQ(count_diamonds(domain), all.size());
+    for (int scale = 0; scale < domain.levels(); ++scale) {
+      const Vertex last = last_supercube(domain, scale);
+      const auto some = [&](std::int32_t most) { return std::int32_t(random() % unsigned(most + 1)); };
+      const Vertex first{some(last.x), some(last.y), some(last.z)};
+      std::uint64_t count = 0;
+      for (Vertex p = first; p.z <= last.z; ++p.z) {
+        for (p.y = first.y; p.y <= last.y; ++p.y)
+          for (p.x = first.x; p.x <= last.x; ++p.x) count += std::uint64_t(std::popcount(updated_slots(domain, scale, p)));
+      }
+      EXPECT_EQ(count_diamonds(domain, scale, first, last), count);
+    }
+    std::vector<BlockSize> sizes;
+    for (int scale = domain.levels() - 1; scale >= 0; --scale)
+      for (const BlockSize& size : block_sizes(domain, scale)) sizes.push_back(size);
+    const std::vector<BrickRun> blocks = blocks_of(all);
+    ASSERT_EQ(sizes.size(), blocks.size());
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      std::size_t diamonds = 0;
+      for (BrickIndex b = blocks[i].first; b < blocks[i].end; ++b) diamonds += all.updates(b);
+      EXPECT_EQ(sizes[i].diamonds, diamonds);
+      EXPECT_EQ(sizes[i].scale, scale_of_key(all.bricks()[blocks[i].first].key));
+    }
+  }
+}
+
 TEST(ValueFile, GivesBackAllValues) {
   for (unsigned seed = 0; seed < 15; seed += 15 / testing::cases(15)) {  // the large box in any case
     const Dims boxes[] = {{9, 9, 9}, {9, 7, 5}, {17, 12, 33}, {2, 2, 2}, {70, 67, 66}};

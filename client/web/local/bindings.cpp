@@ -50,8 +50,11 @@ class LocalDataSet {
     auto scales = coarse_scales(std::as_bytes(std::span(inbox_.bytes())), file_bytes_);
     if (!scales) return scales.error().message;
     coarse_ = std::move(*scales);
+    start_bytes_ = intervale::start_bytes(std::as_bytes(std::span(inbox_.bytes())), file_bytes_);
     return {};
   }
+  // How many bytes begin() needs: if more than it had, it is to be called again with these.
+  [[nodiscard]] double start_bytes() const { return double(start_bytes_); }
   [[nodiscard]] std::size_t coarse_count() const { return coarse_.size(); }
   // How many bytes at the file's beginning and at its end are needed to load the i-th of those.
   [[nodiscard]] double first_bytes(std::size_t i) const { return double(coarse_[i].first_bytes); }
@@ -83,7 +86,7 @@ class LocalDataSet {
 
   Inbox inbox_;
   std::string name_;
-  std::uint64_t file_bytes_ = 0;
+  std::uint64_t file_bytes_ = 0, start_bytes_ = 0;
   std::vector<CoarseScales> coarse_;
   std::shared_ptr<const IntervalVolume> volume_;
 };
@@ -137,6 +140,7 @@ EMSCRIPTEN_BINDINGS(intervale_local) {
       .constructor<>()
       .function("inbox", &LocalDataSet::inbox)
       .function("begin", &LocalDataSet::begin)
+      .function("startBytes", &LocalDataSet::start_bytes)
       .function("coarseCount", &LocalDataSet::coarse_count)
       .function("firstBytes", &LocalDataSet::first_bytes)
       .function("lastBytes", &LocalDataSet::last_bytes)

@@ -50,9 +50,13 @@ async function loadFrom(source: FileSource, name: string, made: LocalDataSet, lo
   const check = (error: string) => {
     if (error) throw new Error(error);
   };
+  const first = new FirstBytes(source);
   put(made, [source.start]);
   check(made.begin(name, source.size));
-  const first = new FirstBytes(source);
+  if (made.startBytes() > source.start.length) {
+    put(made, [await first.until(made.startBytes())]);
+    check(made.begin(name, source.size));
+  }
   const count = made.coarseCount();
   const last = count > 0 ? source.read(source.size - made.lastBytes(0), source.size) : Promise.resolve(new Uint8Array());
   last.catch(() => undefined); // it is awaited below

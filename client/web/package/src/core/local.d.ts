@@ -5,6 +5,7 @@
 export interface LocalDataSet {
   inbox(bytes: number): Uint8Array; // to be filled with bytes of the file; valid until the next call of any function
   begin(name: string, fileBytes: number): string; // the inbox has the file's first 64 KiB, or all; name: the file's without its extension
+  startBytes(): number; // that begin() needs: if more than it had, it is to be called again with these
   coarseCount(): number; // how many times more and more of the data set can be loaded before all of it
   firstBytes(i: number): number; // what is needed for that: bytes at the file's beginning
   lastBytes(i: number): number; // and at its end; the same for all i
