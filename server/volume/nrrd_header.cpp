@@ -41,9 +41,8 @@ std::string canonical(std::string_view name) {
 
 // Fields that describe neither the position nor the type of the samples.
 bool is_decoration(const std::string& field) {
-  constexpr std::array<std::string_view, 14> kDecorations{
-      "content", "number", "thicknesses", "centers", "centerings",  "labels",     "units",
-      "min",     "max",    "oldmin",      "oldmax",  "sampleunits", "spaceunits", "measurementframe"};
+  constexpr std::array<std::string_view, 12> kDecorations{"content", "number", "thicknesses", "labels",      "units",      "min",
+                                                          "max",     "oldmin", "oldmax",      "sampleunits", "spaceunits", "measurementframe"};
   return std::find(kDecorations.begin(), kDecorations.end(), field) != kDecorations.end();
 }
 
@@ -154,21 +153,44 @@ Result<Encoding> encoding_of(const NrrdEncoding* encoding, const std::string& na
   return fail(name + ": NRRD encoding '" + encoding->name + "' is not read; convert it first, e.g. unu save -f nrrd -e gzip");
 }
 
-double usable(double value, double otherwise) { return std::isfinite(value) && value != 0 ? std::abs(value) : otherwise; }
+// Where samples lie on an axis: from the first one to the next, and the first one. `spacings`, which may be negative; or else
+// `axis mins` and `axis maxs`, which are those of the samples, or of their cells if `centerings` says so.
+struct AxisPlaces {
+  double spacing = 1, first = 0;
+};
+AxisPlaces places_on(const NrrdAxisInfo& axis) {
+  const auto is_usable = [](double value) { return std::isfinite(value) && value != 0; };
+  AxisPlaces places;
+  if (std::isfinite(axis.min)) places.first = axis.min;
+  if (is_usable(axis.spacing)) {
+    places.spacing = axis.spacing;
+  } else if (std::isfinite(axis.min) && std::isfinite(axis.max)) {
+    const bool is_cell = axis.center == nrrdCenterCell;
+    const double steps = double(axis.size) - (is_cell ? 0 : 1), between = axis.max / steps - axis.min / steps;
+    if (steps > 0 && is_usable(between)) {
+      places.spacing = between;
+      if (is_cell) places.first += between / 2;
+    }
+  }
+  return places;
+}
 
-// `space directions` if there are any, or else `spacings`, along the axes. The axes of the world are the header's own.
+// `space directions` if there are any, or else along the axes. The axes of the world are the header's own.
 // first_axis: the first one in space.
 Result<Affine> affine_of(const Nrrd& nrrd, unsigned first_axis, const std::string& name) {
-  Vec3 spacing, origin;
+  Vec3 spacing{}, origin{};
   std::array<Vec3, 3> directions;
   int found = 0;
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto& info = nrrd.axis[first_axis + axis];
     found += nrrd.spaceDim > 0 && !std::isnan(info.spaceDirection[0]) ? 1 : 0;
     for (unsigned k = 0; k < 3; ++k) directions[axis][k] = info.spaceDirection[k];
-    spacing[axis] = usable(info.spacing, 1);
-    const double first = nrrd.spaceDim == 3 ? nrrd.spaceOrigin[axis] : info.min;
-    origin[axis] = std::isfinite(first) ? first : 0;
+    const AxisPlaces places = places_on(info);
+    spacing[axis] = places.spacing;
+    if (nrrd.spaceDim != 3)
+      origin[axis] = places.first;
+    else if (std::isfinite(nrrd.spaceOrigin[axis]))
+      origin[axis] = nrrd.spaceOrigin[axis];
   }
   if (found == 0) return Affine::of(spacing, origin);
   if (nrrd.spaceDim != 3) return fail(name + ": 'space directions' in " + std::to_string(nrrd.spaceDim) + " dimensions; a volume has 3");

@@ -157,6 +157,10 @@ TEST(Nrrd, PlacesTheGrid) {
   };
   EXPECT_EQ(grid(""), (Grid{{3, 2, 4}, {}}));
   EXPECT_EQ(grid("spacings: 1 2.5 nan\naxis mins: 7 nan -1\n"), (Grid{{3, 2, 4}, Affine::of({1, 2.5, 1}, {7, 0, -1})}));
+  EXPECT_EQ(grid("spacings: 1 -2 3\n"), (Grid{{3, 2, 4}, Affine::of({1, -2, 3})}));
+  EXPECT_EQ(grid("axis mins: 1 0 -3\naxis maxs: 2 -5 3\n"), (Grid{{3, 2, 4}, Affine::of({0.5, -5, 2}, {1, 0, -3})}));
+  EXPECT_EQ(grid("axis mins: 1 0 -3\naxis maxs: 4 nan 5\ncenterings: cell cell cell\n"), (Grid{{3, 2, 4}, Affine::of({1, 1, 2}, {1.5, 0, -2})}));
+  EXPECT_EQ(grid("axis mins: 1 0 -3\naxis maxs: 4 4 -3\nspacings: 2 nan nan\n"), (Grid{{3, 2, 4}, Affine::of({2, 4, 1}, {1, 0, -3})}));
   EXPECT_EQ(grid("space: left-posterior-superior\nspace directions: (2,0,0) (0,3,4) (0,1e-3,-1)\nspace origin: (9,8,7)\n"),
             (Grid{{3, 2, 4}, Affine{{2, 0, 0, 9, 0, 3, 1e-3, 8, 0, 4, -1, 7}}}));
 }
