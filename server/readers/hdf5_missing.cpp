@@ -46,8 +46,29 @@ bool contains(std::span<const T> stored, T sample) {
 
 }  // namespace
 
+namespace {
+
+bool is_in_netcdf(hid_t dataset) {
+  const Handle file(H5Iget_file_id(dataset), H5Fclose);
+  return file.is_open() && H5Aexists_by_name(file.get(), "/", "_NCProperties", H5P_DEFAULT) > 0;
+}
+
+// What an array has where nobody wrote; none if its maker did not say.
+std::vector<double> fill_value_of(hid_t dataset) {
+  const Handle made(H5Dget_create_plist(dataset), H5Pclose), type(H5Dget_type(dataset), H5Tclose);
+  H5D_fill_value_t status = H5D_FILL_VALUE_ERROR;
+  if (!made.is_open() || H5Tget_size(type.get()) < 2 || H5Pfill_value_defined(made.get(), &status) < 0 || status != H5D_FILL_VALUE_USER_DEFINED)
+    return {};
+  double number = 0;
+  if (H5Pget_fill_value(made.get(), H5T_NATIVE_DOUBLE, &number) < 0 || !std::isfinite(number)) return {};
+  return {number};
+}
+
+}  // namespace
+
 MissingNumbers MissingNumbers::of(hid_t dataset) {
   MissingNumbers missing;
+  if (H5Aexists(dataset, "_FillValue") <= 0 && is_in_netcdf(dataset)) missing.numbers_ = fill_value_of(dataset);
   for (const char* name : {"_FillValue", "missing_value"}) {
     const auto numbers = numbers_of_attribute(dataset, name, kMostNumbers);
     missing.numbers_.insert(missing.numbers_.end(), numbers.begin(), numbers.end());

@@ -1,5 +1,6 @@
-// Stored numbers of an HDF5 array that stand for no value: _FillValue and missing_value (CF conventions, section 2.5.1).
-// They become NaN; so integers that have such ones become floats.
+// Stored numbers of an HDF5 array that stand for no value: _FillValue and missing_value (CF conventions, section 2.5.1); and
+// in a file of NetCDF, where there is no _FillValue, what the library fills arrays with that nobody wrote, but for bytes
+// (NetCDF User's Guide, "Fill Values"). They become NaN; so integers that have such ones become floats.
 #pragma once
 
 #include <hdf5.h>

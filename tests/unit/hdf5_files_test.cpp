@@ -168,6 +168,41 @@ TEST_F(Hdf5, FillValuesAreNoValues) {
   EXPECT_EQ(numbers_in(*none)[5], 5);
 }
 
+// Half of an array is written; of bytes, and of files of other programs, the rest is as it is.
+TEST_F(Hdf5, WhatWasNeverWrittenToNetcdfIsMissing) {
+  for (const bool is_netcdf : {true, false}) {
+    for (const hid_t type : {H5T_IEEE_F32LE, H5T_STD_I16LE, H5T_STD_I8LE}) {
+      const hid_t file = create();
+      const std::vector<hsize_t> dims{2, 2, 2}, half{1, 2, 2}, none{0, 0, 0};
+      const double filler = type == H5T_IEEE_F32LE ? 9.9692099683868690e+36 : type == H5T_STD_I16LE ? -32767 : -127;
+      const std::vector<float> numbers{1, 2, 3, 4};
+      const hid_t how = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(3, dims.data(), nullptr),
+                  part = H5Screate_simple(3, half.data(), nullptr);
+      H5Pset_fill_value(how, H5T_NATIVE_DOUBLE, &filler);
+      const hid_t set = H5Dcreate2(file, "t", type, space, H5P_DEFAULT, how, H5P_DEFAULT);
+      H5Sselect_hyperslab(space, H5S_SELECT_SET, none.data(), nullptr, half.data(), nullptr);
+      H5Dwrite(set, H5T_NATIVE_FLOAT, part, space, H5P_DEFAULT, numbers.data());
+      if (is_netcdf) {
+        const hid_t scalar = H5Screate(H5S_SCALAR), attribute = H5Acreate2(file, "_NCProperties", H5T_STD_I32LE, scalar, H5P_DEFAULT, H5P_DEFAULT);
+        H5Aclose(attribute);
+        H5Sclose(scalar);
+      }
+      H5Dclose(set);
+      H5Sclose(part);
+      H5Sclose(space);
+      H5Pclose(how);
+      H5Fclose(file);
+      const auto volume = read_volume(path_, {});
+      ASSERT_TRUE(volume) << volume.error().message;
+      const bool is_missing = is_netcdf && type != H5T_STD_I8LE;
+      for (std::size_t i = 0; i < 8; ++i) {
+        EXPECT_EQ(std::isnan(numbers_in(*volume)[i]), is_missing && i >= 4) << i;
+        EXPECT_TRUE(i >= 4 || numbers_in(*volume)[i] == double(i + 1)) << i;
+      }
+    }
+  }
+}
+
 TEST_F(Hdf5, FillValuesOfFloatsAreComparedAsTheyAreStored) {
   const hid_t file = create();
   const std::vector<hsize_t> dims{2, 2, 2};
