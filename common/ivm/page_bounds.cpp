@@ -93,9 +93,8 @@ class Bounds {
   std::vector<KeySpan> of_block_;
 };
 
-}  // namespace
-
-BlockValues values_in(BlockLattice& lattice, BlockKey block) {
+// lattice: it is moved to the block.
+BlockValues values_in_block(BlockLattice& lattice, BlockKey block) {
   BlockValues values{block, {}};
   values.parts.fill(kNone);
   lattice.move_to(block, BlockLattice::Load::own);
@@ -108,6 +107,17 @@ BlockValues values_in(BlockLattice& lattice, BlockKey block) {
     }
   }
   return values;
+}
+
+}  // namespace
+
+std::vector<BlockValues> values_in(const PagedValues& values, std::span<const BlockKey> blocks, const ParallelFor& parallel) {
+  std::vector<BlockValues> found(blocks.size());
+  parallel(blocks.size(), [&](std::size_t i) {
+    BlockLattice lattice(values);
+    found[i] = values_in_block(lattice, blocks[i]);
+  });
+  return found;
 }
 
 std::vector<PageBounds> bounds_of_pages(std::span<const BlockValues> blocks, std::span<const std::vector<BlockKey>> pages) {
@@ -131,12 +141,7 @@ std::vector<PageBounds> bounds_of_pages(const PagedValues& values, std::span<con
     for (const BrickRun& block : page) of_page.push_back(block_of(values.set.bricks()[block.first].key));
     keys.insert(keys.end(), of_page.begin(), of_page.end());
   }
-  std::vector<BlockValues> blocks(keys.size());
-  parallel(keys.size(), [&](std::size_t i) {
-    BlockLattice lattice(values);
-    blocks[i] = values_in(lattice, keys[i]);
-  });
-  return bounds_of_pages(blocks, blocks_of_pages);
+  return bounds_of_pages(values_in(values, keys, parallel), blocks_of_pages);
 }
 
 std::vector<bool> pages_for(std::span<const PageBounds> bounds, const ValueFormat& format, const ShownRanges& shown) {

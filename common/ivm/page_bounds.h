@@ -28,8 +28,8 @@ struct BlockValues {
   // By part of each axis, x fastest: points 0 to 2, 3 to 60 and 61 to 64. Of a part without keys, least is the greater.
   std::array<KeySpan, std::size_t(kParts* kParts* kParts)> parts;
 };
-// lattice: of values that have all points of the block, which it is moved to.
-[[nodiscard]] BlockValues values_in(BlockLattice& lattice, BlockKey block);
+// Of these blocks, all of whose points the values have; in their order.
+[[nodiscard]] std::vector<BlockValues> values_in(const PagedValues& values, std::span<const BlockKey> blocks, const ParallelFor& parallel = serial);
 
 // blocks: all of the set, in any order. pages: the blocks of each. As many bounds as pages.
 [[nodiscard]] std::vector<PageBounds> bounds_of_pages(std::span<const BlockValues> blocks, std::span<const std::vector<BlockKey>> pages);

@@ -273,12 +273,7 @@ class Part {
       pages.push_back(page.blocks);
       if (page.rank == ranks_.rank()) own.insert(own.end(), page.blocks.begin(), page.blocks.end());
     }
-    std::vector<BlockValues> blocks(own.size());
-    on_all_cores(own.size(), [&](std::size_t i) {
-      BlockLattice lattice(parts_);
-      blocks[i] = values_in(lattice, own[i]);
-    });
-    return bounds_of_pages(joined<BlockValues>(ranks_, blocks), pages);
+    return bounds_of_pages(joined<BlockValues>(ranks_, values_in(parts_, own, on_all_cores)), pages);
   }
 
   // The own pages, each at its place in the file.
