@@ -1,4 +1,5 @@
-// Opens an .ivm file and writes the mesh of a range, within a share of the largest error: extract_to_file IN.ivm LOW HIGH PERCENT OUT.vtu
+// Opens an .ivm file and writes the mesh of a range, within a share of the largest error: extract_to_file IN.ivm LOW
+// HIGH PERCENT OUT.vtu
 #include <intervale/data_set.h>
 #include <intervale/mesh_digest.h>
 #include <intervale/mesh_writer.h>

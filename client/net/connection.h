@@ -20,8 +20,8 @@ inline constexpr std::chrono::seconds kSilenceTime{30};  // without an answer to
 // The server answered 503 with that body. Its first line, cut at 80 bytes, says why, unless it is HTML (from a proxy).
 [[nodiscard]] Error turned_away(const ServerUrl& url, std::string_view body);
 
-// The connection of one session at a time, on one thread but for wake(). Every error names the server. After one, only is_lost() may
-// be called.
+// The connection of one session at a time, on one thread but for wake(). Every error names the server. After one, only
+// is_lost() may be called.
 class StreamConnection {
  public:
   static Result<StreamConnection> open(const ServerUrl& url);

@@ -267,7 +267,8 @@ void BoundarySurface::find_box_faces(std::size_t number) {
   }
 }
 
-// In place of what the part had, in order of kinds: exactly as much room as they need, if less than half of its room is needed.
+// In place of what the part had, in order of kinds: exactly as much room as they need, if less than half of its room is
+// needed.
 void BoundarySurface::keep_triangles(Part& part) {
   std::size_t count = 0;
   for (const auto& triangles : found_) count += triangles.size();

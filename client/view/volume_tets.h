@@ -32,8 +32,8 @@ class VolumeTets {
   [[nodiscard]] const std::vector<Corners>& tets() const { return tets_; }  // positive in the world
 
   // The numbers of all tetrahedra, the farthest first: by the distances of their centres from the eye (world; finite
-  // coordinates, at most 1e300), to 1/65536 of the span of all of these. Where neighbours differ much in size or shape, this is not always the order
-  // in which a ray meets them. O(tetrahedra), some 20 ns for each.
+  // coordinates, at most 1e300), to 1/65536 of the span of all of these. Where neighbours differ much in size or shape,
+  // this is not always the order in which a ray meets them. O(tetrahedra), some 20 ns for each.
   [[nodiscard]] std::vector<std::uint32_t> order(const Vec3& eye) const;
 
  private:

@@ -34,7 +34,8 @@ class INTERVALE_EXPORT DataSet {
   // Writes a temporary file and renames it.
   [[nodiscard]] Result<void> save(const std::filesystem::path& path) const;
   // The mesh of a level of detail: that which a client has at the end of the same request's stream. Its values are those
-  // of the points. The first call for a data set of every range that was built by this process takes a second copy of its values.
+  // of the points. The first call for a data set of every range that was built by this process takes a second copy of
+  // its values.
   [[nodiscard]] Result<Mesh> extract(const MeshRequest& request = {}) const;
 
   // Of the samples, to choose a range by. None: the data set is of one range.

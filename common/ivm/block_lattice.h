@@ -75,8 +75,8 @@ class BlockLattice {
   // Sets the points that exist; all others become kNoKey.
   void move_to(BlockKey block, Load load);
 
-  // A point's number, from its coordinates in the block, -1 to 64. at(): of the first point of one of the block's supercubes; of_slot(): a diamond's
-  // centre, and its vertices, from there.
+  // A point's number, from its coordinates in the block, -1 to 64. at(): of the first point of one of the block's
+  // supercubes; of_slot(): a diamond's centre, and its vertices, from there.
   using Point = std::int32_t;
   static constexpr Point point_of(std::int32_t x, std::int32_t y, std::int32_t z) { return ((z + 1) * kSide + y + 1) * kSide + x + 1; }
   [[nodiscard]] Point at(SupercubeKey key) const;

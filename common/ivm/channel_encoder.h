@@ -16,8 +16,8 @@ struct SentChannel {
   const SplitSet* held = nullptr;
 };
 
-// The channels' part of a batch. Appended to `out`. groups: supercubes, keys strictly ascending. to_send: for each channel in turn,
-// the slots of each group that the client gets the value of.
+// The channels' part of a batch. Appended to `out`. groups: supercubes, keys strictly ascending. to_send: for each
+// channel in turn, the slots of each group that the client gets the value of.
 void append_channel_values(std::vector<std::uint8_t>& out, const IntervalVolume& volume, std::span<const SentChannel> channels,
                            std::span<const std::vector<SlotGroup>> to_send);
 

@@ -7,8 +7,8 @@
 
 namespace intervale {
 
-// The same values, with the error levels of all diamonds. Fails as IntervalVolume::assemble() does. Its own range moves no surface: relevant() has
-// all updates, and no distances.
+// The same values, with the error levels of all diamonds. Fails as IntervalVolume::assemble() does. Its own range moves
+// no surface: relevant() has all updates, and no distances.
 [[nodiscard]] Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelFor& parallel = serial);
 
 }  // namespace intervale

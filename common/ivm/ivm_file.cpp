@@ -129,7 +129,8 @@ Result<RangeRecord> read_range(const Container& file, Description& d) {
   if (r.bricks > r.supercubes || r.supercubes > r.updates || r.updates > r.supercubes * kSlots || r.coefficients > r.updates * kMostCuts)
     return fail("the counts contradict each other");
   if (r.supercubes > kMostSupercubes) return fail("more updates than this program can read");
-  // An update's key, its bounds, its error step and what that is decoded with, its slope; what makes the set, and its supercubes.
+  // An update's key, its bounds, its error step and what that is decoded with, its slope; what makes the set, and its
+  // supercubes.
   file.claim(r.updates * (3 * ValueKeys(0, d.format.last).width() + 5) + r.supercubes * 56 + r.bricks * 128);
   d.refine = Refine(r.refine);
   d.range = {r.alpha, r.beta};

@@ -32,7 +32,8 @@ namespace intervale {
 [[nodiscard]] Result<void> save_ivm(const std::filesystem::path& path, const IntervalVolume& volume, const ParallelFor& parallel = serial,
                                     KeptPages* kept = nullptr);
 
-// Reads a file of one range, then decode_ivm; the name is the file's, without folders and extension. Errors begin with the path.
+// Reads a file of one range, then decode_ivm; the name is the file's, without folders and extension. Errors begin with
+// the path.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_ivm(const std::filesystem::path& path, const ParallelFor& parallel = serial,
                                                                      PageFaults* faults = nullptr);
 

@@ -96,8 +96,8 @@ class Ranking {
   };
 
   // Upper bounds over updates that are left. slope: of those whose object errors are above the limit; slope_below: of the
-  // others. While these are hardly wanted, with object errors of at most kHardly times what is wanted, they come last, however
-  // steep they are.
+  // others. While these are hardly wanted, with object errors of at most kHardly times what is wanted, they come last,
+  // however steep they are.
   struct Left {
     static constexpr float kHardly = 1.7F;
     unsigned step = 0;

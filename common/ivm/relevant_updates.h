@@ -1,10 +1,11 @@
 // Which updates of an interval volume are relevant to a range, and how far the surfaces of that range can move.
 //
 // Weiss and De Floriani 2008, section 6. A range needs the updates that count for it (front.h): of a data set of one range
-// most of them, of one that was refined uniformly, or that has every range, a part. Their ancestors have to be split before them, but are not wanted
-// for their own sake: where all that counts below an update is finer than what is wanted, it would change no mesh. Several ranges need what each of
-// them needs. What a brick needs is known from the start, or found when it is first asked for; until then there are bounds. Shared by all sessions
-// that look at those ranges.
+// most of them, of one that was refined uniformly, or that has every range, a part. Their ancestors have to be split
+// before them, but are not wanted for their own sake: where all that counts below an update is finer than what is
+// wanted, it would change no mesh. Several ranges need what each of them needs. What a brick needs is known from the
+// start, or found when it is first asked for; until then there are bounds. Shared by all sessions that look at those
+// ranges.
 #pragma once
 
 #include <algorithm>

@@ -188,7 +188,8 @@ Result<std::vector<PageBounds>> read_bounds(const Container& file, const ValueFo
 
 constexpr std::uint64_t kLittle = 16 << 10;  // bytes that come sooner than the answer to another request
 
-// Adds the pages that begin within the first `there` bytes, and those between two others that are no more than kLittle together.
+// Adds the pages that begin within the first `there` bytes, and those between two others that are no more than kLittle
+// together.
 void add_little_between(std::vector<bool>& pages, std::span<const std::uint64_t> lengths, std::uint64_t there) {
   std::uint64_t between = 0;
   std::size_t before = 0;  // the last one that is to be read

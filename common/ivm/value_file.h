@@ -51,9 +51,9 @@ struct NeededPages {
 // file: all but its pages, at least. nullopt: all of the file is to be read, which has no bounds, or has channels, or claims
 // more values than what is needed may hold.
 [[nodiscard]] Result<std::optional<NeededPages>> needed_pages(const FileEnds& file, const ShownRanges& shown);
-// Of these pages: file.first ends with their bytes, in order. The values for other ranges than `shown` are wrong; for these all
-// is as in the whole file: relevant updates, their values and errors, and where surfaces are. Checks all that is there as
-// decode_values() does.
+// Of these pages: file.first ends with their bytes, in order. The values for other ranges than `shown` are wrong; for
+// these all is as in the whole file: relevant updates, their values and errors, and where surfaces are. Checks all that
+// is there as decode_values() does.
 [[nodiscard]] Result<ValueVolume> decode_needed_values(const FileEnds& file, std::string name, const std::vector<bool>& pages,
                                                        const ParallelFor& parallel = serial);
 
@@ -61,8 +61,8 @@ struct NeededPages {
 [[nodiscard]] Result<std::uint64_t> save_values(const std::filesystem::path& path, const ValueVolume& volume, const ParallelFor& parallel = serial,
                                                 KeptPages* kept = nullptr);
 
-// Checks the header and the length before it allocates, then decode_values; the name is the file's, without folders and extension. Errors begin with
-// the path.
+// Checks the header and the length before it allocates, then decode_values; the name is the file's, without folders and
+// extension. Errors begin with the path.
 [[nodiscard]] Result<std::shared_ptr<const ValueVolume>> load_values(const std::filesystem::path& path, const ParallelFor& parallel = serial,
                                                                      PageFaults* faults = nullptr);
 

@@ -82,7 +82,8 @@ struct StoredPage {
   std::uint64_t checksum = 0;
 };
 
-// absent: not among those that are there. lost: it may need what is, or is absent. invalid: intact, but no page; no writer makes it.
+// absent: not among those that are there. lost: it may need what is, or is absent. invalid: intact, but no page; no
+// writer makes it.
 enum class PageState : std::uint8_t { intact, absent, damaged, lost, invalid };
 
 constexpr std::size_t kPagesAtOnce = 16;  // whose values are allocated together, or as many as were decoded before

@@ -52,9 +52,9 @@ void append_pages(const PagedValues& values, std::vector<std::byte>& index, std:
 // The inverse, of bytes from outside: takes them off the front of both.
 [[nodiscard]] Result<void> take_pages(std::span<const std::byte>& index, std::span<const std::byte>& pages, const DecodedValues& to,
                                       const ParallelFor& parallel, PageFaults* faults, const std::string& channel = {});
-// The same where only some pages are there, one for each of the index, and `pages` has the bytes of those alone. Sets the keys
-// and levels of those that are decoded: all that are there, but for those that may need one that is not. The first one must be there.
-// A damaged page is an error. Returns for each page whether it was decoded.
+// The same where only some pages are there, one for each of the index, and `pages` has the bytes of those alone. Sets
+// the keys and levels of those that are decoded: all that are there, but for those that may need one that is not. The
+// first one must be there. A damaged page is an error. Returns for each page whether it was decoded.
 [[nodiscard]] Result<std::vector<bool>> take_some_pages(std::span<const std::byte> index, std::span<const std::byte> pages,
                                                         const std::vector<bool>& there, const DecodedValues& to, const ParallelFor& parallel);
 

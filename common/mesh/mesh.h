@@ -55,8 +55,9 @@ struct PointArray {
   MeshArray<double> value;  // `components` for each point, side by side
 };
 
-// Points in world coordinates, each used by a tetrahedron and given once (once for each range that it is of); tetrahedra as four point indices,
-// positively oriented: (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha = beta).
+// Points in world coordinates, each used by a tetrahedron and given once (once for each range that it is of);
+// tetrahedra as four point indices, positively oriented: (p1 - p0) x (p2 - p0) . (p3 - p0) > 0 (zero only where alpha =
+// beta).
 struct Mesh {
   MeshArray<std::array<double, 3>> points;
   MeshArray<Surface> surface;  // one for each point

@@ -74,8 +74,8 @@ struct Description {
 [[nodiscard]] Result<void> check_grid(const Grid& grid);
 
 // Checks a description from outside: sides within bounds, a box that is finite and not flat, a valid range, a format
-// as check_value_format accepts it with the corners' keys in it, a finite error, labels as check_labels and channels as check_channels
-// accept them.
+// as check_value_format accepts it with the corners' keys in it, a finite error, labels as check_labels and channels as
+// check_channels accept them.
 [[nodiscard]] Result<void> check_description(const Description& description);
 
 }  // namespace intervale

@@ -50,7 +50,8 @@ struct Cuts {
 
 // The cuts of an edge whose ends have the finite values `from` and `to`; exchanging the ends gives the reversed cuts.
 // Where alpha < beta and both surfaces cut, the cut nearer to `from` stays strictly nearer: if quantisation makes them
-// equal, one moves by a step, so that neither is off by more than a step; nor by more than one and a half at the ends of the edge.
+// equal, one moves by a step, so that neither is off by more than a step; nor by more than one and a half at the ends
+// of the edge.
 [[nodiscard]] inline Cuts cuts_between(double from, double to, const Range& range) {
   const double low = std::min(from, to), high = std::max(from, to);
   const Side a = side_of(low, range), b = side_of(high, range);

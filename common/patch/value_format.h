@@ -40,8 +40,8 @@ struct ValueFormat {
     const double product = double(n) * step;
     return type == SampleType::f32 ? double(float(product)) : product;
   }
-  // The key of the value that is nearest; between keys half up. O(log last) with a table. value: finite; below the least value 0, above the
-  // greatest one `last`.
+  // The key of the value that is nearest; between keys half up. O(log last) with a table. value: finite; below the
+  // least value 0, above the greatest one `last`.
   [[nodiscard]] ValueKey key(double value) const;
   [[nodiscard]] double least() const { return value(0); }
   [[nodiscard]] double greatest() const { return value(last); }

@@ -8,9 +8,10 @@
 
 namespace intervale {
 
-// name scope dims spacing origin affine unit field field_unit channels range refine values{least greatest} step max_error updates coefficients
-// full{vertices tets indexed_bytes}. scope is "one": the updates are those of one range. values: of the field. step: how far the kept values are
-// apart; 0 if they are exact. Infinite ends of the range are the strings "-inf" and "inf", since JSON has no such numbers.
+// name scope dims spacing origin affine unit field field_unit channels range refine values{least greatest} step
+// max_error updates coefficients full{vertices tets indexed_bytes}. scope is "one": the updates are those of one range.
+// values: of the field. step: how far the kept values are apart; 0 if they are exact. Infinite ends of the range are
+// the strings "-inf" and "inf", since JSON has no such numbers.
 [[nodiscard]] nlohmann::ordered_json to_json(const Description& description);
 
 // For each channel: name, kind ("scalar" or "vector"), unit, values{least greatest} (of a vector: of lengths, and no

@@ -21,8 +21,8 @@ struct ExtractedMesh {
   std::uint64_t updates = 0;  // shown
 };
 
-// A mesh for each range, with these channels. shown: as check_held() accepts it. Fails as extract() does (extraction.h). Errors on the screen are
-// exact. Throws what `parallel` throws.
+// A mesh for each range, with these channels. shown: as check_held() accepts it. Fails as extract() does
+// (extraction.h). Errors on the screen are exact. Throws what `parallel` throws.
 [[nodiscard]] Result<std::vector<ExtractedMesh>> extract_meshes(const std::shared_ptr<const IntervalVolume>& volume, const ShownRanges& shown,
                                                                 const Lod& lod, std::span<const std::size_t> channels, const ParallelFor& parallel);
 

@@ -19,17 +19,17 @@ namespace intervale {
                                                                                const ShownRanges& shown = {}, const ParallelFor& parallel = serial,
                                                                                PageFaults* faults = nullptr);
 
-// The same, from coarse to fine: a data set of every range is there as soon as its coarse scales are (coarse_scales.h), and of
-// its finer ones only those pages are read that some ranges need (page_bounds.h). All others are read whole, and those on
-// servers that know no ranges. One thread at a time.
+// The same, from coarse to fine: a data set of every range is there as soon as its coarse scales are (coarse_scales.h),
+// and of its finer ones only those pages are read that some ranges need (page_bounds.h). All others are read whole, and
+// those on servers that know no ranges. One thread at a time.
 class RemoteVolume {
  public:
   // What is given must outlive it. shown: the only ranges that it is for; none: all.
   RemoteVolume(const RemoteUrl& url, const RemoteAccess& access, const RemoteLimits& limits, ShownRanges shown = {});
 
   // Reads on: the data set as far as the next scale, the last time IntervalVolume::is_whole(); not to be called after
-  // that, or after an error. What is returned stays valid. If the file changes meanwhile, it is read from its beginning: then the
-  // description has another content_hash. Errors as of load_remote_volume().
+  // that, or after an error. What is returned stays valid. If the file changes meanwhile, it is read from its
+  // beginning: then the description has another content_hash. Errors as of load_remote_volume().
   [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> next(const ParallelFor& parallel = serial);
   // The same for all that is left.
   [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> whole(const ParallelFor& parallel = serial);

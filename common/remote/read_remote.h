@@ -17,7 +17,8 @@ namespace intervale {
 // twice at most. A server that knows no ranges sends all of it over one connection.
 //
 // Redirects are followed, five at most, and never from https to http. Credentials go to the origin of `url` only.
-// Errors are one line that begins with the URL, or with that which it redirects to, without a query. Blocks; `parallel` may stop it within 50 ms.
+// Errors are one line that begins with the URL, or with that which it redirects to, without a query. Blocks; `parallel`
+// may stop it within 50 ms.
 [[nodiscard]] Result<RemoteContents> read_remote(const RemoteUrl& url, const RemoteAccess& access, const RemoteLimits& limits = {},
                                                  const ParallelFor& parallel = serial);
 

@@ -53,8 +53,8 @@ using RemoteOutcome = tl::expected<T, RemoteFailure>;
 inline constexpr unsigned kMostRemoteStarts = 3;
 
 // One state of a file: what its first range is of. After a failure it cannot be used any more. Requests, limits, and what
-// is checked of the file's beginning: as read_remote.h says. No byte is asked for twice but where a request failed. One thread
-// at a time; those who wait block, and `parallel` may stop them within 50 ms.
+// is checked of the file's beginning: as read_remote.h says. No byte is asked for twice but where a request failed. One
+// thread at a time; those who wait block, and `parallel` may stop them within 50 ms.
 class RemoteFile {
  public:
   // What is given must outlive it. known: of what was read before; nullptr: nothing was.

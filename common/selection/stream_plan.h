@@ -97,7 +97,8 @@ class StreamPlan {
   void set_room(std::uint64_t updates) { room_ = updates; }
 
   // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice. relevant:
-  // of this volume. Before the set_lod() of the same view. O(bricks), and a few nanoseconds for 64 updates where something was sent.
+  // of this volume. Before the set_lod() of the same view. O(bricks), and a few nanoseconds for 64 updates where
+  // something was sent.
   void set_relevant(const std::shared_ptr<const RelevantUpdates>& relevant) { set_relevant(relevant, relevant->shown()); }
   // The same for a client that shows other ranges: batches are coded for those.
   void set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown);

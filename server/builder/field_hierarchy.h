@@ -34,8 +34,9 @@ struct Field;
 
 class FieldHierarchy {
  public:
-  // Samples are finite; the volume must outlive the hierarchy. Throws as find_relevant() does. Uses all cores that oneTBB may. Memory beside the
-  // volume: half a byte a sample to find the relevant diamonds, then 4 bytes for each of them.
+  // Samples are finite; the volume must outlive the hierarchy. Throws as find_relevant() does. Uses all cores that
+  // oneTBB may. Memory beside the volume: half a byte a sample to find the relevant diamonds, then 4 bytes for each of
+  // them.
   FieldHierarchy(const Volume& volume, const BuildOptions& options);
 
   [[nodiscard]] const Domain& domain() const { return domain_; }

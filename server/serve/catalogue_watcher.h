@@ -25,8 +25,9 @@ namespace intervale {
 class CatalogueWatcher {
  public:
   // inputs: files, and folders of *.ivm files (without their subfolders). memory: counts the data sets, and must outlive
-  // them; if it has data memory, they lie there; files of folders that would take more than its room are not read until there is more.
-  // tolerates_damage: files with damaged pages are served without what these hold (page_faults.h), which is logged. remote: files on web servers.
+  // them; if it has data memory, they lie there; files of folders that would take more than its room are not read until
+  // there is more. tolerates_damage: files with damaged pages are served without what these hold (page_faults.h), which
+  // is logged. remote: files on web servers.
   CatalogueWatcher(std::vector<std::filesystem::path> inputs, Memory& memory, bool tolerates_damage = false, RemoteInputs remote = {})
       : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage), remote_(std::move(remote), memory, tolerates_damage) {}
 

@@ -24,9 +24,10 @@ namespace intervale {
 
 // Any thread. Among accounts, fair share scheduling (J. Kay and P. Lauder, "A Fair Share Scheduler", 1988): the worker goes
 // to the account that spent least, where what was spent counts half after kHalfLife. So whoever has just come is served
-// before those who have had much. Accounts that spent the same up to a factor of two take turns. Among the sessions of one account, interactive work
-// is scheduled by start-time fair queueing (P. Goyal, H. M. Vin and H. Cheng, "Start-Time Fair Queuing", 1996), with the processor time of a
-// piece of work as its length; bulk work is first come, first served.
+// before those who have had much. Accounts that spent the same up to a factor of two take turns. Among the sessions of
+// one account, interactive work is scheduled by start-time fair queueing (P. Goyal, H. M. Vin and H. Cheng, "Start-Time
+// Fair Queuing", 1996), with the processor time of a piece of work as its length; bulk work is first come, first
+// served.
 class FairScheduler {
   struct Waiter;
   using BulkQueue = std::list<Waiter>;
@@ -44,8 +45,8 @@ class FairScheduler {
   // nobody else waits for them.
   enum class Lane { usual, heavy };
   // interactive: a view's first milliseconds, while nothing was sent for it. bulk: all else. Interactive work goes first,
-  // but leaves an eighth of the time to bulk work, so that no session starves; half of it, if its account spent more than that of the bulk
-  // work; and all of it, if that is much more.
+  // but leaves an eighth of the time to bulk work, so that no session starves; half of it, if its account spent more
+  // than that of the bulk work; and all of it, if that is much more.
   enum class Priority { interactive, bulk };
 
   // What one source of load has spent, and its waiting requests. Shared by its sessions; not destroyed while there are

@@ -31,7 +31,8 @@ class RemoteDataSets {
     std::string last_warning;  // logged since then, not to be repeated
   };
 
-  // memory: counts the data sets, and must outlive them. Callers have a Scope of its data memory. tolerates_damage: as of CatalogueWatcher.
+  // memory: counts the data sets, and must outlive them. Callers have a Scope of its data memory. tolerates_damage: as
+  // of CatalogueWatcher.
   RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage);
 
   // Reads all of them. Fails if one cannot be read. Throws what `parallel` throws.

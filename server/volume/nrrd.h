@@ -18,7 +18,8 @@ namespace intervale {
 Result<Volume> read_nrrd(const std::filesystem::path& path);
 
 // Writes header and samples into one file, raw and little endian: a temporary file that is renamed. read_nrrd returns
-// the same grid, bit by bit, and the same labels unless they begin or end with blanks, or the space is another one than RAS, LAS or LPS.
+// the same grid, bit by bit, and the same labels unless they begin or end with blanks, or the space is another one than
+// RAS, LAS or LPS.
 Result<void> write_nrrd(const std::filesystem::path& path, const Volume& volume);
 
 // The same file, written as its samples are made. Without commit(), nothing is left of it.

@@ -210,8 +210,8 @@ DepthMap depth_map_of(const Mesh& mesh, const Camera& camera) {
   return buffer.map();
 }
 
-// with_depth: as a client that sends a depth map whenever it has twice as many updates as at the last. shown: of a data set of
-// every range, of which it is measured how far its surfaces move.
+// with_depth: as a client that sends a depth map whenever it has twice as many updates as at the last. shown: of a data
+// set of every range, of which it is measured how far its surfaces move.
 Curve follow_plan(const Sigma& sigma, const Picture& picture, const Lod& lod, bool with_depth = false, const RangeRequest& shown = {}) {
   StreamPlan plan(sigma);
   if (!shown.ranges.empty()) plan.set_relevant(find_relevant_updates(sigma, resolve(sigma->description(), shown), Distances::measured));

@@ -1,7 +1,8 @@
 // What many clients need of servers that keep pages of files in a cache, and what they would need without a server.
 //
 // Sessions are recorded: the product's own, over real files, with the cameras and drags of intervale-load, by clients that
-// read as fast as they are sent to. Then a model (scaling.h) replays them for many clients. deploy/SCALING.md has the results.
+// read as fast as they are sent to. Then a model (scaling.h) replays them for many clients. deploy/SCALING.md has the
+// results.
 #include "tests/bench/scaling.h"
 
 #include <fmt/core.h>
@@ -120,8 +121,8 @@ RangeRequest first_shown(const Description& d) {
   return shown;
 }
 
-// One user, from the first view on. A view that takes longer than until the next one is given up, and those due before that are
-// skipped, as servers do.
+// One user, from the first view on. A view that takes longer than until the next one is given up, and those due before
+// that are skipped, as servers do.
 Recording record(const Volume& volume, const Pages& pages, LocalWorker& worker, Scenario scenario, std::uint64_t seed, const Options& options) {
   const Description& d = volume->description();
   const CameraPath path{
@@ -223,7 +224,8 @@ Template record_all(const std::string& file, const Options& options, std::string
   to.page_values = pages.values(volume->set());
   if (to.page_values.size() != to.page_bytes.size()) throw std::runtime_error(file + ": its pages are not those of its set");
   const double ms = view_ms(volume, options);
-  // As servers do, it keeps what was measured of ranges for other sessions. That of the range where sessions begin is not counted.
+  // As servers do, it keeps what was measured of ranges for other sessions. That of the range where sessions begin is
+  // not counted.
   LocalWorker worker(std::size_t(256) << 20);
   const auto measured = worker.ask(volume, resolve(volume->description(), first_shown(volume->description())), Distances::measured);
   while (worker.work()) continue;

@@ -1,7 +1,8 @@
 // What the viewer does in a browser, in figures, as a table: node viewer.mjs FILE.ivm BUCKYBALL.ivm EVERY.ivm [RUNS]
 // FILE: large, for everything but the first mesh. Its recorded moves are in full detail, with the frame rate that is the
-// default, and with any (all of the mesh in each picture); and of hardly any mesh, which is what pixels alone take. EVERY: the buckyball's field for every range, for changes of the
-// range. The environment is that of tests/web/support.mjs. Best on an idle machine.
+// default, and with any (all of the mesh in each picture); and of hardly any mesh, which is what pixels alone take.
+// EVERY: the buckyball's field for every range, for changes of the range. The environment is that of
+// tests/web/support.mjs. Best on an idle machine.
 import { copyFileSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { basename, join } from 'node:path';

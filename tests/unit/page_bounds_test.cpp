@@ -1,4 +1,5 @@
-// What the index of a file tells of its pages: which of them some ranges do not need, and that the rest is as in the whole file.
+// What the index of a file tells of its pages: which of them some ranges do not need, and that the rest is as in the
+// whole file.
 #include "common/ivm/page_bounds.h"
 
 #include <gtest/gtest.h>

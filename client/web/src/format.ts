@@ -28,7 +28,8 @@ const signed = (text: string): string => text.replace(/^-/, '−');
 // With n significant digits at most, and no grouping.
 export const withDigits = (x: number, n: number): string => signed(String(Number(x.toPrecision(n))));
 
-// A value and the bound of its error, with the digits that are significant: "123,400 ± 300". bound 0, or not known (null): the value only.
+// A value and the bound of its error, with the digits that are significant: "123,400 ± 300". bound 0, or not known
+// (null): the value only.
 export function bounded(value: number, bound: number | null): string {
   if (bound === null || !(bound > 0)) return digits(value, 6);
   const significant = value === 0 ? 1 : Math.ceil(Math.log10(Math.abs(value) / bound)) + 1;

@@ -1,6 +1,6 @@
 // Mesh files: .vtu holds the tetrahedra; .vtp, .ply, .stl, .obj and .glb hold the boundary's triangles, oriented
-// outward. .vtu and .vtp also hold the values of the points and the channels, if the mesh has them, and .vtu the range of each tetrahedron
-// of a mesh of several.
+// outward. .vtu and .vtp also hold the values of the points and the channels, if the mesh has them, and .vtu the range
+// of each tetrahedron of a mesh of several.
 #pragma once
 
 #include <cstddef>

@@ -34,8 +34,8 @@ export type Request =
   // most pixelError on the camera's screen. Nothing before 'open'.
   | { type: 'view'; view: View; number: number } // number: for Progress.view
   // Shown until the next 'view', of what was received; the server is not asked. If all of it would take too long, the
-  // ranges that differ from the view's are coarser. Answered by a report of the same type once its surface was sent, which the page's showing of the last one
-  // precedes; or without one where there is no mesh, or a 'view' came before.
+  // ranges that differ from the view's are coarser. Answered by a report of the same type once its surface was sent,
+  // which the page's showing of the last one precedes; or without one where there is no mesh, or a 'view' came before.
   | { type: 'preview'; ranges: [number, number][] }
   // Each is answered by a Cap; if a new one arrives before the answer, only the last is answered.
   | { type: 'clip'; plane: Plane | null }
@@ -88,8 +88,9 @@ export type Report =
   | { type: 'volume'; volume: Volume }
   | { type: 'order'; version: number; order: ArrayBuffer } // another order of the volume of this version; see Volume
   | { type: 'preview' }
-  // Interpolated at a point of the world, in the mesh's tetrahedron there: of the field, then of the data set's channels in their
-  // order, of a vector the length; NaN where values did not come along. null: outside of the box, or there is no mesh.
+  // Interpolated at a point of the world, in the mesh's tetrahedron there: of the field, then of the data set's
+  // channels in their order, of a vector the length; NaN where values did not come along. null: outside of the box, or
+  // there is no mesh.
   | { type: 'probed'; at: Vec3; values: number[] | null }
   | { type: 'saved'; format: MeshFormat; name: string; bytes: ArrayBuffer }
   | { type: 'digest'; digest: string; updates: number; tets: number }
@@ -129,11 +130,11 @@ export interface Progress {
   repeated: number; // updates received more than once; 0 unless the server has a defect
 }
 
-// The triangles of the boundary surface of one range's mesh in one part of the data's box. 16 bytes per vertex: x, y, z as float32;
-// the normal in world space as int8 of length 127 (averaged over the triangles of the vertex's own surface, or that of
-// the box's face); the level of detail as uint8: the scale of the triangles around it, 0 the finest.
-// Triangles: three uint32 indices, counterclockwise seen from outside in the world; first those on the alpha surface, then those on
-// beta, then those on the faces of the data's box.
+// The triangles of the boundary surface of one range's mesh in one part of the data's box. 16 bytes per vertex: x, y, z
+// as float32; the normal in world space as int8 of length 127 (averaged over the triangles of the vertex's own surface,
+// or that of the box's face); the level of detail as uint8: the scale of the triangles around it, 0 the finest.
+// Triangles: three uint32 indices, counterclockwise seen from outside in the world; first those on the alpha surface,
+// then those on beta, then those on the faces of the data's box.
 export interface SurfacePiece {
   id: number; // no other range has it
   range: number; // index among those shown

@@ -19,7 +19,8 @@ export interface Viewer {
   updates(): number;
   done(): boolean;
   progress(): Omit<Progress, 'view' | 'surfaceVersion' | 'memory' | 'busy'>;
-  // Whether pieces, caps and tetrahedra have values, the field's or a channel's, from the next updateSurface() on; if so, that must be of all.
+  // Whether pieces, caps and tetrahedra have values, the field's or a channel's, from the next updateSurface() on; if
+  // so, that must be of all.
   wantValues(wanted: boolean, channel: string): void;
   // all: every piece, changed or not. isOtherMesh: tetrahedra changed, perhaps only some inside.
   updateSurface(edges: boolean, all: boolean): Omit<SurfaceChange, 'version' | 'hasValues'> & { isOtherMesh: boolean };
