@@ -10,6 +10,7 @@
 #include "common/front/front.h"
 #include "common/front/front_state.h"
 #include "common/patch/channel.h"
+#include "common/ranges/bisection.h"
 
 namespace intervale {
 namespace {
@@ -54,9 +55,8 @@ class Search {
   Search(const FrontState& state, const Vec3& point) : state_(state), point_(point) {}
 
   PointInTet find() {
-    constexpr std::array<std::array<int, 3>, 6> kPaths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
     std::array<PointInTet, kPaths.size()> all;
-    for (std::size_t p = 0; p < kPaths.size(); ++p) {  // from corner to corner of the virtual grid, along one axis after the other
+    for (std::size_t p = 0; p < kPaths.size(); ++p) {  // of the virtual grid
       std::array<Vertex, 4> corner{};
       for (std::size_t i = 0; i < 3; ++i) {
         corner[i + 1] = corner[i];
@@ -65,7 +65,9 @@ class Search {
       all[p] = place_in(state_.domain, corner, 0, point_);
     }
     search(all);
-    for (double& weight : found_.weight) weight = std::max(weight, 0.0);
+    double sum = 0;
+    for (double& weight : found_.weight) sum += weight = std::max(weight, 0.0);
+    for (double& weight : found_.weight) weight /= sum;
     return found_;
   }
 
@@ -79,16 +81,19 @@ class Search {
     }
   }
   [[nodiscard]] bool is_in_box_of(const PointInTet& tet) const {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto [least, most] = std::minmax({at(tet, 0)[k], at(tet, 1)[k], at(tet, 2)[k], at(tet, 3)[k]});
-      if (point_[k] < least || point_[k] > most) return false;
+    std::array<bool, 3> is_above{}, is_below{};  // a corner at or beyond the point, on each axis
+    for (const Vertex corner : tet.corner) {
+      const Vec3 at = vec(state_.domain.clamp(corner));
+      for (std::size_t k = 0; k < 3; ++k) {
+        is_above[k] = is_above[k] || at[k] >= point_[k];
+        is_below[k] = is_below[k] || at[k] <= point_[k];
+      }
     }
-    return true;
+    return is_above[0] && is_above[1] && is_above[2] && is_below[0] && is_below[1] && is_below[2];
   }
-  [[nodiscard]] Vec3 at(const PointInTet& tet, std::size_t corner) const { return vec(state_.domain.clamp(tet.corner[corner])); }
 
   void descend(const PointInTet& here) {
-    const auto tail = std::size_t(3 - here.level % 3);
+    const auto tail = std::size_t(tail_of_class(here.level % 3));
     const Vertex a = here.corner[0], b = here.corner[tail], middle{(a.x + b.x) / 2, (a.y + b.y) / 2, (a.z + b.z) / 2};
     if (here.level == 3 * state_.domain.levels() || !is_shown(middle)) {
       if (here.least > found_.least) found_ = here;
@@ -114,28 +119,25 @@ class Search {
 };
 
 double field_at(const FrontState& state, const PointInTet& place) {
-  double value = 0, sum = 0;
+  double value = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const Vertex v = place.corner[i];
     const int scale = scale_of(v);
     const Slot slot = v == Vertex{} ? Slot() : kSlotOfType[type_of(v, scale)];
     value += place.weight[i] * state.values.format.value(block_of(state, v, scale)->key[slot]);
-    sum += place.weight[i];
   }
-  return value / sum;
+  return value;
 }
 
 double channel_at(const ChannelValues& channel, const PointInTet& place) {
   const MeshChannel source = channel.for_mesh();
   std::array<double, kMaxComponents> at{}, total{};
-  double sum = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     if (place.weight[i] == 0) continue;
     source.values_at(place.corner[i], std::span(at).first(source.components));
     for (std::size_t c = 0; c < source.components; ++c) total[c] += place.weight[i] * at[c];
-    sum += place.weight[i];
   }
-  return (source.components == 1 ? total[0] : std::hypot(total[0], total[1], total[2])) / sum;
+  return source.components == 1 ? total[0] : length(total);
 }
 
 }  // namespace

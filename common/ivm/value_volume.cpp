@@ -118,13 +118,12 @@ std::uint64_t count_diamonds(const Domain& domain, int scale, Vertex first, Vert
     const Vertex place = centre_of(0, {}, slot);
     const DiamondType& row = diamond_type(kTypeOfSlot[slot]);
     const auto &x = coordinates[0][std::size_t(place.x)], &y = coordinates[1][std::size_t(place.y)], &z = coordinates[2][std::size_t(place.z)];
+    const std::size_t odd = place.x % 2 != 0 ? 0 : place.y % 2 != 0 ? 1 : 2;  // of class 2: the spine's axis
     for (unsigned k = 0; k < 64; ++k) {
       const std::array<unsigned, 3> squeezed{k & 3, k >> 2 & 3, k >> 4};
       const std::uint64_t diamonds = x[squeezed[0]] * y[squeezed[1]] * z[squeezed[2]];
       if (diamonds == 0 || Domain::tets(row, squeezed) == 0) continue;
-      // A no-op: the spine's axis is the only odd one.
-      const std::size_t odd = place.x % 2 != 0 ? 0 : place.y % 2 != 0 ? 1 : 2;
-      if (row.cls == 2 && h == 1 && squeezed[odd] != 0) continue;
+      if (row.cls == 2 && h == 1 && squeezed[odd] != 0) continue;  // a no-op
       count += diamonds;
     }
   }

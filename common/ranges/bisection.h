@@ -22,6 +22,10 @@ struct BisectionTet {
   Vec3 gradient;               // of the interpolant
 };
 
+// The tetrahedra of a cube, which is a diamond of class 0, follow the paths along its edges from one end of the spine to the
+// other: the axes in order.
+inline constexpr std::array<std::array<int, 3>, 6> kPaths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
+
 [[nodiscard]] constexpr int tail_of_class(int cls) { return 3 - cls; }
 [[nodiscard]] constexpr int finer_class(int cls) { return cls == 2 ? 0 : cls + 1; }
 

@@ -10,6 +10,7 @@
 
 #include "common/diamond/diamond.h"
 #include "common/patch/range.h"
+#include "common/ranges/bisection.h"
 #include "common/ranges/field.h"
 #include "common/util/vec3.h"
 
@@ -62,9 +63,6 @@ struct Cube {
   // those behind, which clamping makes flat.
   Vec3 most;
 };
-
-// The tetrahedra of a cube follow the paths along its edges from one end of the spine to the other: the axes in order.
-inline constexpr std::array<std::array<int, 3>, 6> kPaths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
 
 // A point where the field crosses a surface: its barycentric coordinates in a tetrahedron.
 using Crossing [[gnu::vector_size(4 * sizeof(float))]] = float;

@@ -52,7 +52,7 @@ async function handle(request: Request): Promise<void> {
     case 'shown':
       return session?.pageShows(request.version);
     case 'probe':
-      return session?.probe(request.at);
+      return session ? session.probe(request.at) : report({ type: 'probed', at: request.at, values: null });
     case 'save':
       return session?.save(request.format);
     case 'digest':
