@@ -71,7 +71,7 @@ SupercubeSet::SupercubeSet(std::span<const SupercubeKey> keys, std::vector<std::
     size_ += std::size_t(std::popcount(occupancy_[s]));
   }
   bricks_.shrink_to_fit();
-  directory_.assign(bricks_.size() + bricks_.size() / 2 + 1, 0);
+  directory_.assign(places(bricks_.size()), 0);
   for (std::uint32_t b = 0; b < bricks_.size(); ++b) {
     std::size_t i = home(bricks_[b].key);
     while (directory_[i] != 0) i = i + 1 == directory_.size() ? 0 : i + 1;
@@ -131,10 +131,6 @@ Place SupercubeSet::place(UpdateIndex index) const {
   std::uint64_t word = occupancy_[s];
   for (; skip > 0; --skip) word &= word - 1;
   return {bricks_[brick].key + unsigned(std::countr_zero(mask)), brick, s, Slot(std::countr_zero(word)), index};
-}
-
-std::size_t SupercubeSet::memory_bytes() const {
-  return bricks_.size() * sizeof(Brick) + occupancy_.size() * 8 + first_in_brick_.size() * 2 + directory_.size() * 4;
 }
 
 }  // namespace intervale

@@ -101,7 +101,11 @@ class SupercubeSet {
   [[nodiscard]] std::size_t supercubes() const { return occupancy_.size(); }
   [[nodiscard]] std::size_t size() const { return size_; }                               // diamonds
   [[nodiscard]] std::span<const std::uint64_t> occupancy() const { return occupancy_; }  // by supercube
-  [[nodiscard]] std::size_t memory_bytes() const;
+  [[nodiscard]] std::size_t memory_bytes() const { return memory_bytes_of(bricks_.size(), occupancy_.size()); }
+  // Of a set with so many bricks and supercubes.
+  [[nodiscard]] static std::size_t memory_bytes_of(std::size_t bricks, std::size_t supercubes) {
+    return bricks * sizeof(Brick) + supercubes * (sizeof occupancy_[0] + sizeof first_in_brick_[0]) + places(bricks) * sizeof directory_[0];
+  }
 
   // Where a diamond is in the set, if it is. O(1). centre: coordinates in [0, 2^20], not all 0.
   [[nodiscard]] std::optional<Place> find(Vertex centre) const { return find(Diamond(centre)); }
@@ -171,6 +175,8 @@ class SupercubeSet {
   }
 
  private:
+  // Of the directory of so many bricks.
+  [[nodiscard]] static constexpr std::size_t places(std::size_t bricks) { return bricks + bricks / 2 + 1; }
   [[nodiscard]] std::size_t home(SupercubeKey brick_key) const;
   [[nodiscard]] std::optional<BrickIndex> find_brick(SupercubeKey brick_key) const;
   std::vector<Brick> bricks_;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
 #include <utility>
 
 #include "common/codec/coding_rate.h"
@@ -27,14 +26,6 @@ Grid grid_of(std::span<const std::byte> record) {
 
 // Of the updates that are there.
 int finest_scale(const IntervalVolume& volume) { return scale_of_key(volume.set().bricks().back().key); }
-
-Result<std::vector<std::byte>> read_part(std::ifstream& in, std::uint64_t first, std::uint64_t bytes) {
-  std::vector<std::byte> part(std::size_t(bytes), std::byte(0));
-  in.seekg(std::streamoff(first));
-  in.read(reinterpret_cast<char*>(part.data()), std::streamsize(part.size()));
-  if (!in) return fail("could not be read to its end");
-  return part;
-}
 
 }  // namespace
 
@@ -102,14 +93,13 @@ bool wants_finer(const IntervalVolume& volume, const Lod& lod) {
 
 Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path, const IntervalVolume* held,
                                                                  const ParallelFor& parallel) {
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  const std::streamoff size = in ? std::streamoff(in.tellg()) : -1;
-  if (size < 0) return fail("could not be read");
-  const auto bytes = std::uint64_t(size);
-  auto start = read_part(in, 0, std::min<std::uint64_t>(bytes, kStartBytes));
+  FileParts file;
+  if (auto opened = file.open(path); !opened) return tl::unexpected(opened.error());
+  const std::uint64_t bytes = file.bytes();
+  auto start = file.read(0, std::min<std::uint64_t>(bytes, kStartBytes));
   if (!start) return tl::unexpected(start.error());
   if (const std::uint64_t needed = start_bytes(*start, bytes); needed > start->size()) {
-    start = read_part(in, 0, needed);
+    start = file.read(0, needed);
     if (!start) return tl::unexpected(start.error());
   }
   const auto scales = coarse_scales(*start, bytes);
@@ -117,9 +107,9 @@ Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::file
   const auto next =
       std::find_if(scales->begin(), scales->end(), [&](const CoarseScales& s) { return held == nullptr || s.finest < finest_scale(*held); });
   if (next == scales->end()) return nullptr;
-  const auto first = read_part(in, 0, next->first_bytes);
+  const auto first = file.read(0, next->first_bytes);
   if (!first) return tl::unexpected(first.error());
-  const auto last = read_part(in, bytes - next->last_bytes, next->last_bytes);
+  const auto last = file.read(bytes - next->last_bytes, next->last_bytes);
   if (!last) return tl::unexpected(last.error());
   auto volume = decode_coarse({*first, *last, bytes}, *next, path.stem().string(), parallel);
   if (!volume) return tl::unexpected(volume.error());

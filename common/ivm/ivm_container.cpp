@@ -137,34 +137,21 @@ Result<Head> read_head(std::span<const std::byte> start, std::uint64_t bytes, st
   return fail("a data set of one range, not of every range");
 }
 
-// Reads the start of a file, and says how long the file is.
-Result<std::vector<std::byte>> read_start(std::ifstream& in, std::uint64_t& bytes) {
-  const std::streamoff size = in.tellg();
-  if (size < 0) return fail("not a file that can be read at once");
-  bytes = std::uint64_t(size);
-  std::vector<std::byte> start(std::size_t(std::min<std::uint64_t>(kMostHeadBytes, bytes)));
-  in.seekg(0);
-  in.read(reinterpret_cast<char*>(start.data()), std::streamsize(start.size()));
-  if (!in) return fail("could not be read to its end");
-  return start;
-}
+// The header and the table, at least, or all of a shorter file.
+Result<std::vector<std::byte>> read_start(FileParts& file) { return file.read(0, std::min<std::uint64_t>(kMostHeadBytes, file.bytes())); }
 
 Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std::optional<FileScope> scope, const ParallelFor& parallel) {
-  std::error_code code;
-  if (std::filesystem::is_directory(path, code)) return fail("is a folder, not an interval volume file (.ivm)");
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  if (!in) return fail(std::strerror(errno));
-  std::uint64_t size = 0;
-  auto bytes = read_start(in, size);
+  FileParts file;
+  if (auto opened = file.open(path); !opened) return tl::unexpected(opened.error());
+  auto bytes = read_start(file);
   if (!bytes) return bytes;
-  if (auto head = read_head(*bytes, size, scope); !head) return tl::unexpected(head.error());
-  bytes->reserve(std::size_t(size));  // takes memory only as it is filled
-  while (bytes->size() < size) {
+  if (auto head = read_head(*bytes, file.bytes(), scope); !head) return tl::unexpected(head.error());
+  bytes->reserve(std::size_t(file.bytes()));  // takes memory only as it is filled
+  while (bytes->size() < file.bytes()) {
     may_stop(parallel);
-    const std::size_t read = bytes->size();
-    bytes->resize(std::size_t(std::min<std::uint64_t>(size, read + kReadBytes)));
-    in.read(reinterpret_cast<char*>(bytes->data() + read), std::streamsize(bytes->size() - read));
-    if (!in) return fail("could not be read to its end");
+    const auto more = file.read(bytes->size(), std::min<std::uint64_t>(file.bytes() - bytes->size(), kReadBytes));
+    if (!more) return more;
+    bytes->insert(bytes->end(), more->begin(), more->end());
   }
   return bytes;
 }
@@ -306,12 +293,11 @@ std::optional<FileScope> scope_of(std::span<const std::byte> file) {
 }
 
 std::optional<FileScope> scope_of(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  std::uint64_t size = 0;
-  if (!in) return {};
-  const auto start = read_start(in, size);
+  FileParts file;
+  if (!file.open(path)) return {};
+  const auto start = read_start(file);
   if (!start) return {};
-  const auto head = read_head(*start, size);
+  const auto head = read_head(*start, file.bytes());
   if (!head) return {};
   return head->scope();
 }
@@ -320,6 +306,25 @@ Result<std::vector<std::byte>> read_container(const std::filesystem::path& path,
   auto bytes = read_bytes(path, scope, parallel);
   if (!bytes) return fail(path.string() + ": " + bytes.error().message);
   return bytes;
+}
+
+Result<void> FileParts::open(const std::filesystem::path& path) {
+  std::error_code code;
+  if (std::filesystem::is_directory(path, code)) return fail("is a folder, not an interval volume file (.ivm)");
+  in_.open(path, std::ios::binary | std::ios::ate);
+  if (!in_) return fail(std::strerror(errno));
+  const std::streamoff size = in_.tellg();
+  if (size < 0) return fail("not a file that can be read at once");
+  bytes_ = std::uint64_t(size);
+  return {};
+}
+
+Result<std::vector<std::byte>> FileParts::read(std::uint64_t first, std::uint64_t bytes) {
+  std::vector<std::byte> part(std::size_t(bytes), std::byte(0));
+  in_.seekg(std::streamoff(first));
+  in_.read(reinterpret_cast<char*>(part.data()), std::streamsize(part.size()));
+  if (!in_) return fail("could not be read to its end");
+  return part;
 }
 
 Result<void> save_container(const std::filesystem::path& path, std::span<const std::byte> bytes) {

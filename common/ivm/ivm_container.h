@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <new>
 #include <optional>
 #include <span>
@@ -159,6 +160,20 @@ struct StreamPlace {
 // allocates nothing for another file. Errors begin with the path. `parallel` may stop it.
 [[nodiscard]] Result<std::vector<std::byte>> read_container(const std::filesystem::path& path, std::optional<FileScope> scope,
                                                             const ParallelFor& parallel = serial);
+
+// Parts of a file. One thread at a time.
+class FileParts {
+ public:
+  // First. Fails if it is no file whose length is known.
+  [[nodiscard]] Result<void> open(const std::filesystem::path& path);
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }  // of the file
+  // Within the file.
+  [[nodiscard]] Result<std::vector<std::byte>> read(std::uint64_t first, std::uint64_t bytes);
+
+ private:
+  std::ifstream in_;
+  std::uint64_t bytes_ = 0;
+};
 
 // Writes a temporary file and renames it. Errors name the path.
 [[nodiscard]] Result<void> save_container(const std::filesystem::path& path, std::span<const std::byte> bytes);

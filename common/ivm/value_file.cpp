@@ -138,8 +138,8 @@ std::vector<std::byte> encode_values(const ValueVolume& volume, const ParallelFo
 
 namespace {
 
-// All but what the pages hold. finest: the finest scale of those that are there.
-Result<ValueVolume::Parts> read_description(const Container& file, std::string name, int finest) {
+// All but what the pages hold. finest: the finest scale of those that are there. pages_bytes: of their pages.
+Result<ValueVolume::Parts> read_description(const Container& file, std::uint64_t pages_bytes, std::string name, int finest) {
   ValueVolume::Parts parts;
   FieldDescription& d = parts.description;
   d.name = std::move(name);
@@ -148,8 +148,7 @@ Result<ValueVolume::Parts> read_description(const Container& file, std::string n
   if (auto ok = read_labels(file, d.labels); !ok) return tl::unexpected(ok.error());
   // Sizes before contents.
   if (d.grid.sample_count() > kMostSamples) return fail("more samples than this program can read");
-  if (least_values(d.grid, finest) > most_coded_bits(file[StreamType::pages].size()) + kRootVertices)
-    return fail("the file claims more values than it can hold");
+  if (least_values(d.grid, finest) > most_coded_bits(pages_bytes) + kRootVertices) return fail("the file claims more values than it can hold");
   file.claim(memory_to_decode(d));
   if (auto ok = read_weights(file, Domain(d.grid.dims).levels(), parts.weights); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_histogram(file[StreamType::histogram], d); !ok) return tl::unexpected(ok.error());
@@ -159,10 +158,62 @@ Result<ValueVolume::Parts> read_description(const Container& file, std::string n
 
 }  // namespace
 
+ValueSummary summary_of(const ValueVolume& volume, std::uint64_t file_bytes) {
+  return {volume.description(), volume.set().size(), volume.set().supercubes(), volume.memory_bytes(), file_bytes};
+}
+
+Result<std::optional<StreamPlace>> pages_beside_summary(std::span<const std::byte> start, std::uint64_t file_bytes) {
+  const auto scope = scope_of(start, file_bytes);
+  if (!scope) return tl::unexpected(scope.error());
+  if (*scope != FileScope::every_range) return std::nullopt;
+  const auto channels = place_of(StreamType::channels, start, file_bytes, *scope);
+  if (!channels) return tl::unexpected(channels.error());
+  if (channels->bytes != 0) return std::nullopt;
+  return place_of(StreamType::pages, start, file_bytes, *scope);
+}
+
+Result<ValueSummary> decode_summary(const FileEnds& ends, std::string name) {
+  const auto file = Container::open_ends(ends, FileScope::every_range);
+  if (!file) return tl::unexpected(file.error());
+  const auto pages = place_of(StreamType::pages, ends.first, ends.file_bytes, FileScope::every_range);
+  if (!pages) return tl::unexpected(pages.error());
+  auto parts = read_description(*file, pages->bytes, std::move(name), 0);
+  if (!parts) return tl::unexpected(parts.error());
+  ValueSummary summary{std::move(parts->description), 0, 0, 0, ends.file_bytes};
+  const ValueFormat& format = summary.description.format;
+  const Domain domain(summary.description.grid.dims);
+  const SetCounts counts = count_supercubes(domain);
+  summary.updates = count_diamonds(domain);
+  summary.supercubes = counts.supercubes;
+  const std::uint64_t levels = summary.updates - count_diamonds(domain, 0, {}, last_supercube(domain, 0));
+  summary.memory_bytes = format.memory_bytes() + SupercubeSet::memory_bytes_of(counts.bricks, counts.supercubes) +
+                         summary.updates * ValueKeys(0, format.last).width() + levels * sizeof(ErrorLevel);
+  return summary;
+}
+
+Result<std::optional<ValueSummary>> load_summary(const std::filesystem::path& path) {
+  const auto failed = [&path](const Error& error) { return fail(path.string() + ": " + error.message); };
+  FileParts file;
+  if (auto opened = file.open(path); !opened) return failed(opened.error());
+  const auto start = file.read(0, std::min<std::uint64_t>(file.bytes(), kMostHeadBytes));
+  if (!start) return failed(start.error());
+  const auto pages = pages_beside_summary(*start, file.bytes());
+  if (!pages) return failed(pages.error());
+  if (!*pages) return std::nullopt;
+  const std::uint64_t after = (*pages)->offset + (*pages)->bytes;
+  const auto first = file.read(0, (*pages)->offset);
+  if (!first) return failed(first.error());
+  const auto last = file.read(after, file.bytes() - after);
+  if (!last) return failed(last.error());
+  auto summary = decode_summary({*first, *last, file.bytes()}, path.stem().string());
+  if (!summary) return failed(summary.error());
+  return *std::move(summary);
+}
+
 Result<ValueVolume> decode_coarse_values(const FileEnds& ends, std::string name, int finest, const ParallelFor& parallel) {
   const auto file = Container::open_ends(ends, FileScope::every_range);
   if (!file) return tl::unexpected(file.error());
-  auto parts = read_description(*file, std::move(name), finest);
+  auto parts = read_description(*file, (*file)[StreamType::pages].size(), std::move(name), finest);
   if (!parts) return tl::unexpected(parts.error());
   const Domain domain(parts->description.grid.dims);
   parts->set = all_diamonds(domain, parallel, finest);
@@ -242,7 +293,7 @@ Result<std::optional<NeededPages>> needed_pages(const FileEnds& ends, const Show
 Result<ValueVolume> decode_needed_values(const FileEnds& ends, std::string name, const std::vector<bool>& pages, const ParallelFor& parallel) {
   const auto file = Container::open_ends(ends, FileScope::every_range);
   if (!file) return tl::unexpected(file.error());
-  auto parts = read_description(*file, std::move(name), 0);
+  auto parts = read_description(*file, (*file)[StreamType::pages].size(), std::move(name), 0);
   if (!parts) return tl::unexpected(parts.error());
   parts->set = all_diamonds(Domain(parts->description.grid.dims), parallel);
   const std::vector<ValuePage> all = pages_of(parts->set);
@@ -268,7 +319,7 @@ Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string 
                                   PageFaults* faults) {
   const auto file = Container::open(bytes, FileScope::every_range, room, faults != nullptr);
   if (!file) return tl::unexpected(file.error());
-  auto read = read_description(*file, std::move(name), 0);
+  auto read = read_description(*file, (*file)[StreamType::pages].size(), std::move(name), 0);
   if (!read) return tl::unexpected(read.error());
   ValueVolume::Parts& parts = *read;
   FieldDescription& d = parts.description;

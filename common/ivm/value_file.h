@@ -39,6 +39,23 @@ void append_bounds(Streams& streams, std::span<const PageBounds> bounds);
 [[nodiscard]] Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
                                                 std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
+// What is told of a data set without its values. memory_bytes: as ValueVolume's. file_bytes: of its file; 0: not known.
+struct ValueSummary {
+  FieldDescription description;
+  std::uint64_t updates = 0, supercubes = 0, memory_bytes = 0, file_bytes = 0;
+  friend bool operator==(const ValueSummary&, const ValueSummary&) = default;
+};
+[[nodiscard]] ValueSummary summary_of(const ValueVolume& volume, std::uint64_t file_bytes);
+// Of a file, by all of it but its pages: those are not looked at. Checks the rest as decode_values() does. Some
+// milliseconds at most.
+[[nodiscard]] Result<ValueSummary> decode_summary(const FileEnds& file, std::string name);
+// Where the pages lie that it does without, from the first kMostHeadBytes of a file, or more, or all. nullopt: it cannot tell
+// of such a file, which is of one range, or has channels.
+[[nodiscard]] Result<std::optional<StreamPlace>> pages_beside_summary(std::span<const std::byte> start, std::uint64_t file_bytes);
+// decode_summary() of a file, of which no more is read; nullopt as of pages_beside_summary(). The name is the file's. Errors
+// begin with the path.
+[[nodiscard]] Result<std::optional<ValueSummary>> load_summary(const std::filesystem::path& path);
+
 // Of a file whose ends are there (coarse_scales.h): the scales from `finest` on, 1 at least, whose pages the first end has.
 // Channels are left out. Checks all that is there as decode_values() does.
 [[nodiscard]] Result<ValueVolume> decode_coarse_values(const FileEnds& file, std::string name, int finest, const ParallelFor& parallel = serial);

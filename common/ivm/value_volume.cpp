@@ -4,7 +4,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <map>
 #include <utility>
+#include <vector>
 
 #include "common/diamond/supercube_neighbours.h"
 #include "common/util/bits.h"
@@ -134,6 +136,64 @@ std::uint64_t count_diamonds(const Domain& domain) {
   std::uint64_t count = 0;
   for (int scale = 0; scale < domain.levels(); ++scale) count += count_diamonds(domain, scale, {}, last_supercube(domain, scale));
   return count;
+}
+
+namespace {
+
+constexpr std::int32_t kBrickSide = 4;  // supercubes
+
+// Runs of so many supercubes on an axis that clamping treats alike: their number, and which is the first, counted from 0.
+struct AlikeRuns {
+  std::uint64_t count = 0;
+  std::int32_t first = 0;
+};
+// side: supercubes, kBrickSide at most. last: the last one.
+std::vector<AlikeRuns> alike_runs(const Domain& domain, int scale, int axis, std::int32_t last, std::int32_t side) {
+  constexpr std::uint8_t kBeyond = 4;  // other than what Domain::squeezed() tells
+  const std::int32_t most = std::int32_t(1) << domain.levels();
+  std::map<std::array<std::uint8_t, 4 * kBrickSide>, AlikeRuns> runs;  // by what it does to each place
+  for (std::int32_t run = 0; run <= last / side; ++run) {
+    std::array<std::uint8_t, 4 * kBrickSide> squeezed{};
+    squeezed.fill(kBeyond);
+    for (std::int32_t place = 0; place < 4 * side; ++place) {
+      const std::int32_t c = (run * 4 * side + place) << scale;
+      if (c <= most && run * side + place / 4 <= last) squeezed[std::size_t(place)] = std::uint8_t(domain.squeezed(axis, c, 1 << scale));
+    }
+    AlikeRuns& alike = runs.try_emplace(squeezed, AlikeRuns{0, run}).first->second;
+    ++alike.count;
+  }
+  std::vector<AlikeRuns> found;
+  for (const auto& [squeezed, alike] : runs) found.push_back(alike);
+  return found;
+}
+
+// How many cubes of side x side x side supercubes of a scale have diamonds.
+std::uint64_t count_cubes(const Domain& domain, int scale, std::int32_t side) {
+  const Vertex last = last_supercube(domain, scale);
+  const auto xs = alike_runs(domain, scale, 0, last.x, side), ys = alike_runs(domain, scale, 1, last.y, side),
+             zs = alike_runs(domain, scale, 2, last.z, side);
+  std::uint64_t count = 0;
+  for (const AlikeRuns& z : zs) {
+    for (const AlikeRuns& y : ys) {
+      for (const AlikeRuns& x : xs) {
+        const Vertex first{x.first * side, y.first * side, z.first * side};
+        const Vertex end{std::min(first.x + side - 1, last.x), std::min(first.y + side - 1, last.y), std::min(first.z + side - 1, last.z)};
+        if (count_diamonds(domain, scale, first, end) != 0) count += x.count * y.count * z.count;
+      }
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+SetCounts count_supercubes(const Domain& domain) {
+  SetCounts counts;
+  for (int scale = 0; scale < domain.levels(); ++scale) {
+    counts.bricks += count_cubes(domain, scale, kBrickSide);
+    counts.supercubes += count_cubes(domain, scale, 1);
+  }
+  return counts;
 }
 
 std::size_t coarse_diamonds(const SupercubeSet& set) {

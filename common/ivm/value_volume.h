@@ -108,6 +108,12 @@ class ValueVolume {
 // all scales. By coordinates, not by diamond: O(last - first).
 [[nodiscard]] std::uint64_t count_diamonds(const Domain& domain, int scale, Vertex first, Vertex last);
 [[nodiscard]] std::uint64_t count_diamonds(const Domain& domain);
+// How many supercubes all_diamonds() has, and bricks. By coordinates, too: O(samples of an axis).
+struct SetCounts {
+  std::uint64_t bricks = 0, supercubes = 0;
+  friend bool operator==(const SetCounts&, const SetCounts&) = default;
+};
+[[nodiscard]] SetCounts count_supercubes(const Domain& domain);
 
 // All diamonds as of all_diamonds(), of those supercubes that are wanted.
 [[nodiscard]] SupercubeSet some_diamonds(const Domain& domain, const std::function<bool(int scale, Vertex position)>& wanted,

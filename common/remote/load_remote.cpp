@@ -23,6 +23,40 @@ Result<std::shared_ptr<const IntervalVolume>> load_remote_volume(const RemoteUrl
   return std::make_shared<const IntervalVolume>(std::move(*volume));
 }
 
+namespace {
+
+// The bytes around a file's pages. False: they are not enough.
+RemoteOutcome<bool> read_around_pages(RemoteFile& file, const ParallelFor& parallel) {
+  if (auto begun = file.begin(parallel); !begun) return tl::unexpected(begun.error());
+  const FileEnds start = file.ends();
+  const auto pages = pages_beside_summary(start.first, start.file_bytes);
+  if (!pages || !*pages) return pages.has_value() ? RemoteOutcome<bool>(false) : true;  // decoding says what is wrong
+  const std::uint64_t after = start.file_bytes - (*pages)->offset - (*pages)->bytes;
+  if (start.first.size() <= start.file_bytes - after) {
+    if (auto read = file.read((*pages)->offset, after, parallel); !read) return tl::unexpected(read.error());
+  } else if (auto all = file.read_all(parallel); !all) {
+    return tl::unexpected(all.error());
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<std::optional<ValueSummary>> load_remote_summary(const RemoteUrl& url, const RemoteAccess& access, const ParallelFor& parallel) {
+  const RemoteLimits limits;
+  for (unsigned start = 0; start < kMostRemoteStarts; ++start) {
+    RemoteFile file(url, access, limits);
+    const auto is_there = read_around_pages(file, parallel);
+    if (!is_there && is_there.error().kind != RemoteFailure::Kind::changed) return tl::unexpected(is_there.error().error);
+    if (!is_there) continue;
+    if (!*is_there) return std::nullopt;
+    auto summary = decode_summary(file.ends(), url.name);
+    if (!summary) return fail(url.shown + ": " + summary.error().message);
+    return *std::move(summary);
+  }
+  return fail(url.shown + ": the file changes while it is read");
+}
+
 Result<std::shared_ptr<const IntervalVolume>> RemoteVolume::next(const ParallelFor& parallel) { return go_on(false, parallel); }
 Result<std::shared_ptr<const IntervalVolume>> RemoteVolume::whole(const ParallelFor& parallel) { return go_on(true, parallel); }
 

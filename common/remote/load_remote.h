@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/ivm/coarse_scales.h"
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/page_faults.h"
+#include "common/ivm/value_file.h"
 #include "common/patch/shown_range.h"
 #include "common/remote/read_remote.h"
 
@@ -19,7 +21,11 @@ namespace intervale {
                                                                                const ShownRanges& shown = {}, const ParallelFor& parallel = serial,
                                                                                PageFaults* faults = nullptr);
 
-// The same, from coarse to fine: a data set of every range is there as soon as its coarse scales are (coarse_scales.h),
+// decode_summary() of a file: its pages are not read. nullopt as of pages_beside_summary(). Errors begin with the URL.
+[[nodiscard]] Result<std::optional<ValueSummary>> load_remote_summary(const RemoteUrl& url, const RemoteAccess& access,
+                                                                      const ParallelFor& parallel = serial);
+
+// As load_remote_volume(), from coarse to fine: a data set of every range is there as soon as its coarse scales are (coarse_scales.h),
 // and of its finer ones only those pages are read that some ranges need (page_bounds.h). All others are read whole, and
 // those on servers that know no ranges. One thread at a time.
 class RemoteVolume {

@@ -209,8 +209,9 @@ Result<nlohmann::ordered_json> write_every_range(const Build& build, std::string
   parts->channel_keys = std::move(built->keys);
   const ValueVolume made(std::move(*parts));
   if (auto saved = save_values(build.options.output, made, on_all_cores, build.checkpoint); !saved) return tl::unexpected(saved.error());
-  text = text_of(made, file_size_of(build.options.output));
-  return stats_of(made, file_size_of(build.options.output));
+  const ValueSummary summary = summary_of(made, file_size_of(build.options.output));
+  text = text_of(summary);
+  return stats_of(summary);
 }
 
 // The journal of a build: beside the output, or in the scratch folder, where the outputs of other folders have other names.

@@ -93,8 +93,8 @@ std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes) {
                             human_bytes(volume.memory_bytes()), times(volume.memory_bytes()), human_bytes(file_bytes), times(file_bytes));
 }
 
-nlohmann::ordered_json stats_of(const ValueVolume& volume, std::uint64_t file_bytes) {
-  const FieldDescription& d = volume.description();
+nlohmann::ordered_json stats_of(const ValueSummary& set) {
+  const FieldDescription& d = set.description;
   nlohmann::ordered_json stats{{"name", d.name}, {"scope", "every"}};
   add_grid(stats, d.grid, d.labels);
   stats["channels"] = to_json(d.channels);
@@ -103,18 +103,18 @@ nlohmann::ordered_json stats_of(const ValueVolume& volume, std::uint64_t file_by
       {"values", {{"least", d.format.least()}, {"greatest", d.format.greatest()}}},
       {"step", d.is_exact ? 0.0 : d.format.step},
       {"max_error", d.max_error},
-      {"updates", volume.set().size()},
-      {"supercubes", volume.set().supercubes()},
-      {"memory_bytes", volume.memory_bytes()},
-      {"file_bytes", file_bytes},
+      {"updates", set.updates},
+      {"supercubes", set.supercubes},
+      {"memory_bytes", set.memory_bytes},
+      {"file_bytes", set.file_bytes},
       {"histogram", d.statistics.histogram.count},
       {"histogram_width", d.statistics.histogram.width},
   });
   return stats;
 }
 
-std::string text_of(const ValueVolume& volume, std::uint64_t file_bytes) {
-  const FieldDescription& d = volume.description();
+std::string text_of(const ValueSummary& set) {
+  const FieldDescription& d = set.description;
   const std::uint64_t raw = d.grid.sample_count() * size_of(d.format.type);
   std::string text = fmt::format("{}: {} x {} x {} samples of type {}, every range\n", printable(d.name), d.grid.dims[0], d.grid.dims[1],
                                  d.grid.dims[2], name_of(d.format.type));
@@ -123,10 +123,10 @@ std::string text_of(const ValueVolume& volume, std::uint64_t file_bytes) {
       "values {:g} to {:g}, {}\n", d.format.least(), d.format.greatest(),
       d.is_exact ? std::string("exact") : fmt::format("rounded to multiples of {:g}: off by {:g} at most", d.format.step, d.format.step / 2));
   text += text_of(d.channels);
-  text += fmt::format("{} updates, {} supercubes, largest error {:g}\n", volume.set().size(), volume.set().supercubes(), d.max_error);
-  text += fmt::format("in memory {} ({:.2f} bytes a sample), in the file {} ({:.2f} times smaller than the samples)\n",
-                      human_bytes(volume.memory_bytes()), double(volume.memory_bytes()) / double(d.grid.sample_count()), human_bytes(file_bytes),
-                      file_bytes == 0 ? 0.0 : double(raw) / double(file_bytes));
+  text += fmt::format("{} updates, {} supercubes, largest error {:g}\n", set.updates, set.supercubes, d.max_error);
+  text += fmt::format("in memory {} ({:.2f} bytes a sample), in the file {} ({:.2f} times smaller than the samples)\n", human_bytes(set.memory_bytes),
+                      double(set.memory_bytes) / double(d.grid.sample_count()), human_bytes(set.file_bytes),
+                      set.file_bytes == 0 ? 0.0 : double(raw) / double(set.file_bytes));
   return text + "histogram (bars: cube root of the number of samples)\n" + bars_of(d.statistics.histogram);
 }
 

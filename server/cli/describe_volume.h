@@ -7,7 +7,7 @@
 #include <string>
 
 #include "common/ivm/interval_volume.h"
-#include "common/ivm/value_volume.h"
+#include "common/ivm/value_file.h"
 
 namespace intervale {
 
@@ -18,7 +18,7 @@ namespace intervale {
 [[nodiscard]] std::uint64_t file_size_of(const std::filesystem::path& file);
 
 // Of a data set of every range. The text has the histogram as bars.
-[[nodiscard]] nlohmann::ordered_json stats_of(const ValueVolume& volume, std::uint64_t file_bytes);
-[[nodiscard]] std::string text_of(const ValueVolume& volume, std::uint64_t file_bytes);
+[[nodiscard]] nlohmann::ordered_json stats_of(const ValueSummary& set);
+[[nodiscard]] std::string text_of(const ValueSummary& set);
 
 }  // namespace intervale

@@ -16,6 +16,7 @@
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/ranges/find_relevant_updates.h"
+#include "common/remote/load_remote.h"
 #include "common/remote/read_remote.h"
 #include "common/remote/remote_options.h"
 #include "common/util/printable.h"
@@ -39,6 +40,16 @@ struct InfoCommand {
 std::uint64_t size_of(const IntervalVolume& volume) { return volume.size(); }
 std::uint64_t size_of(const ValueVolume& volume) { return volume.set().size(); }
 
+// What info tells of: a ValueSummary, or this.
+struct OneRange {
+  std::shared_ptr<const IntervalVolume> set;
+  std::uint64_t file_bytes = 0;
+};
+const Grid& grid_of(const ValueSummary& summary) { return summary.description.grid; }
+const Grid& grid_of(const OneRange& one) { return one.set->description().grid; }
+nlohmann::ordered_json stats_of(const OneRange& one) { return stats_of(*one.set, one.file_bytes); }
+std::string text_of(const OneRange& one) { return text_of(*one.set, one.file_bytes); }
+
 // Of the box of the samples, which may be oblique: in cubic world units.
 double box_volume(const Grid& grid) {
   double volume = std::abs(grid.affine.determinant());
@@ -47,10 +58,11 @@ double box_volume(const Grid& grid) {
 }
 
 // The volume where the interpolated field lies in a range: from the table of volumes, or summed over the mesh.
-Result<double> enclosed_volume(const std::shared_ptr<const ValueVolume>& set, const Range& range) {
-  return set->description().statistics.volumes.share_of(range) * box_volume(set->description().grid);
+Result<double> enclosed_volume(const ValueSummary& summary, const Range& range) {
+  return summary.description.statistics.volumes.share_of(range) * box_volume(grid_of(summary));
 }
-Result<double> enclosed_volume(const std::shared_ptr<const IntervalVolume>& set, const Range& range) {
+Result<double> enclosed_volume(const OneRange& one, const Range& range) {
+  const auto& set = one.set;
   const ShownRange shown = resolve(set->description(), range, {});
   if (auto held = check_held(set->description(), shown); !held) return tl::unexpected(held.error());
   const auto extracted = extract(*set, *find_relevant_updates(set, {shown}, Distances::none, on_all_cores), {}, on_all_cores);
@@ -59,23 +71,30 @@ Result<double> enclosed_volume(const std::shared_ptr<const IntervalVolume>& set,
 }
 
 template <class DataSet>
-Result<void> print_data_set(const InfoCommand& options, const std::shared_ptr<const DataSet>& set, std::uint64_t file_bytes) {
+Result<void> print_info(const InfoCommand& options, const DataSet& set) {
   const auto range = parse_range(options.range);
   if (!range) return tl::unexpected(range.error());
   const auto volume = *range ? enclosed_volume(set, **range) : Result<double>(0);
   if (!volume) return tl::unexpected(volume.error());
-  const double share = *volume / box_volume(set->description().grid);
+  const double share = *volume / box_volume(grid_of(set));
   if (options.json) {
-    auto stats = stats_of(*set, file_bytes);
+    auto stats = stats_of(set);
     if (*range) {
       stats["enclosed_volume"] = *volume;
       stats["enclosed_share"] = share;
     }
     return print_json(stats);
   }
-  std::string text = text_of(*set, file_bytes);
+  std::string text = text_of(set);
   if (*range) text += fmt::format("range [{:g}, {:g}]: volume {:.6g}, {:.4g} % of the box\n", (*range)->alpha, (*range)->beta, *volume, 100 * share);
   return print(text);
+}
+
+Result<void> print_data_set(const InfoCommand& options, const std::shared_ptr<const ValueVolume>& set, std::uint64_t file_bytes) {
+  return print_info(options, summary_of(*set, file_bytes));
+}
+Result<void> print_data_set(const InfoCommand& options, const std::shared_ptr<const IntervalVolume>& set, std::uint64_t file_bytes) {
+  return print_info(options, OneRange{set, file_bytes});
 }
 
 template <class DataSet>
@@ -116,6 +135,16 @@ Result<void> with_remote(const InfoCommand& options, const ParallelFor& parallel
 template <class Use>
 Result<void> with_data_set(const InfoCommand& options, const ParallelFor& parallel, PageFaults* faults, const Use& use) {
   return is_remote_url(options.file) ? with_remote(options, parallel, faults, use) : with_local(options.file, parallel, faults, use);
+}
+
+// As of load_summary().
+Result<std::optional<ValueSummary>> load_any_summary(const InfoCommand& options) {
+  if (!is_remote_url(options.file)) return load_summary(options.file);
+  const auto url = parse_remote_url(options.file);
+  if (!url) return tl::unexpected(url.error());
+  const auto access = read_access(options.remote);
+  if (!access) return tl::unexpected(access.error());
+  return load_remote_summary(*url, *access, on_all_cores);
 }
 
 const char* name_of(Encoding encoding) {
@@ -209,6 +238,9 @@ Result<void> run_info(const InfoCommand& options) {
     if (!printed) return tl::unexpected(printed.error());
     if (*printed) return {};
   }
+  const auto summary = load_any_summary(options);
+  if (!summary) return tl::unexpected(summary.error());
+  if (*summary) return print_info(options, **summary);
   return with_data_set(options, on_all_cores, nullptr,
                        [&](const auto& set, std::uint64_t file_bytes) { return print_data_set(options, set, file_bytes); });
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "client/local/fetch_local.h"
+#include "common/ivm/ivm_file.h"
 #include "common/ivm/load_volume.h"
 #include "common/ivm/value_file.h"
 #include "common/mesh/mesh_digest.h"
@@ -176,6 +177,26 @@ TEST(RemoteVolume, ReadsOnlyThePagesThatRangesNeed) {
   std::size_t asked = 0;
   for (const auto& [first, end] : ranges_of(server, file.size())) asked += end - first;
   EXPECT_LT(asked, file.size() * 3 / 4);
+}
+
+TEST(RemoteSummary, NeedsNoPages) {
+  const FileServer server(contents());
+  const RemoteUrl url = parse_remote_url(server.url()).value();
+  const auto summary = load_remote_summary(url, {}, on_all_cores);
+  ASSERT_TRUE(summary && *summary) << summary.error().message;
+  EXPECT_EQ(**summary, summary_of(decode_values(std::as_bytes(std::span(contents())), url.name, on_all_cores).value(), contents().size()));
+  EXPECT_EQ(server.requests().size(), 2U);
+  std::size_t asked = 0;
+  for (const auto& [first, end] : ranges_of(server, contents().size())) asked += end - first;
+  EXPECT_LT(asked, 2 * kFirst);
+  const std::string one = text_of_bytes(encode_ivm(testing::build(testing::digits({9, 7, 5}, 1), {{2, 5}, Refine::boundary})));
+  const FileServer of_one(one);
+  const auto none = load_remote_summary(parse_remote_url(of_one.url()).value(), {}, on_all_cores);
+  EXPECT_TRUE(none && !*none);
+  const FileServer text("no data set");
+  const auto refused = load_remote_summary(parse_remote_url(text.url()).value(), {}, on_all_cores);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, AllOf(StartsWith(text.url()), HasSubstr("not an interval volume file")));
 }
 
 TEST(RemoteVolume, OthersAreReadWhole) {

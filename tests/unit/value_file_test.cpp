@@ -45,6 +45,7 @@ TEST(AllDiamonds, AreCountedBySupercubesAndByBlocks) {
     const Domain domain(dims);
     const SupercubeSet all = all_diamonds(domain);
     EXPECT_EQ(count_diamonds(domain), all.size());
+    EXPECT_EQ(count_supercubes(domain), (SetCounts{all.bricks().size(), all.supercubes()}));
     for (int scale = 0; scale < domain.levels(); ++scale) {
       const Vertex last = last_supercube(domain, scale);
       const auto some = [&](std::int32_t most) { return std::int32_t(random() % unsigned(most + 1)); };
@@ -100,6 +101,55 @@ TEST(ValueFile, RefusesEveryFlippedByteAndEveryTruncation) {
   std::vector<std::byte> longer = bytes;
   longer.emplace_back();
   EXPECT_FALSE(decode_values(longer, "long"));
+}
+
+// The bytes around a file's pages, as if those were not there.
+struct AroundPages {
+  explicit AroundPages(std::span<const std::byte> bytes) : pages(pages_beside_summary(bytes, bytes.size()).value().value()) {
+    first.assign(bytes.begin(), bytes.begin() + std::ptrdiff_t(pages.offset));
+    last.assign(bytes.begin() + std::ptrdiff_t(pages.offset + pages.bytes), bytes.end());
+    file_bytes = bytes.size();
+  }
+  [[nodiscard]] FileEnds ends() const { return {first, last, file_bytes}; }
+  StreamPlace pages;
+  std::vector<std::byte> first, last;
+  std::uint64_t file_bytes = 0;
+};
+
+TEST(ValueSummary, IsThatOfTheVolumeAndNeedsNoPages) {
+  const TempDir folder;
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    const Dims boxes[] = {{9, 7, 5}, {2, 2, 2}, {2, 3, 40}, {70, 67, 66}};
+    const std::vector<std::byte> bytes = encode_values(build(testing::random_value_field(boxes[seed % 4], seed)), on_all_cores);
+    const ValueSummary expected = summary_of(decode_values(bytes, "scan").value(), bytes.size());
+    const auto summary = decode_summary(AroundPages(bytes).ends(), "scan");
+    ASSERT_TRUE(summary) << summary.error().message;
+    EXPECT_EQ(*summary, expected);
+    EXPECT_EQ(decode_summary({bytes, {}, bytes.size()}, "scan").value(), expected);
+    const auto file = folder.file("scan.ivm", std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+    EXPECT_EQ(load_summary(file).value(), expected);
+  }
+}
+
+TEST(ValueSummary, RefusesEveryFlippedByteButThoseOfPages) {
+  std::vector<std::byte> bytes = small_file();
+  AroundPages around(bytes);
+  for (std::vector<std::byte>* part : {&around.first, &around.last}) {
+    for (std::size_t i = 0; i < part->size(); ++i) {
+      (*part)[i] ^= std::byte(1 << i % 8);
+      EXPECT_FALSE(decode_summary(around.ends(), "damaged")) << "byte " << i;
+      (*part)[i] ^= std::byte(1 << i % 8);
+    }
+    EXPECT_TRUE(decode_summary(around.ends(), "whole"));
+    const std::byte last = part->back();
+    part->pop_back();
+    EXPECT_FALSE(decode_summary(around.ends(), "short"));
+    part->push_back(last);
+  }
+  const TempDir folder;
+  EXPECT_THAT(load_summary(folder.path() / "none.ivm").error().message, HasSubstr("none.ivm: No such file"));
+  EXPECT_THAT(load_summary(folder.path()).error().message, HasSubstr("is a folder"));
+  EXPECT_THAT(load_summary(folder.file("text.ivm", "no data set")).error().message, HasSubstr("text.ivm: not an interval volume file"));
 }
 
 TEST(ValueFile, SaysWhichVersionItReads) {
