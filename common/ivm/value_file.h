@@ -49,11 +49,11 @@ struct ValueSummary {
 // Of a file, by all of it but its pages: those are not looked at. Checks the rest as decode_values() does. Some
 // milliseconds at most.
 [[nodiscard]] Result<ValueSummary> decode_summary(const FileEnds& file, std::string name);
-// Where the pages lie that it does without, from the first kMostHeadBytes of a file, or more, or all. nullopt: it cannot tell
-// of such a file, which is of one range, or has channels.
+// Where the pages lie that it does without, from the first kMostHeadBytes of a file, or more, or all. nullopt: it needs
+// the file whole, which is of one range, or has channels.
 [[nodiscard]] Result<std::optional<StreamPlace>> pages_beside_summary(std::span<const std::byte> start, std::uint64_t file_bytes);
-// decode_summary() of a file, of which no more is read; nullopt as of pages_beside_summary(). The name is the file's. Errors
-// begin with the path.
+// decode_summary() of a file, of which no more is read; nullopt as of pages_beside_summary(). The name is the file's.
+// Errors begin with the path.
 [[nodiscard]] Result<std::optional<ValueSummary>> load_summary(const std::filesystem::path& path);
 
 // Of a file whose ends are there (coarse_scales.h): the scales from `finest` on, 1 at least, whose pages the first end has.

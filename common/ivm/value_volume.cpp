@@ -142,7 +142,7 @@ namespace {
 
 constexpr std::int32_t kBrickSide = 4;  // supercubes
 
-// Runs of so many supercubes on an axis that clamping treats alike: their number, and which is the first, counted from 0.
+// Runs of so many supercubes on an axis that clamping treats alike: their number, and the first one's, from 0 on.
 struct AlikeRuns {
   std::uint64_t count = 0;
   std::int32_t first = 0;

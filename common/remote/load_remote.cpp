@@ -25,18 +25,18 @@ Result<std::shared_ptr<const IntervalVolume>> load_remote_volume(const RemoteUrl
 
 namespace {
 
-// The bytes around a file's pages. False: they are not enough.
-RemoteOutcome<bool> read_around_pages(RemoteFile& file, const ParallelFor& parallel) {
+// The bytes around a file's pages, or all if there is hardly anything else, or more behind them than any writer puts
+// there. False: decode_summary() needs the file whole.
+RemoteOutcome<bool> read_around_pages(RemoteFile& file, const RemoteLimits& limits, const ParallelFor& parallel) {
   if (auto begun = file.begin(parallel); !begun) return tl::unexpected(begun.error());
   const FileEnds start = file.ends();
   const auto pages = pages_beside_summary(start.first, start.file_bytes);
-  if (!pages || !*pages) return pages.has_value() ? RemoteOutcome<bool>(false) : true;  // decoding says what is wrong
+  if (!pages) return true;  // decode_summary() says what is wrong
+  if (!*pages) return false;
   const std::uint64_t after = start.file_bytes - (*pages)->offset - (*pages)->bytes;
-  if (start.first.size() <= start.file_bytes - after) {
-    if (auto read = file.read((*pages)->offset, after, parallel); !read) return tl::unexpected(read.error());
-  } else if (auto all = file.read_all(parallel); !all) {
-    return tl::unexpected(all.error());
-  }
+  const bool is_apart = after <= limits.range_bytes && start.first.size() <= start.file_bytes - after;
+  const auto read = is_apart ? file.read((*pages)->offset, after, parallel) : file.read_all(parallel);
+  if (!read) return tl::unexpected(read.error());
   return true;
 }
 
@@ -46,7 +46,7 @@ Result<std::optional<ValueSummary>> load_remote_summary(const RemoteUrl& url, co
   const RemoteLimits limits;
   for (unsigned start = 0; start < kMostRemoteStarts; ++start) {
     RemoteFile file(url, access, limits);
-    const auto is_there = read_around_pages(file, parallel);
+    const auto is_there = read_around_pages(file, limits, parallel);
     if (!is_there && is_there.error().kind != RemoteFailure::Kind::changed) return tl::unexpected(is_there.error().error);
     if (!is_there) continue;
     if (!*is_there) return std::nullopt;

@@ -25,9 +25,9 @@ namespace intervale {
 [[nodiscard]] Result<std::optional<ValueSummary>> load_remote_summary(const RemoteUrl& url, const RemoteAccess& access,
                                                                       const ParallelFor& parallel = serial);
 
-// As load_remote_volume(), from coarse to fine: a data set of every range is there as soon as its coarse scales are (coarse_scales.h),
-// and of its finer ones only those pages are read that some ranges need (page_bounds.h). All others are read whole, and
-// those on servers that know no ranges. One thread at a time.
+// As load_remote_volume(), from coarse to fine: a data set of every range is there as soon as its coarse scales are
+// (coarse_scales.h), and of its finer ones only those pages are read that some ranges need (page_bounds.h). All others
+// are read whole, and those on servers that know no ranges. One thread at a time.
 class RemoteVolume {
  public:
   // What is given must outlive it. shown: the only ranges that it is for; none: all.
