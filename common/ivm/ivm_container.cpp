@@ -149,7 +149,7 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
   bytes->reserve(std::size_t(file.bytes()));  // takes memory only as it is filled
   while (bytes->size() < file.bytes()) {
     may_stop(parallel);
-    const auto more = file.read(bytes->size(), std::min<std::uint64_t>(file.bytes() - bytes->size(), kReadBytes));
+    auto more = file.read(bytes->size(), std::min<std::uint64_t>(file.bytes() - bytes->size(), kReadBytes));
     if (!more) return more;
     bytes->insert(bytes->end(), more->begin(), more->end());
   }

@@ -163,6 +163,7 @@ std::vector<AlikeRuns> alike_runs(const Domain& domain, int scale, int axis, std
     ++alike.count;
   }
   std::vector<AlikeRuns> found;
+  found.reserve(runs.size());
   for (const auto& [squeezed, alike] : runs) found.push_back(alike);
   return found;
 }
