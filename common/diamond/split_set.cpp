@@ -16,7 +16,7 @@ std::uint64_t deposit_portably(std::uint64_t bits, std::uint64_t mask) {
   for (std::uint64_t left = mask; left != 0; left &= left - 1, bits >>= 1) result |= left & (~left + 1) & (~(bits & 1) + 1);
   return result;
 }
-// The inverse: moves the bits at the ones of `mask` to the lowest positions, in their order.
+// See SplitSet::extract().
 std::uint64_t extract_portably(std::uint64_t bits, std::uint64_t mask) {
   std::uint64_t result = 0;
   for (std::uint64_t left = mask, to = 1; left != 0; left &= left - 1, to <<= 1) result |= (bits >> std::countr_zero(left) & 1) != 0 ? to : 0;
@@ -26,9 +26,6 @@ std::uint64_t extract_portably(std::uint64_t bits, std::uint64_t mask) {
 __attribute__((target("bmi2"))) std::uint64_t deposit_bmi2(std::uint64_t bits, std::uint64_t mask) { return _pdep_u64(bits, mask); }
 __attribute__((target("bmi2"))) std::uint64_t extract_bmi2(std::uint64_t bits, std::uint64_t mask) { return _pext_u64(bits, mask); }
 const bool kHasBmi2 = __builtin_cpu_supports("bmi2") != 0;
-std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return kHasBmi2 ? extract_bmi2(bits, mask) : extract_portably(bits, mask); }
-#else
-std::uint64_t extract(std::uint64_t bits, std::uint64_t mask) { return extract_portably(bits, mask); }
 #endif
 
 }  // namespace
@@ -71,6 +68,13 @@ std::uint64_t SplitSet::deposit(std::uint64_t bits, std::uint64_t mask) {
   if (kHasBmi2) return deposit_bmi2(bits, mask);
 #endif
   return deposit_portably(bits, mask);
+}
+
+std::uint64_t SplitSet::extract(std::uint64_t bits, std::uint64_t mask) {
+#if defined(__x86_64__)
+  if (kHasBmi2) return extract_bmi2(bits, mask);
+#endif
+  return extract_portably(bits, mask);
 }
 
 void SplitSet::insert(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots) {

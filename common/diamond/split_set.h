@@ -38,6 +38,8 @@ class SplitSet {
   void erase(UpdateIndex first, std::uint64_t occupancy, std::uint64_t slots);
   // Moves the lowest bits of `bits`, in their order, to the positions of the ones of `mask`.
   [[nodiscard]] static std::uint64_t deposit(std::uint64_t bits, std::uint64_t mask);
+  // The inverse: moves the bits at the ones of `mask` to the lowest positions, in their order.
+  [[nodiscard]] static std::uint64_t extract(std::uint64_t bits, std::uint64_t mask);
   [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;  // all of it, in order
   friend bool operator==(const SplitSet& a, const SplitSet& b);
 

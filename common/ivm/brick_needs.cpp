@@ -4,6 +4,8 @@
 #include <bit>
 #include <utility>
 
+#include "common/diamond/split_set.h"
+
 namespace intervale {
 namespace {
 
@@ -25,9 +27,12 @@ std::uint8_t highest_step(std::span<const std::uint8_t> steps, std::uint64_t rel
 
 }  // namespace
 
-BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs,
-                       Surface surface)
-    : highest_(needs.size()), slopes_(in_halves(surface.slopes)), distances_(std::move(surface.distances)) {
+BrickPart::BrickPart(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs,
+                     Surface surface)
+    : highest_(needs.size()),
+      slopes_(in_halves(surface.slopes)),
+      distances_(std::move(surface.distances)),
+      scale_(scale_of_key(set.bricks()[brick].key)) {
   const bool has_surface = !slopes_.empty() || !distances_.empty();
   if (has_surface) first_.resize(needs.size());
   slots_.resize(needs.size());
@@ -51,54 +56,36 @@ BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<cons
   if (is_all) slots_ = {};
 }
 
-BrickNeeds::BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<const BrickNeeds*> parts) : parts_(std::move(parts)) {
-  const int scale = scale_of_key(set.bricks()[brick].key);
-  bool is_all = true;
-  highest_.reserve(parts_.front()->highest_.size());
-  slots_.reserve(parts_.front()->highest_.size());
-  set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
-    const std::size_t n = highest_.size();
-    const std::uint64_t occupancy = set.occupancy()[s];
-    Highest highest;
-    std::uint64_t slots = 0;
-    for (const BrickNeeds* const part : parts_) {
-      const Highest& one = part->highest_[n];
-      slots |= part->slots(n, occupancy);
-      highest = {ErrorToDistance::farther(highest.to_distance, one.to_distance, scale), std::max(highest.error_step, one.error_step),
-                 std::max(highest.slope, one.slope), std::max(highest.distance, one.distance)};
-    }
-    highest_.push_back(highest);
-    slots_.push_back(slots);
-    updates_ += unsigned(std::popcount(slots));
-    is_all = is_all && slots == occupancy;
-  });
-  if (is_all) slots_ = {};
-}
-
-void BrickNeeds::add_parts(std::vector<const BrickNeeds*>& to) const {
-  const auto add = [&](const BrickNeeds* part) {
-    if (std::find(to.begin(), to.end(), part) == to.end()) to.push_back(part);
-  };
-  if (parts_.empty()) add(this);
-  for (const BrickNeeds* const part : parts_) add(part);
+std::size_t BrickPart::memory_bytes() const {
+  return sizeof *this + highest_.size() * sizeof highest_[0] + slots_.size() * sizeof slots_[0] + first_.size() * sizeof first_[0] + slopes_.size() +
+         distances_.size();
 }
 
 BrickNeeds::OfSupercube BrickNeeds::of_supercube(std::size_t supercube, std::uint64_t relevant) const {
   static constexpr std::array<std::uint8_t, std::size_t(64) * kSlots> kNotKnown{};  // of as many as a brick has
   OfSupercube result;
-  const auto add = [&](const BrickNeeds& part) {
-    if (part.first_.empty()) return;
-    result.parts_[result.count_++] = {part.slots(supercube, relevant), part.distances_.empty() ? kNotKnown.data() : part.distances_.data(),
-                                      part.slopes_.empty() ? kNotKnown.data() : part.slopes_.data(), part.first_[supercube]};
-  };
-  if (parts_.empty()) add(*this);
-  for (const BrickNeeds* const part : parts_) add(*part);
+  for (const BrickPart* const part : parts()) {
+    if (part->first_.empty()) continue;
+    result.parts_[result.count_++] = {part->slots(supercube, relevant), part->distances_.empty() ? kNotKnown.data() : part->distances_.data(),
+                                      part->slopes_.empty() ? kNotKnown.data() : part->slopes_.data(), part->first_[supercube]};
+  }
   return result;
 }
 
-std::size_t BrickNeeds::memory_bytes() const {
-  return sizeof *this + highest_.size() * sizeof highest_[0] + slots_.size() * sizeof slots_[0] + first_.size() * sizeof first_[0] + slopes_.size() +
-         distances_.size() + parts_.size() * sizeof(void*);
+std::uint8_t BrickNeeds::farthest(std::size_t supercube, std::uint64_t relevant, std::uint64_t slots) const {
+  std::uint8_t most = 0;
+  for (const BrickPart* const part : parts()) {
+    if (part->distances_.empty() || part->highest_[supercube].distance <= most) continue;
+    const std::uint8_t* const distances = part->distances_.data() + part->first_[supercube];
+    for (const std::size_t i : set_bits<std::size_t>(SplitSet::extract(slots, part->slots(supercube, relevant)))) most = std::max(most, distances[i]);
+  }
+  return most;
+}
+
+unsigned BrickNeeds::updates() const {
+  unsigned sum = 0;
+  for (const BrickPart* const part : parts()) sum += part->updates();
+  return std::min(sum, unsigned(64 * kSlots));
 }
 
 }  // namespace intervale

@@ -14,10 +14,10 @@
 
 namespace intervale {
 
-// Immutable. Supercubes are counted within their brick, from 0. Memory: 4 bytes a supercube, 8 more unless all updates
-// are relevant; with slopes or distances 2 more, and for each relevant update a byte for its distance and half a byte
-// for its slope; or a pointer to each part that has these.
-class BrickNeeds {
+// What one part of a range needs of a brick (find_relevant_updates.h). Immutable. Supercubes are counted within their
+// brick, from 0. Memory: 4 bytes a supercube, 8 more unless all updates are relevant; with slopes or distances 2 more,
+// and for each relevant update a byte for its distance and half a byte for its slope.
+class BrickPart {
  public:
   struct Supercube {
     std::uint64_t slots = 0;  // those that are relevant
@@ -29,37 +29,66 @@ class BrickNeeds {
     std::vector<std::uint8_t> distances = {};
   };
   // needs: of each supercube of the brick. steps: the error steps of all updates of the set, by number.
-  BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs, Surface surface);
-  static constexpr std::size_t kMostParts = 8;  // two surfaces of each of the most ranges that a view shows
-  // What each of the parts needs, of one brick: of an update the most that is known of it. They must outlive it; one to
-  // kMostParts, none of several parts itself, and all or none have slopes, and distances.
-  BrickNeeds(const SupercubeSet& set, BrickIndex brick, std::vector<const BrickNeeds*> parts);
-
-  // Adds those that have what is known of updates: its parts, or this; none twice.
-  void add_parts(std::vector<const BrickNeeds*>& to) const;
+  BrickPart(const SupercubeSet& set, BrickIndex brick, std::span<const std::uint8_t> steps, std::span<const Supercube> needs, Surface surface);
 
   // Relevant ones. occupancy: of that supercube.
   [[nodiscard]] std::uint64_t slots(std::size_t supercube, std::uint64_t occupancy) const { return slots_.empty() ? occupancy : slots_[supercube]; }
-  [[nodiscard]] ErrorToDistance to_distance(std::size_t supercube) const { return highest_[supercube].to_distance; }
+  [[nodiscard]] unsigned updates() const { return updates_; }  // that are relevant
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  friend class BrickNeeds;
+  struct Highest {
+    ErrorToDistance to_distance;
+    std::uint8_t error_step = 0, slope = 0, distance = 0;
+  };
+  std::vector<Highest> highest_;         // by supercube
+  std::vector<std::uint64_t> slots_;     // by supercube; empty: all
+  std::vector<std::uint16_t> first_;     // by supercube: relevant updates before it; empty: nothing is known of them
+  std::vector<std::uint8_t> slopes_;     // by two relevant updates, the first in the lower half
+  std::vector<std::uint8_t> distances_;  // by relevant update
+  unsigned updates_ = 0;
+  int scale_ = 0;
+};
+
+// What several parts need together: an update is relevant if it is to one of them, and what is known of it is the most
+// that any of them knows. As long as the parts.
+class BrickNeeds {
+ public:
+  static constexpr std::size_t kMostParts = 8;  // two surfaces of each of the most ranges that a view shows
+  BrickNeeds() = default;                       // nothing
+  explicit BrickNeeds(const BrickPart& part) { add(part); }
+  // At most kMostParts, each once; all or none have slopes, and distances.
+  void add(const BrickPart& part) { parts_[count_++] = &part; }
+
+  // Relevant ones. occupancy: of that supercube.
+  [[nodiscard]] std::uint64_t slots(std::size_t supercube, std::uint64_t occupancy) const {
+    std::uint64_t slots = 0;
+    for (const BrickPart* const part : parts()) slots |= part->slots(supercube, occupancy);
+    return slots;
+  }
+  [[nodiscard]] ErrorToDistance to_distance(std::size_t supercube) const {
+    ErrorToDistance most;
+    for (const BrickPart* const part : parts()) most = ErrorToDistance::farther(most, part->highest_[supercube].to_distance, part->scale_);
+    return most;
+  }
   // The highest of a supercube's relevant updates; 0 if there are none, or if they are not known.
-  [[nodiscard]] std::uint8_t error_step(std::size_t supercube) const { return highest_[supercube].error_step; }
-  [[nodiscard]] std::uint8_t slope(std::size_t supercube) const { return highest_[supercube].slope; }
-  [[nodiscard]] std::uint8_t distance(std::size_t supercube) const { return highest_[supercube].distance; }
+  struct Highest {
+    std::uint8_t error_step = 0, distance = 0, slope = 0;
+  };
+  [[nodiscard]] Highest highest(std::size_t supercube) const {
+    Highest most;
+    for (const BrickPart* const part : parts()) {
+      const BrickPart::Highest& one = part->highest_[supercube];
+      most = {std::max(most.error_step, one.error_step), std::max(most.distance, one.distance), std::max(most.slope, one.slope)};
+    }
+    return most;
+  }
   // Of one relevant update. relevant: the slots of its supercube that are; 0 where they are not known.
   struct OfUpdate {
     std::uint8_t distance = 0, slope = 0;
   };
-  [[nodiscard]] OfUpdate of_update(std::size_t supercube, std::uint64_t relevant, Slot slot) const {
-    if (parts_.empty()) return own_update(supercube, count_below(relevant, slot));
-    OfUpdate most;
-    for (const BrickNeeds* const part : parts_) {
-      const std::uint64_t slots = part->slots(supercube, relevant);
-      if ((slots >> slot & 1) == 0) continue;
-      const OfUpdate one = part->own_update(supercube, count_below(slots, slot));
-      most = {std::max(most.distance, one.distance), std::max(most.slope, one.slope)};
-    }
-    return most;
-  }
+  [[nodiscard]] OfUpdate of_update(std::size_t supercube, std::uint64_t relevant, Slot slot) const { return of_supercube(supercube, relevant)(slot); }
   // of_update() of one supercube, for a loop over its updates. Not for longer than this exists.
   class OfSupercube {
    public:
@@ -85,28 +114,16 @@ class BrickNeeds {
     std::size_t count_ = 0;
   };
   [[nodiscard]] OfSupercube of_supercube(std::size_t supercube, std::uint64_t relevant) const;
-  [[nodiscard]] unsigned updates() const { return updates_; }  // that are relevant
-  [[nodiscard]] std::size_t memory_bytes() const;
+  // The greatest distance of some updates of a supercube, in a fraction of the time that it takes to ask for each.
+  // slots: of these; relevant: as above.
+  [[nodiscard]] std::uint8_t farthest(std::size_t supercube, std::uint64_t relevant, std::uint64_t slots) const;
+  // At most so many are relevant: no more than a brick may have.
+  [[nodiscard]] unsigned updates() const;
 
  private:
-  struct Highest {
-    ErrorToDistance to_distance;
-    std::uint8_t error_step = 0, slope = 0, distance = 0;
-  };
-  // before: relevant updates of the supercube with lower slots.
-  [[nodiscard]] OfUpdate own_update(std::size_t supercube, int before) const {
-    if (first_.empty()) return {};
-    const std::size_t i = std::size_t(first_[supercube]) + std::size_t(before);
-    return {distances_.empty() ? std::uint8_t(0) : distances_[i],
-            slopes_.empty() ? std::uint8_t(0) : std::uint8_t(slopes_[i / 2] >> (i % 2 * 4) & 15U)};
-  }
-  std::vector<Highest> highest_;          // by supercube
-  std::vector<std::uint64_t> slots_;      // by supercube; empty: all
-  std::vector<std::uint16_t> first_;      // by supercube: how many relevant updates are before it; empty: no need to know
-  std::vector<std::uint8_t> slopes_;      // by two relevant updates, the first in the lower half
-  std::vector<std::uint8_t> distances_;   // by relevant update
-  std::vector<const BrickNeeds*> parts_;  // that have what is known of updates; empty: this has it
-  unsigned updates_ = 0;
+  [[nodiscard]] std::span<const BrickPart* const> parts() const { return {parts_.data(), count_}; }
+  std::array<const BrickPart*, kMostParts> parts_{};
+  std::size_t count_ = 0;
 };
 
 }  // namespace intervale

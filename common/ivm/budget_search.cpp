@@ -61,10 +61,10 @@ void BudgetSearch::rank_brick(BrickIndex b) {
   const Ranking::Brick brick = ranking_.of_brick(b);
   if (brick.bound() == 0) return;
   const SupercubeSet& set = volume_.set();
-  const BrickNeeds& needs = relevant_.brick(b);
+  const BrickNeeds needs = relevant_.brick(b);
   std::size_t n = 0;
   set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
-    const Ranking::Supercube ranking = brick.supercube(s, key);
+    const Ranking::Supercube ranking = brick.supercube(needs, s, key);
     const std::uint64_t occupancy = set.occupancy()[s], slots = needs.slots(n++, occupancy);
     visited_ += unsigned(std::popcount(occupancy));
     UpdateIndex i = set.first(b, s);

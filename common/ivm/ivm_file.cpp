@@ -58,8 +58,9 @@ std::vector<std::uint8_t> contents_of(const IntervalVolume& volume, StreamType t
   if (type == StreamType::error_to_distance) {
     contents.reserve(set.supercubes());
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+      const BrickNeeds needs = volume.relevant().brick(b);
       std::size_t n = 0;
-      set.for_each_supercube(b, [&](SupercubeIndex, SupercubeKey) { contents.push_back(volume.relevant().brick(b).to_distance(n++).code()); });
+      set.for_each_supercube(b, [&](SupercubeIndex, SupercubeKey) { contents.push_back(needs.to_distance(n++).code()); });
     }
   }
   return contents;
@@ -79,9 +80,9 @@ std::vector<std::uint8_t> coded_update_slopes(const IntervalVolume& volume) {
   slopes.reserve(volume.size());
   const SupercubeSet& set = volume.set();
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    const BrickNeeds needs = volume.relevant().brick(b);
     std::size_t n = 0;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
-      const BrickNeeds& needs = volume.relevant().brick(b);
       const std::uint64_t relevant = needs.slots(n, set.occupancy()[s]);  // those of others are never read
       for (const Slot slot : set_bits<Slot>(set.occupancy()[s]))
         slopes.push_back((relevant >> slot & 1) != 0 ? needs.of_update(n, relevant, slot).slope : std::uint8_t(0));

@@ -44,7 +44,7 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick) const {
   b.brick_ = brick;
   const SupercubeKey key = volume_.set().bricks()[brick].key;
   b.scale_ = scale_of_key(key);
-  const RelevantUpdates::Bound& all = relevant_.bound(brick);
+  const RelevantUpdates::Bound all = relevant_.bound(brick);
   const unsigned step = all.error_step;
   if (step < least_step_) return b;
   if (!roi_ && !screen_) {
@@ -109,12 +109,12 @@ float Ranking::weight_of(const ScreenError::Region& region, int scale, float pix
   return clamp_weight(ahead_ ? std::max(weight, on(*ahead_, pixels_per_unit(*ahead_, region))) : weight);
 }
 
-Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, SupercubeKey key) const {
+Ranking::Supercube Ranking::Brick::supercube(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const {
   Supercube s;
   s.ranking_ = ranking_;
-  s.needs_ = &ranking_->relevant_.brick(brick_);
+  s.needs_ = &needs;
   s.number_ = supercube - ranking_->volume_.set().bricks()[brick_].first_supercube;
-  s.to_distance_ = s.needs_->to_distance(s.number_);
+  s.to_distance_ = needs.to_distance(s.number_);
   s.supercube_ = supercube;
   s.key_ = key;
   s.scale_ = scale_;
@@ -132,10 +132,10 @@ Ranking::Supercube Ranking::Brick::supercube(SupercubeIndex supercube, Supercube
 
 double Ranking::error(Rank rank) const { return rank == 0 ? 0 : double(volume_.error_steps()[rank - 1u]); }
 
-Ranking::Rank Ranking::band_below(Rank top, bool is_rest) const {
+Ranking::Rank Ranking::band_below(Rank top, bool is_rest, int width) const {
   if (screen_) {
     const int last = top > kSeenFrom ? kSeenFrom + 1 : 1;
-    return Rank(is_rest ? last : std::max(last, top - kBand + 1));
+    return Rank(is_rest ? last : std::max(last, top - kBand * width + 1));
   }
   if (is_rest) return 1;
   const auto steps = volume_.error_steps();

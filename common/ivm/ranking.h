@@ -3,16 +3,17 @@
 //
 // Without a camera, updates are ranked by their field error. With one, those are wanted that move surfaces by more than
 // its pixel error; they are ranked by the squared deviation on the screen that they remove, summed up over the picture.
-// Where slopes are known (relevant_updates.h), that is what they say, times the cube of the spacing of samples in pixels:
-// its square, as deviations are seen so large; and its square once more, if all pixels should count alike, but not, if
-// all of the surface should. Once more with 2^scale: coarse updates come a little earlier than what they remove says,
-// which makes early pictures better and later ones no worse. Otherwise it is estimated: the square of the deviation in
-// pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2. Diamonds that are large on the screen
-// come earlier still, by the cube of their size: one part that is left coarse spoils a first picture more than others that
-// are refined improve it. All of that as far as the surfaces are in the picture. So what is large in the picture comes
-// before what is far off in one place. If the camera moves, the weight of what is removed is that of now or that of
-// soon, whichever is greater. What a depth map hides comes after everything that is seen. Pixels a world unit, for the
-// nearest visible point, and the share that is seen are computed once a supercube, or once a brick that is far away.
+// Where slopes are known (relevant_updates.h), that is what they say, times the cube of the spacing of samples in
+// pixels: its square, as deviations are seen so large; and its square once more, if all pixels should count alike, but
+// not, if all of the surface should. Once more with 2^scale: coarse updates come a little earlier than what they remove
+// says, which makes early pictures better and later ones no worse. Otherwise it is estimated: the square of the
+// deviation in pixels, times the pixels that the diamond's surfaces cover, about (h in pixels)^2. Diamonds that are
+// large on the screen come earlier still, by the cube of their size: one part that is left coarse spoils a first
+// picture more than others that are refined improve it. All of that as far as the surfaces are in the picture. So what
+// is large in the picture comes before what is far off in one place. If the camera moves, the weight of what is removed
+// is that of now or that of soon, whichever is greater. What a depth map hides comes after everything that is seen.
+// Pixels a world unit, for the nearest visible point, and the share that is seen are computed once a supercube, or once
+// a brick that is far away.
 #pragma once
 
 #include <algorithm>
@@ -48,8 +49,8 @@ class Ranking {
   // Ranks the updates of one supercube.
   class Supercube {
    public:
-    // The importance of an update with this error step, distance and slope, with which it grows: 0 if it is not wanted for
-    // its own sake. The region of interest is not considered.
+    // The importance of an update with this error step, distance and slope, with which it grows: 0 if it is not wanted
+    // for its own sake. The region of interest is not considered.
     [[nodiscard]] float importance(unsigned step, std::uint8_t distance, unsigned slope) const {
       if (step < ranking_->least_step_) return 0;
       if (!ranking_->screen_) return float(step + 1);
@@ -95,9 +96,9 @@ class Ranking {
     bool is_seen_ = true;
   };
 
-  // Upper bounds over updates that are left. slope: of those whose object errors are above the limit; slope_below: of the
-  // others. While these are hardly wanted, with object errors of at most kHardly times what is wanted, they come last,
-  // however steep they are.
+  // Upper bounds over updates that are left. slope: of those whose object errors are above the limit; slope_below: of
+  // the others. While these are hardly wanted, with object errors of at most kHardly times what is wanted, they come
+  // last, however steep they are.
   struct Left {
     static constexpr float kHardly = 1.7F;
     unsigned step = 0;
@@ -125,7 +126,8 @@ class Ranking {
     }
     // With a camera: about the largest object error that is not wanted here.
     [[nodiscard]] float unwanted() const { return ranking_->pixel_error_ / pixels_; }
-    [[nodiscard]] Supercube supercube(SupercubeIndex supercube, SupercubeKey key) const;
+    // needs: of the brick, must outlive it.
+    [[nodiscard]] Supercube supercube(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const;
     // With a camera: no less than the deviation in pixels of any update here whose object error is no larger, or 2^100.
     // Above 0.
     [[nodiscard]] float pixels(float object_error) const { return std::clamp(object_error * pixels_, kLeastImportance, kMostImportance); }
@@ -143,8 +145,8 @@ class Ranking {
   };
   [[nodiscard]] Brick of_brick(BrickIndex brick) const;
 
-  // Bounds of bricks in order of their numbers: no lower than those that of_brick() tells, in a fraction of the time. What
-  // is inside the picture and far away is taken for as near as its nearest point; what is hidden, for seen.
+  // Bounds of bricks in order of their numbers: no lower than those that of_brick() tells, in a fraction of the time.
+  // What is inside the picture and far away is taken for as near as its nearest point; what is hidden, for seen.
   class BrickBounds {
    public:
     // ranking: must outlive it.
@@ -165,9 +167,11 @@ class Ranking {
 
   // Without a camera: the largest field error that remains once all updates of higher ranks are applied.
   [[nodiscard]] double error(Rank rank) const;
-  // The lowest rank of the band that is sent as one with `top`: field errors, and with a camera importances, differ by a
-  // factor of 4 at most. is_rest: of all further ones that are sent, but for those that are hidden if top is not.
-  [[nodiscard]] Rank band_below(Rank top, bool is_rest = false) const;
+  // The lowest rank of the band that is sent as one with `top`: field errors, and with a camera importances, differ by
+  // a factor of 4 at most, or with a camera of 4^width. is_rest: of all further ones that are sent, but for those that
+  // are hidden if top is not.
+  [[nodiscard]] Rank band_below(Rank top, bool is_rest = false, int width = 1) const;
+  static constexpr int kMostWidth = 128;
 
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
   [[nodiscard]] std::size_t memory_bytes() const;  // besides this object
@@ -178,8 +182,8 @@ class Ranking {
   [[nodiscard]] float importance_of(float pixels, unsigned slope, float weight) const {
     return std::max((relevant_.has_slopes() ? removed_[slope] : pixels * pixels) * weight, kLeastImportance);
   }
-  // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1. All that is seen ranks above all
-  // that is hidden.
+  // Importances as ranks: sixteen an octave, from the bits of the float. The lowest is 1. All that is seen ranks above
+  // all that is hidden.
   static constexpr int kRankShift = 23 - 4, kRankFrom = (127 - 64) << 4, kBand = 32, kSeenFrom = 4096;
   static_assert(((127 + 100) << 4) - kRankFrom + kSeenFrom < 1 << kRankBits, "of kMostImportance");
   [[nodiscard]] static Rank rank_of(float importance, bool is_seen) {

@@ -30,10 +30,11 @@ SplitSet select(const IntervalVolume& volume, const RelevantUpdates& relevant, c
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     const Ranking::Brick brick = ranking.of_brick(b);
     if (brick.bound() == 0) continue;
+    const BrickNeeds needs = relevant.brick(b);
     std::size_t n = 0;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
-      const Ranking::Supercube rank = brick.supercube(s, key);
-      const std::uint64_t occupancy = set.occupancy()[s], slots = relevant.brick(b).slots(n++, occupancy);
+      const Ranking::Supercube rank = brick.supercube(needs, s, key);
+      const std::uint64_t occupancy = set.occupancy()[s], slots = needs.slots(n++, occupancy);
       UpdateIndex i = set.first(b, s);
       for (const Slot slot : set_bits<Slot>(occupancy)) {
         if ((slots >> slot & 1) != 0 && rank(i, slot) != 0) wanted.insert(i);
@@ -50,10 +51,11 @@ std::vector<UpdateIndex> in_order(const IntervalVolume& volume, const RelevantUp
   std::vector<Ranking::Rank> ranks(volume.size());
   for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
     const Ranking::Brick brick = ranking.of_brick(b);
+    const BrickNeeds needs = relevant.brick(b);
     std::size_t n = 0;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
-      const Ranking::Supercube rank = brick.supercube(s, key);
-      const std::uint64_t occupancy = set.occupancy()[s], slots = relevant.brick(b).slots(n++, occupancy);
+      const Ranking::Supercube rank = brick.supercube(needs, s, key);
+      const std::uint64_t occupancy = set.occupancy()[s], slots = needs.slots(n++, occupancy);
       UpdateIndex i = set.first(b, s);
       for (const Slot slot : set_bits<Slot>(occupancy)) {
         if ((slots >> slot & 1) != 0 && updates.contains(i)) ranks[i] = rank(i, slot);

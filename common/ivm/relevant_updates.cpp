@@ -10,19 +10,21 @@
 
 namespace intervale {
 
-RelevantUpdates::RelevantUpdates(const Grid& grid, const UpdateErrors& errors, ShownRanges shown, std::vector<Bound> bounds, Known known, Find find)
-    : shown_(std::move(shown)),
-      bounds_(std::move(bounds)),
-      error_(errors.values.begin(), errors.values.end()),
-      reach_(float(diamond_width(grid) / 2)),
-      known_(known),
-      found_(std::make_shared<Found>(bounds_.size(), std::move(find))) {
-  const auto unit = float(error_to_distance_unit(grid, error_.empty() ? 0.0 : double(error_.back())));
-  for (unsigned code = 0; code < factor_.size(); ++code) {
-    factor_[code] = ErrorToDistance(std::uint8_t(code)).ratio(unit);
-    distance_of_[code] = distance_of(std::uint8_t(code), diamond_width(grid));
+RelevantUpdates::Codes::Codes(const Grid& grid, const UpdateErrors& errors)
+    : error(errors.values.begin(), errors.values.end()), reach(float(diamond_width(grid) / 2)) {
+  const auto unit = float(error_to_distance_unit(grid, error.empty() ? 0.0 : double(error.back())));
+  for (unsigned code = 0; code < factor.size(); ++code) {
+    factor[code] = ErrorToDistance(std::uint8_t(code)).ratio(unit);
+    distance[code] = distance_of(std::uint8_t(code), diamond_width(grid));
   }
 }
+
+RelevantUpdates::RelevantUpdates(const Grid& grid, const UpdateErrors& errors, ShownRanges shown, std::vector<Bound> bounds, Known known, Find find)
+    : shown_(std::move(shown)),
+      known_(known),
+      codes_(std::make_shared<const Codes>(grid, errors)),
+      bounds_(std::move(bounds)),
+      found_(std::make_shared<Found>(bounds_.size(), std::move(find))) {}
 
 RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown,
                                  const std::vector<std::uint64_t>& slots, const SurfaceErrors& surface)
@@ -30,10 +32,10 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
                       {!surface.slopes.empty(), !surface.distances.empty(),
                        std::any_of(surface.to_distance.begin(), surface.to_distance.end(), [](ErrorToDistance code) { return code.is_far(); })},
                       {}) {
-  std::vector<BrickNeeds::Supercube> needs;
+  std::vector<BrickPart::Supercube> needs;
   for (BrickIndex b{0}; b < bounds_.size(); ++b) {
     needs.clear();
-    BrickNeeds::Surface of_updates;
+    BrickPart::Surface of_updates;
     set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
       const std::uint64_t occupancy = set.occupancy()[s];
       needs.push_back({slots.empty() ? occupancy : slots[s], surface.to_distance[s]});
@@ -43,20 +45,21 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
         if (has_distances()) of_updates.distances.push_back(surface.distances[i]);
       }
     });
-    const BrickNeeds& brick = found_->bricks.keep(b, BrickNeeds(set, b, errors.steps, needs, std::move(of_updates))).value;
+    const BrickPart& brick = found_->bricks.keep(b, BrickPart(set, b, errors.steps, needs, std::move(of_updates))).value;
     found_->bytes += brick.memory_bytes();
     bounds_[b].updates = std::uint16_t(brick.updates());
     const int scale = scale_of_key(set.bricks()[b].key);
     for (std::size_t n = 0; n < needs.size(); ++n) {
       if (needs[n].slots == 0) continue;
-      bounds_[b].error_step = std::max(bounds_[b].error_step, brick.error_step(n));
-      bounds_[b].slope = std::max(bounds_[b].slope, brick.slope(n));
-      bounds_[b].object_error = std::max(bounds_[b].object_error, object_error(brick.to_distance(n), scale, brick.error_step(n), brick.distance(n)));
+      const BrickNeeds::Highest highest = BrickNeeds(brick).highest(n);
+      bounds_[b].error_step = std::max(bounds_[b].error_step, highest.error_step);
+      bounds_[b].slope = std::max(bounds_[b].slope, highest.slope);
+      bounds_[b].object_error = std::max(bounds_[b].object_error, object_error(needs[n].to_distance, scale, highest.error_step, highest.distance));
     }
   }
 }
 
-const BrickNeeds& RelevantUpdates::Found::find_now(BrickIndex brick) {
+const BrickPart& RelevantUpdates::Found::find_now(BrickIndex brick) {
   const auto [kept, is_new] = bricks.keep(brick, find(brick));
   if (is_new) {
     bytes += kept.memory_bytes();
@@ -65,47 +68,74 @@ const BrickNeeds& RelevantUpdates::Found::find_now(BrickIndex brick) {
   return kept;
 }
 
+RelevantUpdates::RelevantUpdates(const SupercubeSet& set, Parts parts, ShownRanges shown)
+    : shown_(std::move(shown)), known_(parts.front()->known_), codes_(parts.front()->codes_), parts_(std::move(parts)), set_(&set) {
+  for (const auto& part : parts_) known_.far = known_.far || part->known_.far;
+}
+
+BrickNeeds RelevantUpdates::brick_of_parts(BrickIndex brick) const {
+  BrickNeeds needs;
+  for (const auto& part : parts_) {
+    if (part->bounds_[brick].updates != 0) needs.add(part->own_brick(brick));
+  }
+  return needs;
+}
+
+RelevantUpdates::Bound RelevantUpdates::bound_of_parts(BrickIndex brick) const {
+  Bound all;
+  unsigned updates = 0;
+  for (const auto& part : parts_) {
+    const Bound& one = part->bounds_[brick];
+    updates += one.updates;
+    all.error_step = std::max(all.error_step, one.error_step);
+    all.slope = std::max(all.slope, one.slope);
+    all.object_error = std::max(all.object_error, one.object_error);
+  }
+  all.updates = std::uint16_t(std::min(updates, set_->updates(brick)));
+  return all;
+}
+
+bool RelevantUpdates::is_found(BrickIndex brick) const {
+  if (parts_.empty()) return found_->bricks.find(brick) != nullptr;
+  return std::all_of(parts_.begin(), parts_.end(), [&](const auto& part) { return part->bounds_[brick].updates == 0 || part->is_found(brick); });
+}
+
 std::size_t RelevantUpdates::memory_bytes() const {
-  return sizeof *this + bounds_.size() * (sizeof(Bound) + sizeof(void*)) + error_.size() * sizeof(float) + found_->bytes;
+  if (has_parts()) return sizeof *this + parts_.size() * sizeof parts_[0];
+  return sizeof *this + bounds_.size() * (sizeof(Bound) + sizeof(void*)) + sizeof *codes_ + codes_->error.size() * sizeof(float) + found_->bytes;
 }
 
 namespace {
 
-// What is united, and where.
+// What is united, and where, if not the same is known of each.
 struct Union {
   const IntervalVolume& volume;
   std::vector<std::shared_ptr<const RelevantUpdates>> each;
   RelevantUpdates::Known known;
 
-  [[nodiscard]] BrickNeeds operator()(BrickIndex b) const;
+  [[nodiscard]] BrickPart operator()(BrickIndex b) const;
   [[nodiscard]] RelevantUpdates::Bound bound(BrickIndex b) const;
 };
 
-BrickNeeds Union::operator()(BrickIndex b) const {
+BrickPart Union::operator()(BrickIndex b) const {
   struct Part {
     const RelevantUpdates& of;
-    const BrickNeeds& needs;
+    BrickNeeds needs;
   };
   const SupercubeSet& set = volume.set();
   std::vector<Part> parts;
-  std::vector<const BrickNeeds*> needs_of_parts;
-  bool are_alike = true;
   for (const auto& one : each) {
-    if (one->bound(b).updates == 0) continue;
-    parts.push_back({*one, one->brick(b)});
-    parts.back().needs.add_parts(needs_of_parts);
-    are_alike = are_alike && one->has_slopes() == known.slopes && one->has_distances() == known.distances;
+    if (one->bound(b).updates != 0) parts.push_back({*one, one->brick(b)});
   }
-  if (are_alike && !parts.empty() && needs_of_parts.size() <= BrickNeeds::kMostParts) return {set, b, std::move(needs_of_parts)};
   const double width = diamond_width(volume.description().grid);
   const int scale = scale_of_key(set.bricks()[b].key);
-  std::vector<BrickNeeds::Supercube> needs;
-  BrickNeeds::Surface surface;
+  std::vector<BrickPart::Supercube> needs;
+  BrickPart::Surface surface;
   std::array<std::uint8_t, kSlots> slopes{}, distances{};  // those of relevant slots are set
   std::size_t n = 0;
   set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
     const std::uint64_t occupancy = set.occupancy()[s];
-    BrickNeeds::Supercube all;
+    BrickPart::Supercube all;
     for (const Part& part : parts) {
       all.slots |= part.needs.slots(n, occupancy);
       all.to_distance = ErrorToDistance::farther(all.to_distance, part.needs.to_distance(n), scale);
@@ -141,7 +171,7 @@ RelevantUpdates::Bound Union::bound(BrickIndex b) const {
   RelevantUpdates::Bound all;
   unsigned updates = 0;
   for (const auto& one : each) {
-    const RelevantUpdates::Bound& part = one->bound(b);
+    const RelevantUpdates::Bound part = one->bound(b);
     updates += part.updates;
     all.error_step = std::max(all.error_step, part.error_step);
     if (known.slopes) all.slope = std::max(all.slope, part.slope);
@@ -158,12 +188,22 @@ RelevantUpdates::Bound Union::bound(BrickIndex b) const {
 
 }  // namespace
 
-RelevantUpdates united(const IntervalVolume& volume, std::vector<std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown) {
+RelevantUpdates united(const IntervalVolume& volume, RelevantUpdates::Parts each, ShownRanges shown) {
   const RelevantUpdates::Known known{std::all_of(each.begin(), each.end(), [](const auto& one) { return one->has_slopes(); }),
                                      std::any_of(each.begin(), each.end(), [](const auto& one) { return one->has_distances(); }),
                                      std::any_of(each.begin(), each.end(), [](const auto& one) { return one->may_be_far(); })};
+  RelevantUpdates::Parts parts;
+  bool are_alike = true;
+  for (const auto& one : each) {
+    are_alike = are_alike && one->has_slopes() == known.slopes && one->has_distances() == known.distances;
+    for (const auto& part : one->has_parts() ? one->parts_ : RelevantUpdates::Parts{one}) {
+      if (std::find(parts.begin(), parts.end(), part) == parts.end()) parts.push_back(part);
+    }
+  }
+  if (are_alike && parts.size() <= BrickNeeds::kMostParts) return {volume.set(), std::move(parts), std::move(shown)};
   const Union all{volume, std::move(each), known};
   std::vector<RelevantUpdates::Bound> bounds;
+  bounds.reserve(volume.set().bricks().size());
   for (BrickIndex b{0}; b < volume.set().bricks().size(); ++b) bounds.push_back(all.bound(b));
   return {volume.description().grid, {volume.steps(), volume.error_steps()}, std::move(shown), std::move(bounds), known, all};
 }

@@ -1,8 +1,8 @@
 // Which updates of an interval volume are relevant to a range, and how far the surfaces of that range can move.
 //
-// Weiss and De Floriani 2008, section 6. A range needs the updates that count for it (front.h): of a data set of one range
-// most of them, of one that was refined uniformly, or that has every range, a part. Their ancestors have to be split
-// before them, but are not wanted for their own sake: where all that counts below an update is finer than what is
+// Weiss and De Floriani 2008, section 6. A range needs the updates that count for it (front.h): of a data set of one
+// range most of them, of one that was refined uniformly, or that has every range, a part. Their ancestors have to be
+// split before them, but are not wanted for their own sake: where all that counts below an update is finer than what is
 // wanted, it would change no mesh. Several ranges need what each of them needs. What a brick needs is known from the
 // start, or found when it is first asked for; until then there are bounds. Shared by all sessions that look at those
 // ranges.
@@ -43,8 +43,8 @@ struct UpdateErrors {
 // Any thread. Copies share what is found.
 class RelevantUpdates {
  public:
-  // All of it is known. slots: by supercube; empty: all updates of the set. shown: what they are relevant to, one range at
-  // least. The set must outlive the constructor only.
+  // All of it is known. slots: by supercube; empty: all updates of the set. shown: what they are relevant to, one range
+  // at least. The set must outlive the constructor only.
   RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown, const std::vector<std::uint64_t>& slots,
                   const SurfaceErrors& surface);
 
@@ -55,7 +55,7 @@ class RelevantUpdates {
     float object_error = 0;
   };
   // Finds what a brick needs, on any thread; may be called twice for one brick, with the same result.
-  using Find = std::function<BrickNeeds(BrickIndex)>;
+  using Find = std::function<BrickPart(BrickIndex)>;
   // What is known of updates; and whether codes of an ErrorToDistance may be far ones.
   struct Known {
     bool slopes = false, distances = false, far = false;
@@ -65,62 +65,81 @@ class RelevantUpdates {
 
   [[nodiscard]] const ShownRanges& shown() const { return shown_; }
   // What is known without finding more: exact if all was known from the start.
-  [[nodiscard]] const Bound& bound(BrickIndex brick) const { return bounds_[brick]; }
-  // Found now if need be: some 50 microseconds. Throws what prevents it, for example that memory is exhausted. As long as
-  // this exists.
-  [[nodiscard]] const BrickNeeds& brick(BrickIndex brick) const {
-    const BrickNeeds* const found = found_->bricks.find(brick);
-    return found != nullptr ? *found : found_->find_now(brick);
-  }
-  [[nodiscard]] bool is_found(BrickIndex brick) const { return found_->bricks.find(brick) != nullptr; }
+  [[nodiscard]] Bound bound(BrickIndex brick) const { return parts_.empty() ? bounds_[brick] : bound_of_parts(brick); }
+  // Found now if need be: some 50 microseconds for each part. Throws what prevents it, for example that memory is
+  // exhausted. As long as this exists.
+  [[nodiscard]] BrickNeeds brick(BrickIndex brick) const { return parts_.empty() ? BrickNeeds(own_brick(brick)) : brick_of_parts(brick); }
+  [[nodiscard]] bool is_found(BrickIndex brick) const;
 
   // How far the surfaces can still move, in world units, while an update's diamond is refined completely. An estimate:
   // 99 % of the surface should move no further, and nothing more than twice as far (FORMAT.md, "From errors to
-  // distances"). Where distances are known, that is what they say, and it grows with the distance. Otherwise it depends on
-  // the update's supercube and scale, and grows with the error step. Not saturated.
+  // distances"). Where distances are known, that is what they say, and it grows with the distance. Otherwise it depends
+  // on the update's supercube and scale, and grows with the error step. Not saturated.
   [[nodiscard]] float object_error(ErrorToDistance to_distance, int scale, unsigned step, std::uint8_t distance) const {
-    return has_distances() ? distance_of_[distance] : object_error(to_distance, scale, step);
+    return has_distances() ? this->distance(distance) : object_error(to_distance, scale, step);
   }
   // From the error, whatever is known.
   [[nodiscard]] float object_error(ErrorToDistance to_distance, int scale, unsigned step) const {
-    return std::min(error_[step] * factor_[to_distance.code()], reach_ * (to_distance.is_far() ? kMaxFarDeviation : float(1 << scale)));
+    return std::min(codes_->error[step] * codes_->factor[to_distance.code()],
+                    codes_->reach * (to_distance.is_far() ? kMaxFarDeviation : float(1 << scale)));
   }
   // The greatest distance that has a code and is no larger.
   [[nodiscard]] std::uint8_t code_below(float distance) const {
-    return std::uint8_t(std::upper_bound(distance_of_.begin() + 1, distance_of_.end(), distance) - distance_of_.begin() - 1);
+    const auto& all = codes_->distance;
+    return std::uint8_t(std::upper_bound(all.begin() + 1, all.end(), distance) - all.begin() - 1);
   }
-  [[nodiscard]] float distance(std::uint8_t code) const { return distance_of_[code]; }
+  [[nodiscard]] float distance(std::uint8_t code) const { return codes_->distance[code]; }
   [[nodiscard]] bool has_distances() const { return known_.distances; }  // of updates
   [[nodiscard]] bool has_slopes() const { return known_.slopes; }
   [[nodiscard]] bool may_be_far() const { return known_.far; }
-  [[nodiscard]] std::size_t memory_bytes() const;  // by now
-  // Called when memory_bytes() have grown, on the thread that found something. To be set before others have this.
+  // It has parts, and keeps nothing itself. To make it takes next to no time.
+  [[nodiscard]] bool has_parts() const { return !parts_.empty(); }
+  [[nodiscard]] std::size_t memory_bytes() const;  // by now, besides its parts
+  // Called when memory_bytes() have grown, on the thread that found something. To be set before others have this, which
+  // has no parts.
   void set_on_growth(std::function<void()> on_growth) const { found_->on_growth = std::move(on_growth); }
 
  private:
   struct Found {
-    LazyArray<BrickNeeds> bricks;
+    LazyArray<BrickPart> bricks;
     Find find;
     std::function<void()> on_growth = {};
     std::atomic<std::size_t> bytes = 0;
     Found(std::size_t count, Find how) : bricks(count), find(std::move(how)) {}
-    const BrickNeeds& find_now(BrickIndex brick);
+    const BrickPart& find_now(BrickIndex brick);
   };
+  // What codes say, in world units. Of one volume all have the same.
+  struct Codes {
+    std::vector<float> error;         // by error step
+    std::array<float, 256> factor;    // by code of an ErrorToDistance
+    std::array<float, 256> distance;  // by distance of an update
+    float reach = 0;                  // the largest object error for h = 1: half a diamond's width
+    Codes(const Grid& grid, const UpdateErrors& errors);
+  };
+  using Parts = std::vector<std::shared_ptr<const RelevantUpdates>>;
+  RelevantUpdates(const SupercubeSet& set, Parts parts, ShownRanges shown);
+  friend RelevantUpdates united(const IntervalVolume& volume, Parts each, ShownRanges shown);
+  [[nodiscard]] const BrickPart& own_brick(BrickIndex brick) const {
+    const BrickPart* const found = found_->bricks.find(brick);
+    return found != nullptr ? *found : found_->find_now(brick);
+  }
+  [[nodiscard]] BrickNeeds brick_of_parts(BrickIndex brick) const;
+  [[nodiscard]] Bound bound_of_parts(BrickIndex brick) const;
 
   ShownRanges shown_;
-  std::vector<Bound> bounds_;           // by brick
-  std::vector<float> error_;            // by error step
-  std::array<float, 256> factor_;       // by code of an ErrorToDistance
-  std::array<float, 256> distance_of_;  // by distance of an update
-  float reach_ = 0;                     // the largest object error for h = 1: half a diamond's width
   Known known_;
-  std::shared_ptr<Found> found_;  // not null
+  std::shared_ptr<const Codes> codes_;
+  Parts parts_;                        // none of which has parts
+  const SupercubeSet* set_ = nullptr;  // if there are parts
+  std::vector<Bound> bounds_;          // by brick, unless there are parts
+  std::shared_ptr<Found> found_;       // likewise; otherwise null
 };
 
-// What several ranges, or the parts of one, need together: an update is relevant if it is to any of them, and the surfaces
-// around it can move as far as those that can move farthest. Where some have distances, what is relevant to the others gets
-// them from errors: also inside, where values may show. each: of this volume, one at least. shown: the ranges. Found by
-// brick; O(bricks). The volume must outlive it.
+// What several ranges, or the parts of one, need together: an update is relevant if it is to any of them, and the
+// surfaces around it can move as far as those that can move farthest. Where some have distances, what is relevant to
+// the others gets them from errors: also inside, where values may show. each: of this volume, one at least. shown: the
+// ranges. If the same is known of each of them, it has them as parts; otherwise it is found by brick, O(bricks). The
+// volume must outlive it.
 [[nodiscard]] RelevantUpdates united(const IntervalVolume& volume, std::vector<std::shared_ptr<const RelevantUpdates>> each, ShownRanges shown);
 
 }  // namespace intervale

@@ -17,7 +17,7 @@ namespace intervale {
 
 struct EstimatedSurface {
   std::vector<ErrorToDistance> to_distance;  // by supercube; none is far
-  BrickNeeds::Surface of_updates;            // of relevant updates
+  BrickPart::Surface of_updates;             // of relevant updates
 };
 
 // Of a brick of a volume that was refined uniformly. counts: for a range with one surface. relevant: by supercube

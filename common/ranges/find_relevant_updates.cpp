@@ -107,7 +107,7 @@ std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
   for (int scale = 0; scale < kMaxLevels; ++scale) most[std::size_t(scale)] = bound_of_estimates(volume_.description().grid, scale);
   std::vector<RelevantUpdates::Bound> bounds(set.bricks().size());
   for (BrickIndex b{0}; b < bounds.size(); ++b) {
-    const RelevantUpdates::Bound& whole = volume_.relevant().bound(b);
+    const RelevantUpdates::Bound whole = volume_.relevant().bound(b);
     if (whole.updates == 0 || !slots->has_any(b)) continue;
     bounds[b] = {whole.updates, whole.error_step, 0, 0};
     if (!is_estimated) continue;
@@ -118,15 +118,15 @@ std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {
   const CountingKeys counts(KeySides(volume_.description().format, part.shown.range), part.shown.refine);
   const auto find_brick = [&volume = volume_, slots, counts, is_estimated](BrickIndex brick) {
     const std::vector<std::uint64_t> relevant = slots->of(brick);
-    std::vector<BrickNeeds::Supercube> needs(relevant.size());
+    std::vector<BrickPart::Supercube> needs(relevant.size());
     for (std::size_t n = 0; n < needs.size(); ++n) needs[n].slots = relevant[n];
-    BrickNeeds::Surface surface;
+    BrickPart::Surface surface;
     if (is_estimated) {
       EstimatedSurface estimated = estimate_surface(volume, counts, brick, relevant);
       for (std::size_t n = 0; n < needs.size(); ++n) needs[n].to_distance = estimated.to_distance[n];
       surface = std::move(estimated.of_updates);
     }
-    return BrickNeeds(volume.set(), brick, volume.steps(), needs, std::move(surface));
+    return BrickPart(volume.set(), brick, volume.steps(), needs, std::move(surface));
   };
   return std::make_shared<const RelevantUpdates>(volume_.description().grid, UpdateErrors{volume_.steps(), volume_.error_steps()},
                                                  ShownRanges{part.shown}, std::move(bounds),

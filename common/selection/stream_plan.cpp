@@ -14,7 +14,7 @@ namespace intervale {
 namespace {
 
 constexpr std::uint32_t kFindVisits = 1 << 12;  // finding what a brick needs takes as long as so many visits
-constexpr std::uint32_t kBrickVisits = 32;      // and looking at a brick's bounds, as so many
+constexpr std::uint32_t kBrickVisits = 128;     // and looking at a brick's bounds, as so many
 
 }  // namespace
 
@@ -160,52 +160,62 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   if (viewed_[brick].is_loose != 0) refine(brick, ranking);
   if (viewed_[brick].rank < band_) return true;
   if (!relevant_->is_found(brick)) builder.visited += kFindVisits;
-  const BrickNeeds& needs = relevant_->brick(brick);
-  Bounds bounds = bounds_of(brick, needs);
+  InBrick in{relevant_->brick(brick), 0, scale_of_key(set.bricks()[brick].key), 0};
+  Bounds bounds = bounds_of(brick, in.needs);
   Pending before = pending(brick);
   if (ranking_->has_camera()) {
     move_limit(ranking, before, bounds);
     keep(brick, before);
   }
-  const int scale = scale_of_key(set.bricks()[brick].key);
+  in.limit = relevant_->distance(before.limit);
   const Rank least = budget_ ? Rank(1) : Rank(0);  // ancestors in the budget come last
   Unsent rest;
   float object_error = 0;
   bool full = false;
-  InBrick in{needs, 0, scale, relevant_->distance(before.limit)};
+  std::size_t count = 0;
   builder.visited += kBrickVisits;
   set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     if (full) return;
-    const std::size_t n = in.number++;
-    const Highest all = bounds.highest[n];
-    const float farthest = relevant_->object_error(needs.to_distance(n), scale, all.error_step, all.distance);
+    in.number = count++;
+    const Highest all = bounds.highest[in.number];
+    const float farthest = this->object_error(in, all);
     const Rank bound = std::max(ranking.bound({all.error_step, farthest, all.slope}), least);
-    const std::uint64_t occupancy = set.occupancy()[s], relevant = needs.slots(n, occupancy);
+    const std::uint64_t occupancy = set.occupancy()[s], relevant = in.needs.slots(in.number, occupancy);
     if (bound < band_ && ranking_->has_camera()) {  // most of them: what was sent is not even looked up
       rest.raise({bound, bound == 0 ? 0 : unsigned(std::popcount(relevant)), all});
       object_error = std::max(object_error, farthest);
       return;
     }
-    ++builder.visited;
+    builder.visited += 4;
     const UpdateIndex first = set.first(brick, s);
-    const std::uint64_t unsent = ~sent_.some(first, unsigned(std::popcount(occupancy))) & extract_bits(relevant, occupancy);
+    const std::uint64_t unsent = ~sent_.some(first, unsigned(std::popcount(occupancy))) & SplitSet::extract(relevant, occupancy);
     if (unsent == 0) return;
-    const auto here = visit_supercube(ranking, {needs, n, scale, in.limit}, {key, brick, s, {}, first}, unsent, all, builder);
+    const auto here = visit_supercube(ranking, in, {key, brick, s, {}, first}, unsent, all, builder);
     full = !here;
     if (full) return;
-    bounds.set(n, here->highest);
+    bounds.set(in.number, here->highest);
     rest.raise(*here);
-    object_error = std::max(object_error, relevant_->object_error(needs.to_distance(n), scale, here->highest.error_step, here->highest.distance));
+    object_error = std::max(object_error, this->object_error(in, here->highest));
   });
   keep(brick, bounds);
   if (full) return false;
   // What was not looked up may have been sent; but bounds do not grow.
   Pending after = pending(brick);
-  after.set_unsent(std::min<unsigned>(after.unsent, needs.updates()));
+  after.set_unsent(std::min<unsigned>(after.unsent, in.needs.updates()));
   after.lower_to(rest.highest, object_error);
   set_pending(brick, after, rest.rank, std::min<unsigned>(after.wanted, rest.wanted));
   if (ranking_->has_camera() && viewed_[brick].rank != 0) viewed_.use(brick).pixels = Up16(ranking.pixels(float(after.object_error)));
   return true;
+}
+
+// Lowers bounds of a supercube's unsent updates to how far those can move.
+void StreamPlan::lower(const InBrick& in, std::uint64_t occupancy, std::uint64_t unsent, Highest& highest) const {
+  if (!relevant_->has_distances()) return;
+  highest.distance =
+      std::min(highest.distance, in.needs.farthest(in.number, in.needs.slots(in.number, occupancy), SplitSet::deposit(unsent, occupancy)));
+  if (relevant_->distance(highest.distance) > in.limit) return;
+  highest.slope_below = std::max(highest.slope, highest.slope_below);
+  highest.slope = 0;
 }
 
 // Adds the updates of a supercube that belong to the band, if it may have any. first: its first update. unsent: a bit
@@ -218,8 +228,9 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
   Unsent rest{.highest = highest};
   if (candidates == 0) return rest;
-  const Ranking::Supercube ranking = brick.supercube(s, first.key);
-  const Rank bound = std::max(ranking.bound(highest.error_step, highest.distance, highest.slope), budget_ ? Rank(1) : Rank(0));
+  const Ranking::Supercube ranking = brick.supercube(in.needs, s, first.key);
+  if (ranking_->has_camera()) lower(in, occupancy, unsent, rest.highest);
+  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.distance, rest.highest.slope), budget_ ? Rank(1) : Rank(0));
   if (bound < band_) {
     rest.rank = bound;
     rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
@@ -299,7 +310,11 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
       --next_brick_;
       continue;
     }
-    if (!visit_brick(BrickIndex(next_brick_ - 1), builder)) break;
+    const std::uint32_t visited = builder.visited, updates = builder.updates;
+    const bool is_full = !visit_brick(BrickIndex(next_brick_ - 1), builder);
+    band_visits_ += builder.visited - visited;
+    band_updates_ += builder.updates - updates;
+    if (is_full) break;
     --next_brick_;
     if (builder.visited >= max_visits) break;
   }

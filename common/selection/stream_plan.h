@@ -1,12 +1,12 @@
 // Selects what a session sends next: a pure function of the data set, the level of detail and the updates sent. No
 // I/O.
 //
-// Updates are sent in bands of falling rank (ranking.h): within a band, importances differ by a factor of 4. The last
-// band takes all that is left once that is little. Within a band they are sent region by region, each after its missing
-// ancestors: neighbours share names and code tables, which makes the batch smaller. Bounds of the unsent updates are kept
-// for each brick and supercube that something was sent of (those of others are of all that is relevant), and a brick is
-// visited only if its bound is in the band: a new view costs O(bricks), and then the work for what it sends. What a brick
-// needs may be found only then (relevant_updates.h).
+// Updates are sent in bands of falling rank (ranking.h): within a band, importances differ by a factor of 4, or by more
+// where next to nothing was found. The last band takes all that is left once that is little. Within a band they are
+// sent region by region, each after its missing ancestors: neighbours share names and code tables, which makes the
+// batch smaller. Bounds of the unsent updates are kept for each brick and supercube that something was sent of (those
+// of others are of all that is relevant), and a brick is visited only if its bound is in the band: a new view costs
+// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h).
 #pragma once
 
 #include <algorithm>
@@ -40,22 +40,22 @@ struct Batch {
   std::vector<std::uint8_t> channels;  // their values (common/codec/channel_batch.h); empty if there are none
 };
 
-// Bound on the payload of a view's next batch, after `sent` bytes of payload. The first batch is small, so that there is
-// a mesh to draw soon; each further one about doubles what was sent, since a batch takes about a third of its bound. So a
-// client that has room for n bytes shows what fits into n / 2 at least.
+// Bound on the payload of a view's next batch, after `sent` bytes of payload. The first batch is small, so that there
+// is a mesh to draw soon; each further one about doubles what was sent, since a batch takes about a third of its bound.
+// So a client that has room for n bytes shows what fits into n / 2 at least.
 inline constexpr std::size_t kFirstPayload = 4 << 10;
-// The same of a view that shows other ranges of what the client has: there is a mesh already. What is missing lies in many
-// places, so that names are a third of small batches; such a batch takes some 6 to 16 kB.
+// The same of a view that shows other ranges of what the client has: there is a mesh already. What is missing lies in
+// many places, so that names are a third of small batches; such a batch takes some 6 to 16 kB.
 inline constexpr std::size_t kFirstPayloadOfRange = 128 << 10;
 [[nodiscard]] constexpr std::size_t next_payload(std::size_t sent, std::size_t most, std::size_t first = kFirstPayload) {
   return std::clamp(3 * sent, std::min(first, most), most);
 }
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: a byte for each four
-// bricks; four bytes for each of 64 bricks of which one has something that is wanted and not sent; eight for each brick that
-// something was sent of; for each 32 updates of which one was sent four bytes and a little more (eight with max_updates,
-// four more for each channel); for each supercube whose unsent updates matter less than all of it two bytes, or three if
-// distances are known.
+// bricks; four bytes for each of 64 bricks of which one has something that is wanted and not sent; eight for each brick
+// that something was sent of; for each 32 updates of which one was sent four bytes and a little more (eight with
+// max_updates, four more for each channel); for each supercube whose unsent updates matter less than all of it two
+// bytes, or three if distances are known.
 class StreamPlan {
  public:
   static constexpr std::uint32_t kMostVisits = 1 << 19;
@@ -63,8 +63,8 @@ class StreamPlan {
   // At first everything that the range of the data set needs is relevant.
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
-  // What is kept of a plan while its client rests, until the next view: what the client holds, and what is relevant to the
-  // ranges that it looks at.
+  // What is kept of a plan while its client rests, until the next view: what the client holds, and what is relevant to
+  // the ranges that it looks at.
   struct Resting {
     struct Held {
       PackedSplits updates;
@@ -96,9 +96,9 @@ class StreamPlan {
   // The most updates that the client holds.
   void set_room(std::uint64_t updates) { room_ = updates; }
 
-  // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice. relevant:
-  // of this volume. Before the set_lod() of the same view. O(bricks), and a few nanoseconds for 64 updates where
-  // something was sent.
+  // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice.
+  // relevant: of this volume. Before the set_lod() of the same view. O(bricks), and a few nanoseconds for 64 updates
+  // where something was sent.
   void set_relevant(const std::shared_ptr<const RelevantUpdates>& relevant) { set_relevant(relevant, relevant->shown()); }
   // The same for a client that shows other ranges: batches are coded for those.
   void set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown);
@@ -111,18 +111,19 @@ class StreamPlan {
   bool resume(std::size_t channel, SupercubeKey key, std::uint64_t slots);
 
   // Replaces the level of detail; check_lod(lod) must hold. hidden: a depth map of its camera; what lies behind is sent
-  // last. ahead: where the camera will be soon; another order of the same updates. O(bricks). The search of an equal level
-  // of detail goes on.
+  // last. ahead: where the camera will be soon; another order of the same updates. O(bricks). The search of an equal
+  // level of detail goes on.
   void set_lod(const Lod& lod, const DepthMap* hidden = nullptr, const Camera* ahead = nullptr);
 
   // The search for what is within max_updates, which is to be done before the next batch; nullptr: none. Another thread
   // may go on with it; otherwise next() does.
   [[nodiscard]] const std::shared_ptr<BudgetSearch>& search() const { return search_; }
 
-  // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call: done() tells
-  // which. max_bytes, at least 256, bounds the payload with its channels before compression, which takes about half of it.
-  // max_visits: of supercubes and updates, after which the batch ends; 2^15 take about a quarter of a millisecond. Few cut
-  // what a drag of a range needs, a few updates in many places, into small batches that name the same supercubes again.
+  // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call: done()
+  // tells which. max_bytes, at least 256, bounds the payload with its channels before compression, which takes about
+  // half of it. max_visits: of supercubes and updates, after which the batch ends; 2^13 take about a third of a
+  // millisecond. Few cut what a drag of a range needs, a few updates in many places, into small batches that name the
+  // same supercubes again.
   std::optional<Batch> next(std::size_t max_bytes, std::uint32_t max_visits = kMostVisits);
   // A batch that says only how much is left.
   [[nodiscard]] Batch no_updates() const;
@@ -199,7 +200,7 @@ class StreamPlan {
   }
   // A supercube, and what its brick needs.
   struct InBrick {
-    const BrickNeeds& needs;
+    BrickNeeds needs;
     std::size_t number = 0;  // of the supercube in the brick
     int scale = 0;
     float limit = 0;  // of the brick
@@ -214,12 +215,12 @@ class StreamPlan {
   [[nodiscard]] Highest of_update(const InBrick& in, UpdateIndex i, const BrickNeeds::OfSupercube& of_supercube, Slot slot) const {
     const BrickNeeds::OfUpdate known = of_supercube(slot);
     Highest own{std::uint8_t(volume_->error_step(i)), known.distance, known.slope};
-    const float error = relevant_->object_error(in.needs.to_distance(in.number), in.scale, own.error_step, own.distance);
-    if (error <= in.limit) std::swap(own.slope, own.slope_below);
+    if (object_error(in, own) <= in.limit) std::swap(own.slope, own.slope_below);
     return own;
   }
-  [[nodiscard]] static Highest of_relevant(const InBrick& in) {
-    return {in.needs.error_step(in.number), in.needs.distance(in.number), in.needs.slope(in.number), 0};
+  [[nodiscard]] float object_error(const InBrick& in, const Highest& highest) const {
+    if (relevant_->has_distances()) return relevant_->distance(highest.distance);
+    return relevant_->object_error(in.needs.to_distance(in.number), in.scale, highest.error_step);
   }
   // Bounds of all supercubes of a brick. Those that are not kept are those of their relevant updates.
   struct Bounds : SupercubeBounds::OfBrick {
@@ -245,6 +246,7 @@ class StreamPlan {
     }
   };
   bool visit_brick(BrickIndex brick, BatchBuilder& builder);
+  void lower(const InBrick& in, std::uint64_t occupancy, std::uint64_t unsent, Highest& highest) const;
   std::optional<Unsent> visit_supercube(const Ranking::Brick& brick, const InBrick& in, const Place& first, std::uint64_t unsent,
                                         const Highest& highest, BatchBuilder& builder);
   bool add_band(const Ranking::Supercube& ranking, const InBrick& in, const Place& place, std::uint64_t candidates, BatchBuilder& builder,
@@ -270,9 +272,11 @@ class StreamPlan {
   std::optional<SplitSet> budget_;        // then: the updates within the budget
   std::optional<Lod> searched_;           // that both are of
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);
-  std::uint32_t pending_bricks_ = 0;  // whose rank is not 0
-  Rank band_ = 0;                     // the lowest rank of the current band
-  std::uint32_t next_brick_ = 0;      // a band visits the bricks from last to first; those below this one are left
+  std::uint32_t pending_bricks_ = 0;                  // whose rank is not 0
+  Rank band_ = 0;                                     // the lowest rank of the current band
+  int band_width_ = 1;                                // see Ranking::band_below()
+  std::uint64_t band_visits_ = 0, band_updates_ = 0;  // what was looked at for it, and found
+  std::uint32_t next_brick_ = 0;                      // bricks below this one are left of the band
 };
 
 }  // namespace intervale

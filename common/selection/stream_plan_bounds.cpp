@@ -1,4 +1,5 @@
-// What is known of the updates that were not sent: bounds by brick and by supercube, and the bands that follow from them.
+// What is known of the updates that were not sent: bounds by brick and by supercube, and the bands that follow from
+// them.
 //
 // A view that differs little from the one before should find at once what it lacks. So bounds outlive views, and do not
 // say how steep updates are that no view near by wants.
@@ -14,6 +15,9 @@ namespace {
 // A brick's limit, relative to the object errors that are wanted there: at first, and the least that is kept.
 constexpr float kLimit = 1.3F, kLeastLimit = 0.95F;
 
+// A band was in vain after so many visits, if they found less than one update in so many.
+constexpr std::uint64_t kManyVisits = 1 << 13, kVisitsInVain = 64;
+
 }  // namespace
 
 StreamPlan::InBrick StreamPlan::in_brick(BrickIndex brick, SupercubeIndex s) const {
@@ -24,7 +28,10 @@ StreamPlan::InBrick StreamPlan::in_brick(BrickIndex brick, SupercubeIndex s) con
 StreamPlan::Bounds StreamPlan::bounds_of(BrickIndex brick, const BrickNeeds& needs) const {
   const auto count = std::size_t(std::popcount(volume_->set().bricks()[brick].mask));
   Bounds bounds;
-  for (std::size_t n = 0; n < count; ++n) bounds.highest[n] = of_relevant({needs, n});
+  for (std::size_t n = 0; n < count; ++n) {
+    const BrickNeeds::Highest all = needs.highest(n);
+    bounds.highest[n] = {all.error_step, all.distance, all.slope, 0};
+  }
   supercube_bounds_.read(brick, count, bounds);
   return bounds;
 }
@@ -88,6 +95,7 @@ void StreamPlan::rank_bricks() {
     viewed.pixels = Up16(bound.pixels);
     viewed.is_loose = bound.is_exact ? 0 : 1;
   }
+  band_visits_ = band_updates_ = 0;
   begin_band();
 }
 
@@ -99,7 +107,7 @@ void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
 }
 
 StreamPlan::Pending StreamPlan::first_pending(BrickIndex brick) const {
-  const RelevantUpdates::Bound& bound = relevant_->bound(brick);
+  const RelevantUpdates::Bound bound = relevant_->bound(brick);
   Pending first;
   first.set_unsent(bound.updates);
   first.wanted = viewed_[brick].rank == 0 ? 0 : first.unsent;
@@ -124,7 +132,12 @@ void StreamPlan::set_pending(BrickIndex brick, Pending pending, Rank rank, unsig
   keep(brick, pending);
 }
 
+// Where a client has nearly all that its view wants, as while it drags a range, bands find next to nothing; the order
+// of so few updates does not matter, and each band costs a visit of many bricks.
 void StreamPlan::begin_band() {
+  const bool was_in_vain = band_visits_ > kManyVisits && band_visits_ > kVisitsInVain * band_updates_;
+  band_width_ = was_in_vain ? std::min(2 * band_width_, Ranking::kMostWidth) : 1;
+  band_visits_ = band_updates_ = 0;
   next_brick_ = std::uint32_t(viewed_.size());
   Rank top = 0;
   for (std::size_t page = viewed_.pages(); page-- != 0;) {  // coarse ones have high ranks, so that few others are refined
@@ -139,7 +152,7 @@ void StreamPlan::begin_band() {
     if (most == 0) viewed_.release(page);
   }
   const bool is_rest = wanted_count_ < sent_count_ / kRest;
-  band_ = top == 0 ? Rank(0) : ranking_->band_below(top, is_rest);
+  band_ = top == 0 ? Rank(0) : ranking_->band_below(top, is_rest, band_width_);
 }
 
 StreamPlan::Remaining StreamPlan::remaining() const {

@@ -51,7 +51,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     Pending pending = this->pending(here.brick);
     pending.set_unsent(std::min<unsigned>(pending.unsent + 1U, in.needs.updates()));
     const Highest again = of_update(in, i, in.needs.of_supercube(in.number, relevant), slot);
-    pending.raise_to(again, relevant_->object_error(in.needs.to_distance(in.number), in.scale, again.error_step, again.distance));
+    pending.raise_to(again, object_error(in, again));
     keep(here.brick, pending);
     Bounds bounds = bounds_of(here.brick, in.needs);
     Highest highest = bounds.highest[in.number];

@@ -59,14 +59,4 @@ template <std::unsigned_integral Word>
   return std::popcount(Word(word & ((Word(1) << i) - 1)));
 }
 
-// The bits of `word` at the positions that are set in `mask`, as the lowest bits of the result.
-template <std::unsigned_integral Word>
-[[nodiscard]] constexpr Word extract_bits(Word word, Word mask) {
-  if ((mask & (mask + 1)) == 0) return word & mask;  // they are the lowest already
-  if ((word & mask) == mask) return Word((Word(1) << std::popcount(mask)) - 1);
-  Word bits = 0;
-  for (int at = 0; mask != 0; mask &= Word(mask - 1)) bits |= Word(word >> std::countr_zero(mask) & 1) << at++;
-  return bits;
-}
-
 }  // namespace intervale

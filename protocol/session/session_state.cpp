@@ -21,8 +21,8 @@ Fault other_version(std::uint32_t payload) {
 // Once a view is so exact, updates of every range with at least such errors go ahead of the rest of it: few, so that it is
 // not put off for long.
 constexpr double kCoarsePixels = 16, kAheadOfRestPercent = 40;
-constexpr std::uint64_t kAmpleRoom = 1 << 16;         // updates; in less room, ancestors may be most of what a view wants
-constexpr std::uint32_t kContendedVisits = 24 << 10;  // while other sessions wait: a fifth of a millisecond
+constexpr std::uint64_t kAmpleRoom = 1 << 16;        // updates; in less room, most may be ancestors
+constexpr std::uint32_t kContendedVisits = 8 << 10;  // while other sessions wait: a third of a millisecond
 
 }  // namespace
 

@@ -88,14 +88,21 @@ RangeCache::Relevant RangeCache::counted(Relevant relevant) const {
 }
 
 // What is known of a part, or is being found; better known distances before others.
-std::list<RangeCache::Entry>::iterator RangeCache::find_entry(const Volume& volume, const RangePart& part) {
-  auto best = entries_.end();
-  for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
-    if (entry->part.shown != part.shown || entry->volume.lock() != volume) continue;
-    if (entry->part.distances == part.distances && best == entries_.end()) best = entry;
-    if (entry->part.distances > part.distances && entry->bytes != 0) best = entry;
+RangeCache::Entries::iterator RangeCache::find_entry(const Volume& volume, const RangePart& part) {
+  for (const Distances distances : {Distances::measured, Distances::estimated, Distances::none}) {
+    if (distances < part.distances) break;
+    const auto found = entry_of_.find(Key{volume.get(), {part.shown, distances}});
+    if (found == entry_of_.end()) continue;
+    const Entry& entry = *found->second;
+    if (entry.is_of(volume) && (distances == part.distances || entry.bytes != 0)) return found->second;
   }
-  return best;
+  return entries_.end();
+}
+
+// It is not found any more, but stays in the list.
+void RangeCache::hide(Entries::iterator entry) {
+  const auto found = entry_of_.find(entry->key);
+  if (found != entry_of_.end() && found->second == entry) entry_of_.erase(found);
 }
 
 RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volume, const RangePart& part) {
@@ -107,19 +114,21 @@ RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volu
     lock.unlock();
     return relevant.get();
   }
-  const auto entry = entries_.insert(entries_.begin(), Entry{volume, part, promise.get_future().share()});
+  const auto entry = entries_.insert(entries_.begin(), Entry{{volume.get(), part}, volume, promise.get_future().share()});
+  entry_of_[entry->key] = entry;
   lock.unlock();
   try {
     Relevant relevant = counted(find_(finder, part));
     promise.set_value(relevant);
     lock.lock();
     entry->bytes = relevant->memory_bytes();
-    const std::list<Entry> dropped = take_old(volume, part);
+    const Entries dropped = take_old(volume, part);
     lock.unlock();  // what is dropped may have thousands of arrays: nobody waits until they are freed
     return relevant;
   } catch (...) {  // out of memory, or stopped: whoever asks next tries again
     promise.set_exception(std::current_exception());
     lock.lock();
+    hide(entry);
     entries_.erase(entry);
     throw;
   }
@@ -127,23 +136,26 @@ RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volu
 
 // What is better known by now, what was used least recently, and what belongs to data sets that are served no more: taken
 // out of the list. With the lock held.
-std::list<RangeCache::Entry> RangeCache::take_old(const Volume& volume, const RangePart& found) {
-  std::list<Entry> old;
+RangeCache::Entries RangeCache::take_old(const Volume& volume, const RangePart& found) {
+  Entries old;
   std::size_t bytes = 0;
   for (auto entry = entries_.begin(); entry != entries_.end();) {
     const bool is_computed = entry->bytes != 0, is_first = entry == entries_.begin();
-    const bool is_worse = entry->part.distances < found.distances && entry->part.shown == found.shown && entry->volume.lock() == volume;
+    const bool is_worse = entry->key.part.distances < found.distances && entry->key.part.shown == found.shown && entry->is_of(volume);
     if (is_computed) entry->bytes = entry->relevant.get()->memory_bytes();
     bytes += is_worse ? 0 : entry->bytes;
     const bool is_old = is_worse || entry->volume.expired() || (bytes > most_bytes_ && !is_first);
     const auto next = std::next(entry);
-    if (is_computed && is_old) old.splice(old.end(), entries_, entry);
+    if (is_computed && is_old) {
+      hide(entry);
+      old.splice(old.end(), entries_, entry);
+    }
     entry = next;
   }
   return old;
 }
 
-// A range of several parts that a session has. nullptr: there is none. With the lock held.
+// A range of several parts that a session has. nullptr: there is none that finds something itself. With the lock held.
 RangeCache::Relevant RangeCache::find_whole(const Volume& volume, const ShownRanges& shown, Distances distances) const {
   for (const Whole& whole : wholes_) {
     Relevant relevant = whole.relevant.lock();
@@ -206,11 +218,13 @@ void RangeCache::answer(Answer& request) {
     if (!relevant) {
       relevant = find_relevant_updates(request.volume_, request.shown_, request.distances_, part_of);
       const auto is_same = [&](const Answer::Part& one) { return one.relevant == relevant; };
-      const bool is_new = std::none_of(request.parts_.begin(), request.parts_.end(), is_same) && relevant.get() != &request.volume_->relevant();
-      if (is_new) relevant = counted(std::move(relevant));
-      const std::lock_guard lock(mutex_);
-      std::erase_if(wholes_, [](const Whole& whole) { return whole.relevant.expired(); });
-      wholes_.push_back({request.volume_, request.distances_, relevant});
+      const bool is_known = std::any_of(request.parts_.begin(), request.parts_.end(), is_same) || relevant.get() == &request.volume_->relevant();
+      if (!is_known && !relevant->has_parts()) {
+        relevant = counted(std::move(relevant));
+        const std::lock_guard lock(mutex_);
+        std::erase_if(wholes_, [](const Whole& whole) { return whole.relevant.expired(); });
+        wholes_.push_back({request.volume_, request.distances_, relevant});
+      }
     }
     request.promise_.set_value(std::move(relevant));
   } catch (...) {

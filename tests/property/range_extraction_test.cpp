@@ -111,7 +111,8 @@ TEST_P(RangeExtraction, FindsWhatADataSetOfOneRangeHolds) {
         if (!found) return;
         const bool moves = testing::to_distance_of(one->relevant(), *one, found->brick, found->supercube).code() != 0;
         const bool has_error =
-            one->error_steps()[one->relevant().brick(found->brick).error_step(testing::number_in_brick(*one, found->brick, found->supercube))] > 0;
+            one->error_steps()
+                [one->relevant().brick(found->brick).highest(testing::number_in_brick(*one, found->brick, found->supercube)).error_step] > 0;
         // Where a surface only touches the values nothing moves.
         if (moves && has_error && testing::slots_of(*crossed, *volume, b, s) != 0) {
           EXPECT_GT(testing::to_distance_of(*relevant, *volume, b, s).code(), 0);

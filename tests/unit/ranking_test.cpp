@@ -103,10 +103,10 @@ TEST_P(Ranks, NoUpdateRanksAboveItsSupercube) {
     const auto ahead = random_ahead(lod, volume_.description().grid, random_);
     const Ranking ranking(volume_, volume_.relevant(), lod, map ? &*map : nullptr, ahead ? &*ahead : nullptr);
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
-      const BrickNeeds& needs = volume_.relevant().brick(p.brick);
-      const std::size_t n = testing::number_in_brick(volume_, p.brick, p.supercube);
-      const unsigned level = needs.error_step(n);
-      ASSERT_GE(ranking.of_brick(p.brick).supercube(p.supercube, p.key).bound(level, 0, needs.slope(n)), rank) << "trial " << trial;
+      const BrickNeeds needs = volume_.relevant().brick(p.brick);
+      const BrickNeeds::Highest highest = needs.highest(testing::number_in_brick(volume_, p.brick, p.supercube));
+      ASSERT_GE(ranking.of_brick(p.brick).supercube(needs, p.supercube, p.key).bound(highest.error_step, 0, highest.slope), rank)
+          << "trial " << trial;
     });
   }
 }
@@ -188,10 +188,10 @@ TEST_P(Ranks, WhereDistancesAreKnownTheyTellWhatIsWanted) {
     for_each_rank(volume, ranking, [&](const Place& p, Ranking::Rank rank) {
       const Ranking::Brick brick = ranking.of_brick(p.brick);
       const RelevantUpdates& relevant = volume.relevant();
-      const BrickNeeds& needs = relevant.brick(p.brick);
-      const std::size_t n = testing::number_in_brick(volume, p.brick, p.supercube);
+      const BrickNeeds needs = relevant.brick(p.brick);
+      const BrickNeeds::Highest highest = needs.highest(testing::number_in_brick(volume, p.brick, p.supercube));
       ASSERT_GE(brick.bound(), rank);
-      ASSERT_GE(brick.supercube(p.supercube, p.key).bound(needs.error_step(n), needs.distance(n), needs.slope(n)), rank);
+      ASSERT_GE(brick.supercube(needs, p.supercube, p.key).bound(highest.error_step, highest.distance, highest.slope), rank);
       const double pixels = double(distance_of(testing::distance_of(relevant, volume, p), diamond_width(g))) * pixels_per_unit(volume, view, p);
       if (std::abs(pixels - lod.camera->pixel_error) < 1e-5 * pixels) return;
       ASSERT_EQ(rank != 0, pixels > lod.camera->pixel_error) << "trial " << trial;
@@ -267,6 +267,8 @@ TEST_P(Ranks, GrowWithTheSquaredDeviationInThePicture) {
       ASSERT_GE(low, 1);
       ASSERT_LE(low, top);
       ASSERT_LE(ranking.band_below(top, true), all.front().first);
+      ASSERT_LE(ranking.band_below(top, false, 2), low);
+      ASSERT_GE(ranking.band_below(top, false, Ranking::kMostWidth), ranking.band_below(top, true));
       const auto last = std::lower_bound(all.begin(), all.end(), std::pair(low, 0.0));
       if (low > 1) {
         ASSERT_LE(all[i].second, last->second * 4 * 1.07) << "trial " << trial;

@@ -48,12 +48,11 @@ class United : public ::testing::TestWithParam<unsigned> {
   }
 
   // What is known of bricks and supercubes bounds all that is relevant in them.
-  void expect_bounds(const RelevantUpdates& all) const {
+  void expect_bounds(const RelevantUpdates& all) {
     const SupercubeSet& set = volume_->set();
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
-      const RelevantUpdates::Bound& bound = all.bound(b);
-      const BrickNeeds& needs = all.brick(b);
-      ASSERT_GE(bound.updates, needs.updates());
+      const RelevantUpdates::Bound bound = all.bound(b);
+      const BrickNeeds needs = all.brick(b);
       ASSERT_LE(bound.updates, set.updates(b));
       unsigned relevant = 0;
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
@@ -70,13 +69,19 @@ class United : public ::testing::TestWithParam<unsigned> {
           distance = std::max<unsigned>(distance, testing::distance_of(all, *volume_, p));
           ASSERT_GE(bound.object_error, testing::object_error_of(all, *volume_, p) * (1 - 1e-5F));
         }
-        ASSERT_EQ(needs.error_step(n), step);
-        ASSERT_EQ(needs.slope(n), slope);
-        ASSERT_EQ(needs.distance(n), distance);
+        ASSERT_EQ(needs.highest(n).error_step, step);
+        ASSERT_EQ(needs.highest(n).slope, slope);
+        ASSERT_EQ(needs.highest(n).distance, distance);
+        for (std::uint64_t some : {testing::slots_of(all, *volume_, b, s), testing::slots_of(all, *volume_, b, s) & random_()}) {
+          std::uint8_t farthest = 0;
+          for (const Slot slot : set_bits<Slot>(some)) farthest = std::max(farthest, known(slot).distance);
+          ASSERT_EQ(needs.farthest(n, testing::slots_of(all, *volume_, b, s), some), farthest);
+        }
         ASSERT_GE(bound.error_step, step);
         ASSERT_GE(bound.slope, slope);
       });
-      ASSERT_EQ(needs.updates(), relevant);
+      ASSERT_GE(needs.updates(), relevant);
+      ASSERT_GE(bound.updates, relevant);
     }
   }
 
