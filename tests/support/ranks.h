@@ -42,11 +42,17 @@ inline std::optional<Camera> random_ahead(const Lod& lod, const Grid& g, std::mt
   return random_camera(g, random);
 }
 
-// Of what is relevant to the volume's range.
+// Of one update that is relevant to the volume's range.
+inline Ranking::Rank rank_of(const IntervalVolume& v, const Ranking& ranking, const Place& p) {
+  const BrickNeeds needs = v.relevant().brick(p.brick);
+  return ranking.of_brick(p.brick).supercube(needs, p.supercube, p.key)(p.index, p.slot);
+}
+
+// Of all that are.
 using VisitRank = std::function<void(const Place&, Ranking::Rank)>;
 inline void for_each_rank(const IntervalVolume& v, const Ranking& ranking, const VisitRank& visit) {
   v.set().for_each_down([&](const Place& p) {
-    if (is_relevant(v.relevant(), v, p)) visit(p, ranking.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot));
+    if (is_relevant(v.relevant(), v, p)) visit(p, rank_of(v, ranking, p));
   });
 }
 

@@ -26,7 +26,7 @@ TEST_P(RanksAhead, WhereTheCameraGoesChangesRanksButNotWhatIsWanted) {
     const Camera ahead = testing::random_camera(g, random_);
     const Ranking resting(volume_, lod), moving(volume_, volume_.relevant(), lod, nullptr, &ahead);
     for_each_rank(volume_, moving, [&](const Place& p, Ranking::Rank rank) {
-      const Ranking::Rank without = resting.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot);
+      const Ranking::Rank without = testing::rank_of(volume_, resting, p);
       ASSERT_EQ(rank == 0, without == 0) << "trial " << trial;
       if (!lod.camera) {
         ASSERT_EQ(rank, without) << "without a camera there is no other";
@@ -44,9 +44,8 @@ TEST_P(RanksAhead, ACameraThatGoesNowhereRanksAsOneThatRests) {
     const Lod lod = testing::random_lod(volume_.description().grid, random_);
     if (!lod.camera) continue;
     const Ranking resting(volume_, lod), moving(volume_, volume_.relevant(), lod, nullptr, &*lod.camera);
-    for_each_rank(volume_, moving, [&](const Place& p, Ranking::Rank rank) {
-      ASSERT_EQ(rank, resting.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot)) << "trial " << trial;
-    });
+    for_each_rank(volume_, moving,
+                  [&](const Place& p, Ranking::Rank rank) { ASSERT_EQ(rank, testing::rank_of(volume_, resting, p)) << "trial " << trial; });
   }
 }
 

@@ -125,7 +125,7 @@ TEST_P(Ranks, WhatADepthMapHidesComesLastAndIsWantedAllTheSame) {
     std::array<std::optional<int>, 2> shifts;
     Ranking::Rank highest_hidden = 0, lowest_seen = std::numeric_limits<Ranking::Rank>::max();
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
-      const Ranking::Rank without = seen.of_brick(p.brick).supercube(p.supercube, p.key)(p.index, p.slot);
+      const Ranking::Rank without = testing::rank_of(volume_, seen, p);
       ASSERT_EQ(rank == 0, without == 0);
       if (rank == 0) return;
       const bool is_hidden = occlusion.hides(region_of(volume_, p.key, p.key));

@@ -14,6 +14,7 @@
 #include "tests/support/interval_volumes.h"
 #include "tests/support/needs.h"
 #include "tests/support/parents.h"
+#include "tests/support/ranks.h"
 
 namespace intervale {
 namespace {
@@ -102,7 +103,7 @@ class Receiver {
     for (UpdateIndex i : left()) {
       const Place p = volume_->set().place(i);
       if (!testing::is_relevant(volume_->relevant(), *volume_, p)) continue;
-      if (ranking.of_brick(p.brick).supercube(p.supercube, p.key)(i, p.slot) == 0) continue;
+      if (testing::rank_of(*volume_, ranking, p) == 0) continue;
       ++own.updates;
       own.error = std::max(own.error, double(volume_->error(i)));
     }
