@@ -145,9 +145,20 @@ TEST_F(RangeCacheTest, SeveralRangesAreUnitedOnceOfWhatEachNeeds) {
   const auto first = measured(above(2)), all = measured(both);
   EXPECT_EQ(found, 3);
   EXPECT_EQ(all->shown(), both);
-  EXPECT_EQ(measured(both), all);
+  EXPECT_TRUE(all->has_parts());
+  EXPECT_EQ(testing::slots_of(*measured(both), *volume), testing::slots_of(*all, *volume));
   EXPECT_EQ(measured(above(2)), first);
   EXPECT_EQ(found, 3);
+}
+
+// Nothing is known of how far surfaces move inside, where a range is refined: what it needs together with another one is
+// found anew.
+TEST_F(RangeCacheTest, WhatIsFoundForSeveralRangesTogetherIsSharedWhileInUse) {
+  RangeCache cache(memory, scheduler, find);
+  const ShownRanges unlike = distinct({above(2).front(), {{-0.5, 0.5}, Refine::uniform}});
+  const auto all = get(cache, volume, unlike);
+  EXPECT_FALSE(all->has_parts());
+  EXPECT_EQ(get(cache, volume, unlike), all);
 }
 
 // On the way from one value to the next a surface crosses the same edges, but at other places.
@@ -174,7 +185,7 @@ TEST_F(RangeCacheTest, WithFewKeysWhatIsMeasuredDoesForAllRangesBetweenTwoKeys) 
   EXPECT_EQ(found, 3) << "2 to 3, 5 to 6, and 8 to 9";
   EXPECT_EQ(first->shown(), between(2.25, 5));
   EXPECT_EQ(second->shown(), between(3, 5.75));
-  EXPECT_EQ(measured(2.25, 5), first) << "shared while it is in use";
+  EXPECT_TRUE(first->has_parts()) << "which are shared";
   EXPECT_EQ(testing::slots_of(*first, *volume), testing::slots_of(*second, *volume));
   const auto one = testing::error_to_distance_of(*first, *volume), other = testing::error_to_distance_of(*second, *volume);
   EXPECT_TRUE(std::ranges::equal(one, other, {}, &ErrorToDistance::code, &ErrorToDistance::code));
