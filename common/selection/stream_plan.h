@@ -276,7 +276,6 @@ class StreamPlan {
   Rank band_ = 0;                                     // the lowest rank of the current band
   int band_width_ = 1;                                // see Ranking::band_below()
   std::uint64_t band_visits_ = 0, band_updates_ = 0;  // what was looked at for it, and found
-  std::uint64_t view_updates_ = 0;                    // found in the bands before it, for this view
   std::uint32_t next_brick_ = 0;                      // bricks below this one are left of the band
 };
 

@@ -95,7 +95,7 @@ void StreamPlan::rank_bricks() {
     viewed.pixels = Up16(bound.pixels);
     viewed.is_loose = bound.is_exact ? 0 : 1;
   }
-  band_visits_ = band_updates_ = view_updates_ = 0;
+  band_visits_ = band_updates_ = 0;
   begin_band();
 }
 
@@ -132,12 +132,11 @@ void StreamPlan::set_pending(BrickIndex brick, Pending pending, Rank rank, unsig
   keep(brick, pending);
 }
 
-// Where a client has most of what its view wants, as while it drags a range, bands find next to nothing; the order of so
-// few updates matters little, and each band costs a visit of many bricks.
+// Where a client has nearly all that its view wants, as while it drags a range, bands find next to nothing; the order
+// of so few updates does not matter, and each band costs a visit of many bricks.
 void StreamPlan::begin_band() {
-  view_updates_ += band_updates_;
   const bool was_in_vain = band_visits_ > kManyVisits && band_visits_ > kVisitsInVain * band_updates_;
-  band_width_ = was_in_vain && view_updates_ < sent_count_ / 2 ? std::min(2 * band_width_, Ranking::kMostWidth) : 1;
+  band_width_ = was_in_vain ? std::min(2 * band_width_, Ranking::kMostWidth) : 1;
   band_visits_ = band_updates_ = 0;
   next_brick_ = std::uint32_t(viewed_.size());
   Rank top = 0;
