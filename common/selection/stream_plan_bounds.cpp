@@ -95,7 +95,6 @@ void StreamPlan::rank_bricks() {
     viewed.pixels = Up16(bound.pixels);
     viewed.is_loose = bound.is_exact ? 0 : 1;
   }
-  band_visits_ = band_updates_ = 0;
   begin_band();
 }
 
@@ -133,7 +132,8 @@ void StreamPlan::set_pending(BrickIndex brick, Pending pending, Rank rank, unsig
 }
 
 // Where a client has nearly all that its view wants, as while it drags a range, bands find next to nothing; the order
-// of so few updates does not matter, and each band costs a visit of many bricks.
+// of so few updates does not matter, and each band costs a visit of many bricks. The next view most likely is like that,
+// too: the width is kept.
 void StreamPlan::begin_band() {
   const bool was_in_vain = band_visits_ > kManyVisits && band_visits_ > kVisitsInVain * band_updates_;
   band_width_ = was_in_vain ? std::min(2 * band_width_, Ranking::kMostWidth) : 1;
