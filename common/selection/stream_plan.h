@@ -1,5 +1,5 @@
-// Selects what a session sends next: a pure function of the data set, the level of detail and the updates sent. No
-// I/O.
+// Selects what a session sends next. What follows from the data set, the level of detail and the updates sent; the
+// order, a little, from the views before, too (begin_band()). No I/O.
 //
 // Updates are sent in bands of falling rank (ranking.h): within a band, importances differ by a factor of 4, or by more
 // where next to nothing was found. The last band takes all that is left once that is little. Within a band they are
