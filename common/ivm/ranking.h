@@ -171,7 +171,7 @@ class Ranking {
   // a factor of 4 at most, or with a camera of 4^width. is_rest: of all further ones that are sent, but for those that
   // are hidden if top is not.
   [[nodiscard]] Rank band_below(Rank top, bool is_rest = false, int width = 1) const;
-  static constexpr int kMostWidth = 128;
+  static constexpr int kMostWidth = 128;  // a band of all that is seen, or of all that is hidden
 
   [[nodiscard]] bool has_camera() const { return screen_.has_value(); }
   [[nodiscard]] std::size_t memory_bytes() const;  // besides this object
