@@ -31,9 +31,14 @@ constexpr double kUnknownDistance = kMaxFarDeviation / (1 << kTopScale);
 constexpr double kFarWidths = 2.01;       // a patch further away than so many widths of the diamond is far
 constexpr double kLeastDeviation = 1e-4;  // of the finest diamonds' width: smaller deviations count as 0
 
-// Sums of squared deviations are whole numbers, so that their order does not matter.
+// Sums of squared deviations are whole numbers, so that their order does not matter. Where a grid is so large or so small
+// that they are not finite, they say nothing.
 constexpr double kRemovedOne = 1 << 20;
-std::int64_t whole(double value) { return std::int64_t(value < 0 ? value - 0.5 : value + 0.5); }
+std::int64_t whole(double value) {
+  constexpr double kMost = 1LL << 62;
+  if (std::isnan(value)) return 0;
+  return std::int64_t(std::clamp(value < 0 ? value - 0.5 : value + 0.5, -kMost, kMost));
+}
 
 using Tet = BisectionTet;
 

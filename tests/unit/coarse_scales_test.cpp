@@ -21,6 +21,7 @@
 #include "protocol/session/local_worker.h"
 #include "protocol/session/session_state.h"
 #include "server/builder/value_builder.h"
+#include "tests/support/seeds.h"
 #include "tests/support/value_fields.h"
 
 namespace intervale::coarse_scaless {
@@ -101,12 +102,12 @@ TEST(CoarseScales, TheirMeshIsThatOfTheWholeFileWhereNothingFinerIsWanted) {
 TEST(CoarseScales, ErrorsOfTheLastLevelOfAScaleBoundThoseOfFinerOnes) {
   for (const Dims& dims :
        std::vector<Dims>{{33, 33, 33}, {40, 21, 35}, {70, 67, 66}, {65, 9, 30}, {2, 50, 7}, {37, 2, 2}, {18, 17, 100}, {3, 3, 66}}) {
-    for (unsigned seed = 0; seed < 5; ++seed) {
+    for (unsigned seed = 0; seed < testing::cases(5); ++seed) {
       const SharedVolume all = whole(file_of(dims, seed));
       const SupercubeSet& set = all->set();
       const auto largest = [&](int scale, int cls) {
         double error = 0;
-        set.for_each(scale, std::size_t(cls), [&](const Place& p) { error = std::max(error, double(all->error(p.index))); });
+        set.for_each(scale, cls, [&](const Place& p) { error = std::max(error, double(all->error(p.index))); });
         return error;
       };
       double finer = 0;

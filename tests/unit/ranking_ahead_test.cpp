@@ -6,6 +6,7 @@
 #include "common/ivm/ranking.h"
 #include "tests/support/cameras.h"
 #include "tests/support/ranks.h"
+#include "tests/support/seeds.h"
 
 namespace intervale {
 namespace {
@@ -20,7 +21,7 @@ class RanksAhead : public ::testing::TestWithParam<unsigned> {
 
 TEST_P(RanksAhead, WhereTheCameraGoesChangesRanksButNotWhatIsWanted) {
   std::size_t moved = 0;
-  for (int trial = 0; trial < 40; ++trial) {
+  for (unsigned trial = 0; trial < testing::cases(40); ++trial) {
     const Grid& g = volume_.description().grid;
     const Lod lod = testing::random_lod(g, random_);
     const Camera ahead = testing::random_camera(g, random_);
@@ -40,7 +41,7 @@ TEST_P(RanksAhead, WhereTheCameraGoesChangesRanksButNotWhatIsWanted) {
 }
 
 TEST_P(RanksAhead, ACameraThatGoesNowhereRanksAsOneThatRests) {
-  for (int trial = 0; trial < 40; ++trial) {
+  for (unsigned trial = 0; trial < testing::cases(40); ++trial) {
     const Lod lod = testing::random_lod(volume_.description().grid, random_);
     if (!lod.camera) continue;
     const Ranking resting(volume_, lod), moving(volume_, volume_.relevant(), lod, nullptr, &*lod.camera);
