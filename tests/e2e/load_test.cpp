@@ -154,8 +154,8 @@ TEST(Load, ClientsThatKeepLittleForgetWhatTheServerForgets) {
 TEST(Load, ClientsTellWhatTheirMeshesHide) {
   const EveryRangeFolder every;
   ServerProgram one, any(every.file);
-  const std::vector<std::string> options{"--clients",     "3", "--duration", "1", "--ramp",   "0",           "--views-per-second", "5",
-                                         "--pixel-error", "4", "--threads",  "2", "--verify", "--depth-maps"};
+  const std::vector<std::string> options{"--clients",     "3",   "--duration", "1", "--ramp",   "0",           "--views-per-second", "5",
+                                         "--pixel-error", "0.5", "--threads",  "2", "--verify", "--depth-maps"};
   for (const std::string scenario : {"orbit", "range"}) {
     std::vector<std::string> all = options;
     all.insert(all.end(), {"--scenario", scenario});
