@@ -19,12 +19,12 @@ class TlsContext;
 using LoadClock = std::chrono::steady_clock;
 
 inline constexpr std::chrono::milliseconds kLate{5};  // a view sent so much after it was due counts as late
-inline constexpr std::chrono::seconds kGrace{2};      // to wait for answers after the duration
 
 struct LoadOptions {
   unsigned clients = 0;  // at least 1
   LoadClock::duration duration{};
-  LoadClock::duration ramp = std::chrono::seconds(1);  // the starts of the clients are spread evenly over it, at most over the duration
+  LoadClock::duration grace = std::chrono::seconds(2);  // after the duration: how long answers are awaited
+  LoadClock::duration ramp = std::chrono::seconds(1);   // the starts of the clients are spread evenly over it, at most over the duration
   Scenario scenario = Scenario::orbit;
   double views_per_second = 5;
   double pixel_error = 2;

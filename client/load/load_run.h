@@ -8,7 +8,7 @@
 
 namespace intervale {
 
-// Asks the server for the description, runs the clients, and compares meshes. Blocks for the duration and up to kGrace
+// Asks the server for the description, runs the clients, and compares meshes. Blocks for the duration and up to the grace
 // and the patience; to compare meshes of a range each, also for two streams for each client. Fails if the run is not
 // possible: no server, no such data set, a range or scenario that the data set is not for (misuse), too few open files
 // allowed; and if those streams cannot be had. Clients that fail later and meshes that differ are in the report.

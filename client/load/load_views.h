@@ -4,8 +4,8 @@
 // periods after its WebSocket was opened, however slow the server is, and its latency counts from that time, not from
 // when it was sent. A view that is replaced before it was answered counts until the first message for the same view or
 // a newer one, and one that is replaced before its Done until the next Done. Views that are not served to the end when
-// the duration is over may take kGrace more, and then count with the time they have waited. While a server is lost,
-// views continue to be due.
+// the duration is over may take the plan's grace more, and then count with the time they have waited. While a server is
+// lost, views continue to be due.
 #pragma once
 
 #include <cstddef>

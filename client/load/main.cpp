@@ -118,7 +118,8 @@ void add_options(CLI::App& app, LoadCommand& options) {
   load.threads = std::max(1u, std::thread::hardware_concurrency() / 2);
   app.add_option("URL", options.url, "ws://host:port/NAME, or wss://")->required();
   within(app.add_option("--clients", load.clients, "Number of clients that run at once")->required(), 1, 1e6, "N");
-  add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent; answers may arrive up to 2 s later")->required();
+  add_seconds(app, "--duration", load.duration, 0.01, "How long views are sent")->required();
+  add_seconds(app, "--grace", load.grace, 0, "After the duration: how long answers are awaited (default 2)");
   add_ranges_option(app, options.range, std::string(kShownRangeHelp) + ". Scenario range: where drags begin (default: the upper half of the values)")
       ->group("Views");
   add_refine_option(app, options.refine, kShownRefineHelp)->group("Views");

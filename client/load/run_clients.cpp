@@ -299,7 +299,7 @@ class LoadClient {
       stats_.repeated_updates += session.updates - session.forgotten - session_.mesh()->updates();
     }
     // Not the time that closing took.
-    views_.report_rest(state_ == State::failed, std::min(LoadClock::now(), plan_.end() + kGrace));
+    views_.report_rest(state_ == State::failed, std::min(LoadClock::now(), plan_.end() + plan_.grace));
   }
 
   const LoadPlan& plan_;
@@ -324,7 +324,7 @@ asio::awaitable<void> end_on_time(asio::steady_timer& timer, const LoadPlan& pla
   for (const auto& client : clients) {
     if (client) client->end_views();
   }
-  timer.expires_at(plan.end() + kGrace);
+  timer.expires_at(plan.end() + plan.grace);
   if (const auto [error] = co_await timer.async_wait(kAwait); error) co_return;
   for (const auto& client : clients) {
     if (client) client->leave();

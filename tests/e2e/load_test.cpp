@@ -66,7 +66,7 @@ class LoadScenarios : public ::testing::TestWithParam<const char*> {};
 TEST_P(LoadScenarios, EveryViewIsAnswered) {
   ServerProgram server;
   const auto figures = load(server.url("buckyball"), {"--clients", "5", "--duration", "0.8", "--ramp", "0.2", "--scenario", GetParam(),
-                                                      "--views-per-second", "10", "--seed", "3", "--threads", "2", "--verify"});
+                                                      "--views-per-second", "10", "--seed", "3", "--threads", "2", "--verify", "--grace", "60"});
   EXPECT_EQ(figures.at("connected"), 5);
   EXPECT_EQ(figures.at("verified"), 5);
   EXPECT_GT(figures.at("views"), 5);
@@ -91,8 +91,9 @@ struct EveryRangeFolder {
 TEST(Load, ADraggedRangeIsAnsweredWithItsMesh) {
   const EveryRangeFolder every;
   ServerProgram server(every.file);
-  const std::vector<std::string> options{"--clients",          "4",  "--duration", "1.8", "--ramp",    "0.2", "--scenario", "range",
-                                         "--views-per-second", "20", "--seed",     "3",   "--threads", "2",   "--verify"};
+  const std::vector<std::string> options{"--clients",  "4",     "--duration",         "1.8",     "--ramp", "0.2",
+                                         "--scenario", "range", "--views-per-second", "20",      "--seed", "3",
+                                         "--threads",  "2",     "--verify",           "--grace", "60"};
   for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
            {}, {"--range", "-0.2", "0.4"}, {"--range", "0.5", "inf", "--refine", "uniform"}, {"--max-tets", "3000", "--max-kept", "2500"}}) {
     std::vector<std::string> all = options;
@@ -154,8 +155,9 @@ TEST(Load, ClientsThatKeepLittleForgetWhatTheServerForgets) {
 TEST(Load, ClientsTellWhatTheirMeshesHide) {
   const EveryRangeFolder every;
   ServerProgram one, any(every.file);
-  const std::vector<std::string> options{"--clients",     "3",   "--duration", "1", "--ramp",   "0",           "--views-per-second", "5",
-                                         "--pixel-error", "0.5", "--threads",  "2", "--verify", "--depth-maps"};
+  const std::vector<std::string> options{
+      "--clients", "3",        "--duration",   "1",       "--ramp", "0", "--views-per-second", "5", "--pixel-error", "0.5", "--threads",
+      "2",         "--verify", "--depth-maps", "--grace", "60"};
   for (const std::string scenario : {"orbit", "range"}) {
     std::vector<std::string> all = options;
     all.insert(all.end(), {"--scenario", scenario});
