@@ -150,13 +150,18 @@ export async function open(browser, url, { width = 800, height = 600, ...options
   return { page, errors, downloaded: () => downloaded, close: () => context.close() };
 }
 
-// Waits until the view is completely refined and drawn.
+// Waits until the view is completely refined and drawn. A change of the view before reaches the worker with the next
+// frame, or when the interval between two views is over; the worker then takes back that it is done.
 export async function settled(page) {
-  await page.waitForFunction(() => {
+  const isDone = () => {
     const { progress, live, stats } = window.intervale;
     return progress?.done && live.connection.state === 'open' && stats.surfaceVersion === progress.surfaceVersion;
-  });
-  await drawn(page);
+  };
+  do {
+    await page.waitForFunction(isDone);
+    await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve, 150))));
+    await drawn(page);
+  } while (!(await page.evaluate(isDone)));
 }
 
 // Waits until the worker has answered all requests, and the picture is drawn.
@@ -183,10 +188,7 @@ export const fetched = (server, name, ...options) =>
 
 // Changes the view as the controls do, and waits until it is refined.
 export async function set(page, change) {
-  await page.evaluate((change) => {
-    window.intervale.set(change);
-    return new Promise((resolve) => setTimeout(resolve, 250)); // views are sent at most ten times a second
-  }, change);
+  await page.evaluate((change) => window.intervale.set(change), change);
   await settled(page);
 }
 

@@ -122,7 +122,7 @@ describe('The page', () => {
   test('tells the server what its surfaces hide, if they hide anything', async () => {
     const changes = async () => Number(/^intervale_view_change_seconds_count (\d+)/m.exec(await (await fetch(new URL('/metrics', server.url))).text())[1]);
     // Views that are answered after the first one, while the page opens over a slow line.
-    const line = await throttledProxy(server.port, 50_000);
+    const line = await throttledProxy(server.port, 20_000);
     const opened = async (hash) => {
       const before = await changes();
       const { page, close } = await open(browser, `http://127.0.0.1:${line}/#data=buckyball${hash}`);
@@ -235,7 +235,6 @@ describe('Controls', () => {
         const first = await pixels(page);
         const toggle = async () => {
           await page.locator(`label:has(#${id})`).click();
-          await page.waitForTimeout(300);
           await settled(page);
         };
         await toggle();
@@ -253,7 +252,6 @@ describe('Controls', () => {
     withPage(`${kCamera}&clip=1,0,0,0.25`, {}, async (page) => {
       const colorBy = async (name) => {
         await page.selectOption('#color-by', name);
-        await page.waitForTimeout(300);
         await settled(page);
         return pixels(page);
       };
@@ -280,12 +278,10 @@ describe('Controls', () => {
       for (const key of ['ArrowLeft', 'ArrowUp', '+', '-', 'Shift+ArrowLeft']) {
         const before = await pose();
         await page.keyboard.press(key);
-        await page.waitForTimeout(200);
-        assert.notEqual(await pose(), before, key);
+        await eventually(async () => assert.notEqual(await pose(), before, key));
       }
       await page.keyboard.press('r');
-      await page.waitForTimeout(200);
-      assert.notEqual(await pose(), first);
+      await eventually(async () => assert.notEqual(await pose(), first));
       await page.keyboard.press('h');
       await eventually(async () => assert.ok(await page.isVisible('#help-dialog')));
       await page.keyboard.press('Escape');
@@ -300,14 +296,15 @@ describe('Controls', () => {
       await page.mouse.down();
       await page.mouse.move(x + 120, y + 40, { steps: 6 });
       await page.mouse.up();
-      assert.notEqual(await page.evaluate(() => window.intervale.state.pose), null);
+      await eventually(async () => assert.notEqual(await page.evaluate(() => window.intervale.state.pose), null));
       for (let k = 0; k < 6; ++k) {
         await page.mouse.wheel(0, -240);
         await page.waitForTimeout(60);
       }
-      await page.waitForTimeout(400);
-      await settled(page);
-      assert.ok((await progressOf(page)).updates > before.updates);
+      await eventually(async () => {
+        await settled(page);
+        assert.ok((await progressOf(page)).updates > before.updates);
+      });
     }));
 
   test('the screen-space error and the budget of tetrahedra limit the mesh', () =>
