@@ -13,7 +13,10 @@ namespace {
 
 // How far updates of each class move the surface at most, in half widths of a diamond of class 0: diamonds of the other
 // classes are smaller, and nearer to the values that they lie between.
-constexpr std::array kReach{1.0, 0.57, 0.33};
+constexpr std::array kReach{0.8, 0.5, 0.3};
+// Likewise, of any class, where both ends of the spine are on the same side of the surface, and the centre on the other:
+// the surface reaches the centre, however small the change of the value is.
+constexpr double kAcrossReach = 1;
 // Likewise, where none of the diamond's vertices is on the other side of the surface: it makes a piece of its own.
 constexpr double kPieceReach = 2;
 // So many surface points, each a square of the least spacing, come nearer by an update of class 0 and scale 0.
@@ -22,14 +25,14 @@ constexpr double kPoints = 20;
 // What updates of one scale and class can do at most, in world units and in squares of the least spacing. width: of a
 // diamond with h = 1.
 struct Most {
-  double width = 0, piece = 0, distance = 0, removed = 0;
+  double width = 0, piece = 0, across = 0, distance = 0, removed = 0;
 };
 
 // What is removed goes with the area of the diamond's surface and the square of its width: with its volume to the 4/3.
 Most most_of(const Grid& grid, int scale, std::size_t cls) {
   const Vec3 spacing = grid.affine.spacing();
   const double width = diamond_width(grid), unit = std::min({spacing[0], spacing[1], spacing[2]}), reach = width / 2 * std::exp2(scale);
-  return {width, kPieceReach * reach, kReach[cls] * reach,
+  return {width, kPieceReach * reach, kAcrossReach * reach, kReach[cls] * reach,
           kPoints * width * width / (unit * unit) * std::pow(std::exp2(3.0 * scale - double(cls)), 4.0 / 3)};
 }
 
@@ -52,8 +55,11 @@ void add_estimates(const IntervalVolume& volume, const SplitLattice& lattice, co
     double distance = most.piece, part = 1;
     if (counts(span.least, span.greatest)) {
       const double difference = format.value(span.greatest) - format.value(span.least);
-      const double own = format.value(volume.key(i)) - (format.value(around[0]) / 2 + format.value(around[1]) / 2);
-      distance = most.distance * std::min(error / difference, 1.0);
+      const ValueKey centre = volume.key(i);
+      const double own = format.value(centre) - (format.value(around[0]) / 2 + format.value(around[1]) / 2);
+      const auto [low, high] = std::minmax(around[0], around[1]);
+      const bool across = !counts(low, high) && counts(std::min(low, centre), std::max(high, centre));
+      distance = across ? most.across : most.distance * std::min(error / difference, 1.0);
       part = std::min(std::abs(own) / difference, 1.0);
     }
     estimates.distances[slot] = distance_at_least(distance, most.width);

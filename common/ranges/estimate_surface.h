@@ -3,6 +3,7 @@
 //
 // By a change of the value over the steepness of the values around: an update moves the surface that goes through its
 // diamond by the part of the diamond's width that its error is of the difference of the values at the diamond's vertices.
+// Where only the centre is on the other side of the surface than the ends of the spine, it moves by half of the width.
 #pragma once
 
 #include <cstdint>

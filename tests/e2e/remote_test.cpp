@@ -3,13 +3,16 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "tests/support/complaints.h"
 #include "tests/support/file_server.h"
 #include "tests/support/programs.h"
+#include "tests/support/seeds.h"
 #include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
 
@@ -96,7 +99,8 @@ TEST(Remote, FetchReadsCoarseScalesFirstAndNoFinerOnesThanItNeeds) {
   ASSERT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "129", "-o", volume}).status, 0);
   ASSERT_EQ(run({program("intervale"), "build", volume, "-o", file}).status, 0);
   const ServerProgram local(file);
-  for (const Arguments& view : {Arguments{}, {"--error-percent", "10"}, {"--error", "0.3"}, {"--max-tets", "20000"}, views()[2]}) {
+  const std::array<Arguments, 5> all{{{"--error-percent", "10"}, {}, {"--error", "0.3"}, {"--max-tets", "20000"}, views()[2]}};
+  for (const Arguments& view : std::span(all).first(testing::cases(all.size()))) {
     const FileServer web(contents_of(file));
     const Arguments more = Arguments{"--range", "-0.3", "0.4", "--digest", "--json"} + view;
     const auto served = json_of(run(Arguments{program("intervale-client"), "fetch", local.url("gyroid")} + more));

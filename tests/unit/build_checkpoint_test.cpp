@@ -22,6 +22,7 @@
 #include "server/builder/value_builder.h"
 #include "server/builder/value_steps.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/seeds.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {
@@ -171,8 +172,8 @@ TEST_F(CheckpointTest, EveryTruncationLeavesWhatIsWhole) {
 TEST_F(CheckpointTest, FlippedBytesAreDroppedOrRefused) {
   keep_all();
   const std::string whole = contents_of(path);
-  const std::size_t step = whole.size() / 300 + 1;
-  for (std::size_t at = 0; at < whole.size(); at += at < 200 ? 1 : step) {
+  const std::size_t step = whole.size() / testing::cases(300) + 1;
+  for (std::size_t at = 0; at < whole.size(); at += at < testing::cases(200) ? 1 : step) {
     std::string damaged = whole;
     damaged[at] = char(damaged[at] ^ (1 << at % 8));
     folder.file("out.ivm.resume", damaged);

@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <random>
+#include <span>
+#include <tuple>
 #include <utility>
 
 #include "client/core/client_session.h"
@@ -55,14 +58,16 @@ SharedVolume coarse(const Bytes& file, const CoarseScales& scales) {
 
 SharedVolume whole(const Bytes& file) { return std::make_shared<const IntervalVolume>(decode_volume(file, "made", on_all_cores).value()); }
 
-// Of several pages, in two scales that can be had before the rest; and of one that is a page by itself.
+// Of several pages, in one scale or two that can be had before the rest.
+constexpr std::array<std::pair<Dims, unsigned>, 3> kFiles{{{{300, 60, 20}, 4}, {{70, 67, 66}, 0}, {{134, 130, 129}, 1}}};
 const Bytes& large() {
-  static const Bytes file = file_of({134, 130, 129}, 1);
+  static const Bytes file = std::apply(file_of, kFiles.back());
   return file;
 }
 
 TEST(CoarseScales, AreTheSameUpdatesAsThoseOfTheWholeFile) {
-  for (const Bytes& file : {large(), file_of({70, 67, 66}, 0), file_of({300, 60, 20}, 4)}) {
+  for (const auto& made : std::span(kFiles).first(testing::cases(kFiles.size()))) {
+    const Bytes file = std::apply(file_of, made);
     const SharedVolume all = whole(file);
     EXPECT_TRUE(all->is_whole());
     std::size_t before = 0;
@@ -123,7 +128,8 @@ TEST(CoarseScales, ErrorsOfTheLastLevelOfAScaleBoundThoseOfFinerOnes) {
 }
 
 TEST(CoarseScales, WantFinerOnesWhereTheirErrorsAreAboveTheThreshold) {
-  for (const Bytes& file : {large(), file_of({70, 67, 66}, 0), file_of({300, 60, 20}, 4)}) {
+  for (const auto& made : std::span(kFiles).first(testing::cases(kFiles.size()))) {
+    const Bytes file = std::apply(file_of, made);
     const SharedVolume all = whole(file);
     EXPECT_FALSE(wants_finer(*all, {}));
     for (const CoarseScales& scales : scales_of(file)) {
@@ -148,7 +154,7 @@ TEST(CoarseScales, WantFinerOnesWhereTheirErrorsAreAboveTheThreshold) {
 TEST(CoarseScales, EndAFetchOnceNothingFinerIsWanted) {
   std::mt19937 random(3);
   std::size_t ended = 0;
-  for (const unsigned seed : {0U, 1U, 2U, 4U}) {
+  for (unsigned seed = 0; seed < testing::cases(4); ++seed) {
     const Dims dims{70, 67, 66};
     const testing::ValueField field = testing::random_value_field(dims, seed);
     const Bytes file = file_of(dims, seed);
@@ -179,7 +185,7 @@ TEST(CoarseScales, EndAFetchOnceNothingFinerIsWanted) {
       EXPECT_EQ(growing->client.updates_in_mesh(), at_once->client.updates_in_mesh());
     }
   }
-  EXPECT_GT(ended, 8U);
+  EXPECT_GT(ended, 2 * testing::cases(4));
 }
 
 TEST(CoarseScales, AreFewOfTheBytes) {
@@ -278,7 +284,8 @@ TEST(CoarseScales, ASessionThatBeginsWithThemEndsWithTheMeshOfTheWholeFile) {
   for (const CoarseScales& scales : scales_of(file)) growing.push_back(coarse(file, scales));
   ASSERT_EQ(growing.size(), 1U);
   growing.push_back(all);
-  for (const bool uses_camera : {true, false}) {
+  constexpr std::array kUsesCamera{true, false};
+  for (const bool uses_camera : std::span(kUsesCamera).first(testing::cases(kUsesCamera.size()))) {
     ViewRequest view = view_of({1.25, kInf}, 1);
     if (!uses_camera) view.lod = {.error_percent = 2};
     GrowingSession at_once(all);

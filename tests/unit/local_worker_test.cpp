@@ -12,6 +12,7 @@
 #include "protocol/codec.h"
 #include "protocol/session/session_state.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/seeds.h"
 #include "tests/support/session_server.h"
 
 namespace intervale {
@@ -65,7 +66,7 @@ TEST(LocalWorker, EndsWithTheMeshThatAServerSends) {
   here.connected({});
   ClientSession there({.dataset = "made", .client = "test"});
   testing::SessionServer<ClientSession> server(volume, there);
-  for (int i = 0; i < 12; ++i) {
+  for (unsigned i = 0; i < testing::cases(12); ++i) {
     const double a = value(), b = value();
     const auto most = random() % 3 == 0 ? std::optional<std::uint64_t>(200 + random() % 3000) : std::nullopt;
     const ViewRequest view = through_camera({std::min(a, b), std::max(a, b)}, most, false);

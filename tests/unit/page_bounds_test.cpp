@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <memory>
 #include <optional>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "common/ivm/ivm_container.h"
@@ -21,6 +23,7 @@
 #include "common/ranges/extract_meshes.h"
 #include "server/builder/value_builder.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/seeds.h"
 #include "tests/support/value_fields.h"
 
 namespace intervale::page_boundss {
@@ -82,8 +85,8 @@ std::vector<KeySpan> spans_of(const ValueVolume& volume) {
 
 TEST(PageBounds, HoldWhatLiesAroundAllDescendants) {
   std::vector<ValueVolume> volumes;
-  volumes.push_back(ramp({200, 70, 66}, 0));
-  volumes.push_back(ramp({130, 65, 129}, 2));
+  volumes.push_back(ramp({140, 70, 66}, 0));
+  volumes.push_back(ramp({130, 65, 66}, 2));
   volumes.push_back(random_values({65, 64, 63}, 3));
   volumes.push_back(random_values({3, 150, 40}, 4));
   volumes.push_back(random_values({2, 2, 2}, 5));
@@ -163,7 +166,8 @@ TEST(PageBounds, WhatSomeRangesNeedGivesTheirMeshes) {
     std::vector<std::vector<ExtractedMesh>> wanted;
     for (const Lod& lod : {Lod(), coarse, seen, few}) wanted.push_back(extract_meshes(file().whole, shown, lod, {}, on_all_cores).value());
     const std::vector<Lod> all{Lod(), coarse, seen, few}, one_of_them{Lod()};
-    for (const std::size_t there : {std::size_t(file().pages.offset), std::size_t(file().pages.offset) + 1000, std::size_t(64) << 10}) {
+    const std::array starts{std::size_t(file().pages.offset), std::size_t(file().pages.offset) + 1000, std::size_t(64) << 10};
+    for (const std::size_t there : std::span(starts).first(testing::cases(starts.size()))) {
       const auto needed = needed_pages(ends_of(file().bytes, there), shown);
       ASSERT_TRUE(needed && *needed);
       const Bytes read = read_of(**needed, there);
@@ -188,7 +192,7 @@ TEST(PageBounds, WhatSomeRangesNeedGivesTheirMeshes) {
 
 // Blocks that meet at faces, edges and corners.
 TEST(PageBounds, WhatIsNeededIsAsInTheWholeWhereverSurfacesPass) {
-  constexpr Dims kDims{134, 130, 129};
+  constexpr Dims kDims{134, 130, 70};
   std::mt19937 random(7);
   std::vector<float> samples;
   for (std::int32_t z = 0; z < kDims[2]; ++z) {
@@ -254,7 +258,7 @@ TEST(PageBounds, DamageIsFound) {
     return decode_needed_volume({first, std::span(file().bytes).subspan(file().pages.offset + file().pages.bytes), file().bytes.size()}, "made",
                                 pages);
   };
-  for (std::size_t at = 8; at < read.size(); at += at < there ? 37 : read.size() / 40) {
+  for (std::size_t at = 8; at < read.size(); at += at < there ? 37 : read.size() / testing::cases(40)) {
     Bytes damaged = read;
     damaged[at] ^= std::byte(1);
     EXPECT_FALSE(made(damaged, (*needed)->pages)) << at;

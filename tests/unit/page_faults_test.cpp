@@ -110,7 +110,7 @@ void expect_what_is_left(const std::vector<std::byte>& file, std::size_t page, i
 }
 
 TEST(PageFaults, OfEveryRangeTheRestHasTheRightMeshes) {
-  const std::vector<std::byte> file = file_of_every_range({81, 97, 70});
+  const std::vector<std::byte> file = file_of_every_range({81, 97, 40});
   const std::size_t pages = testing::page_count(file);
   ASSERT_GT(pages, 2u);
   expect_what_is_left(file, pages - 1, 0, {{90, 120}, Refine::boundary});
