@@ -16,6 +16,7 @@
 #include "common/selection/stream_plan.h"
 #include "server/builder/field_hierarchy.h"
 #include "tests/support/interval_volumes.h"
+#include "tests/support/seeds.h"
 #include "tests/support/special_values.h"
 
 namespace intervale {
@@ -264,7 +265,7 @@ TEST_P(BoundarySurfaceOf, CutsDrawTheSidesOfTheirPolygons) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, BoundarySurfaceOf, ::testing::Range(0u, 8u));
+INSTANTIATE_TEST_SUITE_P(Random, BoundarySurfaceOf, testing::seeds(0, 8));
 
 // Where nothing hides in diamonds that look empty, the bound holds at every level of detail.
 TEST(BoundarySurface, TheFullVolumeIsWithinTheBound) {

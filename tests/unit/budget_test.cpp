@@ -15,6 +15,7 @@
 #include "tests/support/cameras.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
+#include "tests/support/seeds.h"
 
 namespace intervale {
 namespace {
@@ -198,7 +199,7 @@ TEST_P(Budgets, WhatMattersDoesNotDependOnWhereOneWas) {
   EXPECT_GE(shown_weight(), 0.9 * first);
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, Budgets, ::testing::Range(0u, 8u));
+INSTANTIATE_TEST_SUITE_P(Random, Budgets, testing::seeds(0, 8));
 
 }  // namespace
 }  // namespace intervale

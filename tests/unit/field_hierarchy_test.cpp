@@ -12,12 +12,14 @@
 #include <numeric>
 #include <random>
 #include <set>
+#include <span>
 
 #include "common/ivm/ivm_file.h"
 #include "common/ivm/verify.h"
 #include "server/builder/error_steps.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/bisection.h"
+#include "tests/support/seeds.h"
 #include "tests/support/special_values.h"
 
 namespace intervale {
@@ -249,8 +251,8 @@ TEST_P(Extremes, AreBuiltInSecondsAndAreValid) {
   EXPECT_TRUE(valid) << valid.error().message;
 }
 
-INSTANTIATE_TEST_SUITE_P(Dims, Extremes,
-                         ::testing::Values(std::array{2, 2, 2}, std::array{2, 2, kMaxSide}, std::array{kMaxSide, 2, 3}, std::array{3, 5, 70000}));
+constexpr std::array<std::array<std::int32_t, 3>, 4> kExtremes{{{3, 5, 70000}, {2, 2, 2}, {kMaxSide, 2, 3}, {2, 2, kMaxSide}}};
+INSTANTIATE_TEST_SUITE_P(Dims, Extremes, ::testing::ValuesIn(std::span(kExtremes).first(testing::cases(kExtremes.size()))));
 
 TEST(FieldHierarchy, ALinearFieldHasNoErrorAndAllItsUpdates) {
   for (const int n : {3, 5, 9, 17}) {

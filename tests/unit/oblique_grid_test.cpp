@@ -19,6 +19,7 @@
 #include "tests/support/interval_volumes.h"
 #include "tests/support/mesh_laws.h"
 #include "tests/support/parts.h"
+#include "tests/support/seeds.h"
 
 namespace intervale {
 namespace {
@@ -214,7 +215,7 @@ TEST_P(ObliqueGrid, TheBoundarySurfaceEnclosesTheMeshAndItsNormalsPointOutward) 
   EXPECT_NEAR(enclosed, volume_of(mesh), 1e-3 * (1 + volume_of(mesh)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, ObliqueGrid, ::testing::Range(0u, 20u));
+INSTANTIATE_TEST_SUITE_P(Random, ObliqueGrid, testing::seeds(0, 20));
 
 }  // namespace
 }  // namespace intervale

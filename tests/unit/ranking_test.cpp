@@ -16,6 +16,7 @@
 #include "tests/support/needs.h"
 #include "tests/support/parents.h"
 #include "tests/support/ranks.h"
+#include "tests/support/seeds.h"
 
 namespace intervale {
 namespace {
@@ -373,7 +374,7 @@ TEST_P(Ranks, InOrderParentsComeFirstAndRanksDoNotAscend) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Random, Ranks, ::testing::Range(0u, 10u));
+INSTANTIATE_TEST_SUITE_P(Random, Ranks, testing::seeds(0, 10));
 
 }  // namespace
 }  // namespace intervale

@@ -168,7 +168,7 @@ export async function settled(page) {
 export async function drawn(page) {
   await digestOf(page); // requests are answered in order
   await page.evaluate(async () => {
-    for (let k = 0; k < 3; ++k) await new Promise((resolve) => requestAnimationFrame(resolve));
+    for (let k = 0; k < 3 || !window.intervale.isIdle; ++k) await new Promise((resolve) => requestAnimationFrame(resolve));
   });
 }
 

@@ -18,6 +18,7 @@ export const automation = (view: Store<ViewState>, status: Store<Status>, viewer
   get live() { return status.value; }, // connection, data sets, errors
   get progress() { return status.value.progress; },
   stats: viewer.stats, // longestBlock may be set to 0, which restarts its measurement
+  get isIdle() { return viewer.isIdle; }, // all that has arrived is drawn
   canvas: viewer.picture.canvas,
   set: (change: Partial<ViewState>) => view.set(exclusive(change)), // as the controls do
   send: (request: Request) => mesh.send(request), // to the worker

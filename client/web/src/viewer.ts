@@ -196,6 +196,11 @@ export class Viewer {
     if (at) this.schedule();
   }
 
+  // Whether all that has arrived is drawn; the graphics card may still be drawing it.
+  get isIdle(): boolean {
+    return !this.isScheduled;
+  }
+
   private schedule(): void {
     if (this.isScheduled) return;
     this.isScheduled = true;

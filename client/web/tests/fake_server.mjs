@@ -100,9 +100,19 @@ export function sharedPages() {
 export const refined = (page) =>
   page.waitForFunction(() => window.intervale?.progress?.done && window.intervale.stats.frames > 0, null, { timeout: 60_000 });
 
-// Until the effects of an action are drawn.
+// Until the effects of an action are drawn. Requests leave with the next frame, or when a handle has rested; the worker
+// answers them in order, and a picture may take long.
 export const settled = (page) =>
-  page.evaluate(() => new Promise((resolve) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(resolve)), 200)));
+  page.evaluate(async () => {
+    const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+    await new Promise((resolve) => setTimeout(resolve, 200));
+    for (let k = 0; k < 2; ++k) await frame();
+    const answer = window.intervale.next('digest');
+    window.intervale.send({ type: 'digest' });
+    await answer;
+    do await frame();
+    while (!window.intervale.isIdle);
+  });
 
 export const state = (page) => page.evaluate(() => window.intervale.state);
 

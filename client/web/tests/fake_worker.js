@@ -351,6 +351,8 @@ self.onmessage = ({ data }) => {
     if (isOther && meshes.length > 0) postSurface(false);
   } else if (data.type === 'probe') { // the channel's values are late
     post({ type: 'probed', at: data.at, values: [field(...toSamples(data.at)), ++probes < 3 ? NaN : 2.5] });
+  } else if (data.type === 'digest') {
+    post({ type: 'digest', digest: '', updates: 0, tets: sum((mesh) => mesh.tets.length) });
   } else if (data.type === 'save') {
     post({ type: 'saved', format: data.format, name: `${name}.${data.format}`, bytes: new ArrayBuffer(16) });
   }
