@@ -1,5 +1,6 @@
 #include "client/api/live_mesh.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <mutex>
 #include <random>
@@ -166,12 +167,12 @@ class LiveMesh::Worker {
       if (auto looked = take_request(); !looked) return looked;
       if (auto sent = connection.send(session_); !sent) return sent;
       const bool is_late = make_state();
-      const auto event = connection.receive(session_, is_late ? due_ : Clock::time_point::max());
+      const auto event = connection.receive(session_, is_late ? next_state() : Clock::time_point::max());
       if (!event) return tl::unexpected(event.error());
       if (event->kind == ClientSession::Event::Kind::opened) {
         if (auto opened = take_description(); !opened) return opened;
       }
-      if (event->kind == ClientSession::Event::Kind::batch || event->kind == ClientSession::Event::Kind::done) is_changed_ = true;
+      if (event->kind == ClientSession::Event::Kind::batch || event->kind == ClientSession::Event::Kind::done) set_changed();
     }
     return {};
   }
@@ -192,20 +193,28 @@ class LiveMesh::Worker {
       if (!std::exchange(is_looking_, false)) return {};
       request = request_;
     }
-    is_changed_ = session_.mesh() != nullptr;
+    set_changed();
     ViewRequest view = view_of(request, options_);
     if (view.camera) view.ahead = motion_.next(*view.camera, Clock::now());
     return session_.look(std::move(view));
   }
 
-  // Makes the mesh if it changed, somebody asks, and there is time. True: only time is missing, until due_.
+  void set_changed() {
+    is_changed_ = true;
+    changed_at_ = Clock::now();
+  }
+
+  // When there is time for a mesh: most of it is for what arrives, but if nothing does, a mesh delays nothing.
+  [[nodiscard]] Clock::time_point next_state() const { return std::min(made_at_ + 9 * cost_, changed_at_ + cost_); }
+
+  // Makes the mesh if it changed, somebody asks, and there is time. True: only time is missing, until next_state().
   bool make_state() {
     const bool is_done = session_.state() == ClientSession::State::idle;
     if (!session_.mesh() || !is_changed_) return false;
     {
       const std::lock_guard lock(mutex_);
       if (waiting_ == 0 && !is_polled_) return false;
-      if (!is_done && Clock::now() < due_) return true;
+      if (!is_done && Clock::now() < next_state()) return true;
       is_polled_ = false;
     }
     const auto begin = Clock::now();
@@ -216,7 +225,8 @@ class LiveMesh::Worker {
                     .remaining_pixels = stats.remaining_pixels,
                     .updates = session_.mesh()->updates(),
                     .bytes = stats.bytes};
-    due_ = Clock::now() + 9 * (Clock::now() - begin);
+    made_at_ = Clock::now();
+    cost_ = made_at_ - begin;
     is_changed_ = false;
     const std::lock_guard lock(mutex_);
     if (!is_looking_) state_ = std::move(state);
@@ -235,8 +245,10 @@ class LiveMesh::Worker {
   ClientSession session_;
   CameraMotion motion_;
   bool was_lost_ = false;
-  bool is_changed_ = false;  // the mesh, since the last state
-  Clock::time_point due_{};  // of the next state
+  bool is_changed_ = false;         // the mesh, since the last state
+  Clock::time_point changed_at_{};  // when it changed last
+  Clock::time_point made_at_{};     // the last state
+  Clock::duration cost_{};          // how long that took
 
   std::mutex mutex_;
   std::condition_variable changed_;

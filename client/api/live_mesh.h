@@ -50,8 +50,9 @@ class INTERVALE_EXPORT LiveMesh {
   [[nodiscard]] Result<void> look(const MeshRequest& request);
 
   // The mesh as it is now, if it changed since the last call; does not wait. Making it takes time linear in its size, on
-  // the other thread, at most a tenth of that thread's time until the view is done: so it may lag behind. Fails once the
-  // stream has ended with an error, and every time then.
+  // the other thread; while updates arrive, at most a tenth of that thread's time: so it may lag behind. Once none has
+  // arrived for as long as the last one took, it is made. Fails once the stream has ended with an error, and every time
+  // then.
   [[nodiscard]] Result<std::optional<MeshState>> poll();
   // The same, but waits for a change, up to that long.
   [[nodiscard]] Result<std::optional<MeshState>> wait(std::chrono::milliseconds time);
