@@ -103,7 +103,7 @@ class Page {
 };
 
 class BoundarySurfaceOf : public ::testing::TestWithParam<unsigned> {
- protected:
+ public:
   std::shared_ptr<const IntervalVolume> volume = surfaces_volume(GetParam());
   const Grid& grid = volume->description().grid;
   std::mt19937 random{GetParam()};
