@@ -193,7 +193,7 @@ class LiveMesh::Worker {
       if (!std::exchange(is_looking_, false)) return {};
       request = request_;
     }
-    set_changed();
+    if (session_.mesh()) set_changed();
     ViewRequest view = view_of(request, options_);
     if (view.camera) view.ahead = motion_.next(*view.camera, Clock::now());
     return session_.look(std::move(view));
