@@ -73,19 +73,32 @@ RelevantUpdates::RelevantUpdates(const SupercubeSet& set, Parts parts, ShownRang
   for (const auto& part : parts_) known_.far = known_.far || part->known_.far;
 }
 
-BrickNeeds RelevantUpdates::brick_of_parts(BrickIndex brick) const {
+std::optional<RelevantUpdates::SharedParts> RelevantUpdates::shared_with(const RelevantUpdates& other) const {
+  static_assert(BrickNeeds::kMostParts <= 8 * sizeof(PartMask));
+  if (!has_parts() || !other.has_parts() || has_slopes() != other.has_slopes() || has_distances() != other.has_distances()) return {};
+  SharedParts shared;
+  shared.fill(-1);
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const auto there = std::find(other.parts_.begin(), other.parts_.end(), parts_[i]);
+    if (there != other.parts_.end()) shared[i] = std::int8_t(there - other.parts_.begin());
+  }
+  return shared;
+}
+
+BrickNeeds RelevantUpdates::brick(BrickIndex brick, PartMask parts) const {
   BrickNeeds needs;
-  for (const auto& part : parts_) {
-    if (part->bounds_[brick].updates != 0) needs.add(part->own_brick(brick));
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if ((parts >> i & 1) != 0 && parts_[i]->bounds_[brick].updates != 0) needs.add(parts_[i]->own_brick(brick));
   }
   return needs;
 }
 
-RelevantUpdates::Bound RelevantUpdates::bound_of_parts(BrickIndex brick) const {
+RelevantUpdates::Bound RelevantUpdates::bound(BrickIndex brick, PartMask parts) const {
   Bound all;
   unsigned updates = 0;
-  for (const auto& part : parts_) {
-    const Bound& one = part->bounds_[brick];
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if ((parts >> i & 1) == 0) continue;
+    const Bound& one = parts_[i]->bounds_[brick];
     updates += one.updates;
     all.error_step = std::max(all.error_step, one.error_step);
     all.slope = std::max(all.slope, one.slope);

@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -65,10 +66,10 @@ class RelevantUpdates {
 
   [[nodiscard]] const ShownRanges& shown() const { return shown_; }
   // What is known without finding more: exact if all was known from the start.
-  [[nodiscard]] Bound bound(BrickIndex brick) const { return parts_.empty() ? bounds_[brick] : bound_of_parts(brick); }
+  [[nodiscard]] Bound bound(BrickIndex brick) const { return parts_.empty() ? bounds_[brick] : bound(brick, kAllParts); }
   // Found now if need be: some 50 microseconds for each part. Throws what prevents it, for example that memory is
   // exhausted. As long as this exists.
-  [[nodiscard]] BrickNeeds brick(BrickIndex brick) const { return parts_.empty() ? BrickNeeds(own_brick(brick)) : brick_of_parts(brick); }
+  [[nodiscard]] BrickNeeds brick(BrickIndex index) const { return parts_.empty() ? BrickNeeds(own_brick(index)) : brick(index, kAllParts); }
   [[nodiscard]] bool is_found(BrickIndex brick) const;
 
   // How far the surfaces can still move, in world units, while an update's diamond is refined completely. An estimate:
@@ -94,6 +95,16 @@ class RelevantUpdates {
   [[nodiscard]] bool may_be_far() const { return known_.far; }
   // It has parts, and keeps nothing itself. To make it takes next to no time.
   [[nodiscard]] bool has_parts() const { return !parts_.empty(); }
+  // Some of at most BrickNeeds::kMostParts parts, a bit each.
+  using PartMask = std::uint8_t;
+  // Those of its parts that another one has, and where: for each of them its number there, or -1. nullopt: one has no parts,
+  // or what is known of their updates is not alike. Both of one volume.
+  using SharedParts = std::array<std::int8_t, BrickNeeds::kMostParts>;
+  [[nodiscard]] std::optional<SharedParts> shared_with(const RelevantUpdates& other) const;
+  // bound() and brick() of some parts.
+  [[nodiscard]] Bound bound(BrickIndex brick, PartMask parts) const;
+  [[nodiscard]] BrickNeeds brick(BrickIndex brick, PartMask parts) const;
+  static constexpr PartMask kAllParts = 0xff;
   [[nodiscard]] std::size_t memory_bytes() const;  // by now, besides its parts
   // Called when memory_bytes() have grown, on the thread that found something. To be set before others have this, which
   // has no parts.
@@ -123,8 +134,6 @@ class RelevantUpdates {
     const BrickPart* const found = found_->bricks.find(brick);
     return found != nullptr ? *found : found_->find_now(brick);
   }
-  [[nodiscard]] BrickNeeds brick_of_parts(BrickIndex brick) const;
-  [[nodiscard]] Bound bound_of_parts(BrickIndex brick) const;
 
   ShownRanges shown_;
   Known known_;

@@ -56,28 +56,59 @@ struct StreamPlan::BatchBuilder {
 };
 
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume)
-    : volume_(std::move(volume)), sent_(volume_->size()), channels_(volume_->channel_keys().size()) {
+    : volume_(std::move(volume)), sent_(volume_->size()), sent_in_(volume_->set().bricks().size()), channels_(volume_->channel_keys().size()) {
   set_relevant(std::shared_ptr<const RelevantUpdates>(volume_, &volume_->relevant()));
 }
 
 void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown) {
   search_.reset();
   searched_.reset();
-  relevant_ = std::move(relevant);
+  const std::shared_ptr<const RelevantUpdates> before = std::exchange(relevant_, std::move(relevant));
   shown_ = std::move(shown);
+  const RelevantUpdates::PartMask new_parts = find_new_parts(before.get());
   const SupercubeSet& set = volume_->set();
   viewed_ = PagedArray<Viewed>(set.bricks().size());
-  pending_ = SparseArray<std::uint64_t>(viewed_.size());
+  const SparseArray<std::uint64_t> kept = std::exchange(pending_, SparseArray<std::uint64_t>(viewed_.size()));
   wanted_count_ = pending_bricks_ = 0;
   for (BrickIndex b{0}; b < viewed_.size(); ++b) {
-    if (relevant_->bound(b).updates == 0) continue;
-    Pending pending = first_pending(b);
-    const unsigned all = set.updates(b), sent = sent_.count(set.bricks()[b].first, all);
-    if (sent == 0) continue;
-    pending.set_unsent(std::min<unsigned>(pending.unsent, all - sent));
+    const unsigned sent = sent_in_.get(b);
+    const auto found = time_ == 0 ? std::nullopt : kept.find(b);
+    if (sent == 0 && !found) continue;
+    const RelevantUpdates::Bound all = relevant_->bound(b);
+    Pending pending = first_pending(b, all);
+    unsigned unsent = all.updates;
+    if (found) {
+      const RelevantUpdates::Bound added = relevant_->bound(b, new_parts);
+      pending = bits_as<Pending>(*found);
+      pending.wanted = 0;
+      pending.raise_to({added.error_step, 0, added.slope, 0}, added.object_error);
+      unsent = std::min(unsent, unsigned(pending.unsent) + added.updates);
+    }
+    pending.set_unsent(std::min(unsent, set.updates(b) - sent));
     keep(b, pending);
   }
-  supercube_bounds_ = SupercubeBounds(viewed_.size());
+}
+
+// Which parts of what is relevant were not relevant before: bounds that are known of unsent updates need to be raised to
+// those of these parts only, since what is not relevant any more leaves them as they are. before: may be null. If none of
+// these bounds can be kept, all of them are dropped, and time begins again.
+RelevantUpdates::PartMask StreamPlan::find_new_parts(const RelevantUpdates* before) {
+  const auto shared = before != nullptr && time_ < UINT8_MAX ? relevant_->shared_with(*before) : std::nullopt;
+  if (!shared) {
+    time_ = 0;
+    part_since_ = {};
+    supercube_bounds_ = SupercubeBounds(volume_->set().bricks().size());
+    return RelevantUpdates::kAllParts;
+  }
+  ++time_;
+  RelevantUpdates::PartMask added = 0;
+  const auto since = part_since_;
+  for (std::size_t i = 0; i < shared->size(); ++i) {
+    const bool is_new = (*shared)[i] < 0;
+    added |= RelevantUpdates::PartMask(unsigned(is_new) << i);
+    part_since_[i] = is_new ? time_ : since[std::size_t((*shared)[i])];
+  }
+  return added;
 }
 
 void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* ahead) {
@@ -139,6 +170,7 @@ bool StreamPlan::add_all(const SlotGroup& group, BatchBuilder& builder) {
 void StreamPlan::put(const SlotGroup& updates, BatchBuilder& builder) {
   const auto count = unsigned(std::popcount(updates.slots));
   builder.put(updates, count);
+  count_sent(updates.brick, int(count));
   sent_count_ += count;
   if (!relevant_->is_found(updates.brick)) return;  // bounds stay as they are: these are ancestors
   Pending w = pending(updates.brick);
@@ -177,10 +209,14 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     if (full) return;
     in.number = count++;
+    const std::uint64_t occupancy = set.occupancy()[s], relevant = in.needs.slots(in.number, occupancy);
+    if (relevant == 0) {
+      bounds.drop(in.number);
+      return;
+    }
     const Highest all = bounds.highest[in.number];
     const float farthest = this->object_error(in, all);
     const Rank bound = std::max(ranking.bound({all.error_step, farthest, all.slope}), least);
-    const std::uint64_t occupancy = set.occupancy()[s], relevant = in.needs.slots(in.number, occupancy);
     if (bound < band_ && ranking_->has_camera()) {  // most of them: what was sent is not even looked up
       rest.raise({bound, bound == 0 ? 0 : unsigned(std::popcount(relevant)), all});
       object_error = std::max(object_error, farthest);

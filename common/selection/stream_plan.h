@@ -6,7 +6,9 @@
 // sent region by region, each after its missing ancestors: neighbours share names and code tables, which makes the
 // batch smaller. Bounds of the unsent updates are kept for each brick and supercube that something was sent of (those
 // of others are of all that is relevant), and a brick is visited only if its bound is in the band: a new view costs
-// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h).
+// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h). Bounds
+// outlive ranges, too: where one end of a range moves, they are raised to those of its new surface, and only bricks that
+// this one crosses are looked at again.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +54,7 @@ inline constexpr std::size_t kFirstPayloadOfRange = 128 << 10;
 }
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: a byte for each four
-// bricks; four bytes for each of 64 bricks of which one has something that is wanted and not sent; eight for each brick
+// bricks; four bytes for each of 64 bricks of which one has something that is wanted and not sent; ten for each brick
 // that something was sent of; for each 32 updates of which one was sent four bytes and a little more (eight with
 // max_updates, four more for each channel); for each supercube whose unsent updates matter less than all of it two
 // bytes, or three if distances are known.
@@ -97,8 +99,7 @@ class StreamPlan {
   void set_room(std::uint64_t updates) { room_ = updates; }
 
   // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice.
-  // relevant: of this volume. Before the set_lod() of the same view. O(bricks), and a few nanoseconds for 64 updates
-  // where something was sent.
+  // relevant: of this volume. Before the set_lod() of the same view. O(bricks).
   void set_relevant(const std::shared_ptr<const RelevantUpdates>& relevant) { set_relevant(relevant, relevant->shown()); }
   // The same for a client that shows other ranges: batches are coded for those.
   void set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown);
@@ -193,8 +194,12 @@ class StreamPlan {
     const auto found = pending_.find(brick);
     return found ? bits_as<Pending>(*found) : first_pending(brick);
   }
-  [[nodiscard]] Pending first_pending(BrickIndex brick) const;
+  [[nodiscard]] Pending first_pending(BrickIndex brick) const { return first_pending(brick, relevant_->bound(brick)); }
+  [[nodiscard]] Pending first_pending(BrickIndex brick, const RelevantUpdates::Bound& bound) const;
   void keep(BrickIndex brick, const Pending& pending);
+  void count_sent(BrickIndex brick, int more) {
+    sent_in_.update(brick, [more](std::uint16_t had) { return std::uint16_t(had + more); });
+  }
   [[nodiscard]] Ranking::Left left(const Pending& pending) const {
     return {pending.error_step, float(pending.object_error), pending.slope, relevant_->distance(pending.limit), pending.slope_below};
   }
@@ -224,10 +229,13 @@ class StreamPlan {
   }
   // Bounds of all supercubes of a brick. Those that are not kept are those of their relevant updates.
   struct Bounds : SupercubeBounds::OfBrick {
-    bool has_changed = false;                         // since it was read
-    void set(std::size_t number, const Highest& to);  // number: of the supercube in the brick
+    bool has_changed = false;  // since it was read
+    // number: of the supercube in the brick.
+    void set(std::size_t number, const Highest& to);
+    void drop(std::size_t number);  // nothing is relevant there any more
   };
   [[nodiscard]] Bounds bounds_of(BrickIndex brick, const BrickNeeds& needs) const;
+  RelevantUpdates::PartMask find_new_parts(const RelevantUpdates* before);
   void keep(BrickIndex brick, const Bounds& bounds);
   void move_limit(const Ranking::Brick& ranking, Pending& pending, Bounds& bounds) const;
   void rank_bricks();
@@ -261,12 +269,15 @@ class StreamPlan {
   std::shared_ptr<const RelevantUpdates> relevant_;  // not null
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
-  PagedArray<Viewed> viewed_;                 // by brick; those whose rank is 0 may be as at first
-  SparseArray<std::uint64_t> pending_;        // by brick, the bits of Pending
-  SupercubeBounds supercube_bounds_;          // of unsent updates, where they are not those of the relevant ones
-  std::vector<SentChannel> channels_;         // of the data set
-  std::vector<std::size_t> wanted_channels_;  // ascending
-  std::uint32_t next_lacking_ = 0;            // bricks before this one lack no value that is wanted
+  SparseArray<std::uint16_t> sent_in_;                             // how many of each brick, which has at most 64 * kSlots
+  PagedArray<Viewed> viewed_;                                      // by brick; those whose rank is 0 may be as at first
+  SparseArray<std::uint64_t> pending_;                             // by brick, the bits of Pending
+  SupercubeBounds supercube_bounds_;                               // of unsent updates, where they are not those of the relevant ones
+  std::uint8_t time_ = 0;                                          // how often relevant_ was replaced since supercube_bounds_ were last dropped
+  std::array<std::uint8_t, BrickNeeds::kMostParts> part_since_{};  // by part of relevant_: the time at which it came
+  std::vector<SentChannel> channels_;                              // of the data set
+  std::vector<std::size_t> wanted_channels_;                       // ascending
+  std::uint32_t next_lacking_ = 0;                                 // bricks before this one lack no value that is wanted
   std::optional<Ranking> ranking_;
   std::shared_ptr<BudgetSearch> search_;  // with max_updates, until its result is taken
   std::optional<SplitSet> budget_;        // then: the updates within the budget

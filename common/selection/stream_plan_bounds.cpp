@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
 #include "common/selection/stream_plan.h"
 
@@ -33,11 +34,21 @@ StreamPlan::Bounds StreamPlan::bounds_of(BrickIndex brick, const BrickNeeds& nee
     bounds.highest[n] = {all.error_step, all.distance, all.slope, 0};
   }
   supercube_bounds_.read(brick, count, bounds);
+  const std::uint8_t then = std::exchange(bounds.time, time_);
+  if (bounds.kept == 0 || then == time_) return bounds;
+  RelevantUpdates::PartMask added = 0;
+  for (std::size_t i = 0; i < part_since_.size(); ++i) added |= RelevantUpdates::PartMask(unsigned(part_since_[i] > then) << i);
+  const BrickNeeds needs_of_added = relevant_->brick(brick, added);
+  for (const std::size_t n : set_bits<std::size_t>(bounds.kept)) {
+    const BrickNeeds::Highest more = needs_of_added.highest(n);
+    bounds.highest[n].raise({more.error_step, more.distance, more.slope, 0});
+  }
   return bounds;
 }
 
 void StreamPlan::keep(BrickIndex brick, const Bounds& bounds) {
-  if (bounds.has_changed) supercube_bounds_.write(brick, std::size_t(std::popcount(volume_->set().bricks()[brick].mask)), bounds);
+  // Those that were all dropped may stay: they are never too low.
+  if (bounds.has_changed && bounds.kept != 0) supercube_bounds_.write(brick, std::size_t(std::popcount(volume_->set().bricks()[brick].mask)), bounds);
 }
 
 void StreamPlan::Bounds::set(std::size_t number, const Highest& to) {
@@ -45,6 +56,12 @@ void StreamPlan::Bounds::set(std::size_t number, const Highest& to) {
   highest[number] = to;
   kept |= std::uint64_t(1) << number;
   has_changed = true;
+}
+
+void StreamPlan::Bounds::drop(std::size_t number) {
+  const std::uint64_t others = kept & ~(std::uint64_t(1) << number);
+  has_changed = has_changed || others != kept;
+  kept = others;
 }
 
 // Sets a brick's limit again if it is not near what a view wants there. bounds: of the brick.
@@ -84,11 +101,11 @@ void StreamPlan::Pending::lower_to(const Highest& highest, float error) {
 void StreamPlan::rank_bricks() {
   Ranking::BrickBounds bounds(*ranking_);
   for (BrickIndex b{0}; b < viewed_.size(); ++b) {
-    if (relevant_->bound(b).updates == 0) continue;
     const Pending w = pending(b);
     if (w.unsent == 0) continue;
     const auto bound = bounds(b, left(w));
     const Rank rank = std::max(bound.rank, budget_ ? Rank(1) : Rank(0));
+    if (rank == 0 && viewed_[b].rank == 0) continue;
     set_pending(b, w, rank, w.unsent);
     if (rank == 0) continue;
     Viewed& viewed = viewed_.use(b);
@@ -105,8 +122,7 @@ void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
   set_pending(brick, w, std::min<Rank>(viewed_[brick].rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), w.wanted);
 }
 
-StreamPlan::Pending StreamPlan::first_pending(BrickIndex brick) const {
-  const RelevantUpdates::Bound bound = relevant_->bound(brick);
+StreamPlan::Pending StreamPlan::first_pending(BrickIndex brick, const RelevantUpdates::Bound& bound) const {
   Pending first;
   first.set_unsent(bound.updates);
   first.wanted = viewed_[brick].rank == 0 ? 0 : first.unsent;

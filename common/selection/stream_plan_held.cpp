@@ -16,6 +16,7 @@ bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   if (added == 0) return true;
   sent_.insert(first, occupancy, added);
   sent_count_ += std::uint64_t(std::popcount(added));
+  count_sent(found->brick, std::popcount(added));
   Pending pending = this->pending(found->brick);
   pending.set_unsent(pending.unsent - unsigned(std::popcount(added & relevant_slots(found->brick, found->supercube))));
   keep(found->brick, pending);
@@ -39,6 +40,7 @@ bool StreamPlan::forget(std::span<const SlotGroup> groups) {
     const UpdateIndex i = here.index(slot);
     sent_.erase(i);
     --sent_count_;
+    count_sent(here.brick, -1);
     for (SentChannel& channel : channels_) {
       if (channel.count == 0 || !channel.held.contains(i)) continue;
       channel.held.erase(i);
@@ -73,8 +75,13 @@ StreamPlan::Resting StreamPlan::rest() const {
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume, const Resting& resting)
     : volume_(std::move(volume)),
       sent_(resting.sent.updates.unpack(volume_->set())),
+      sent_in_(volume_->set().bricks().size()),
       channels_(resting.channels.size()),
       sent_count_(resting.sent.count) {
+  const SupercubeSet& set = volume_->set();
+  for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
+    if (const unsigned sent = sent_.count(set.bricks()[b].first, set.updates(b))) sent_in_.set(b, std::uint16_t(sent));
+  }
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     if (resting.channels[i].count != 0) channels_[i] = {resting.channels[i].updates.unpack(volume_->set()), resting.channels[i].count};
   }

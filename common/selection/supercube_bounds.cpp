@@ -8,10 +8,10 @@
 namespace intervale {
 namespace {
 
-constexpr std::size_t kHereBytes = 4;                                    // bytes of a bit for each brick
-constexpr std::size_t kPast = 4;                                         // bytes that a load may read past the last record
-constexpr std::size_t kAllocator = 8;                                    // what an allocator takes for a block; their sum is a multiple of 16
-constexpr std::size_t kMostBytes = 8 + 5 + SupercubeBounds::kBrick * 3;  // of a record
+constexpr std::size_t kHereBytes = 4;                                        // bytes of a bit for each brick
+constexpr std::size_t kPast = 4;                                             // bytes that a load may read past the last record
+constexpr std::size_t kAllocator = 8;                                        // what an allocator takes for a block; their sum is a multiple of 16
+constexpr std::size_t kMostBytes = 1 + 8 + 5 + SupercubeBounds::kBrick * 3;  // of a record
 
 // Bytes of a block whose parts take so many.
 std::size_t capacity(std::size_t bytes) { return (bytes + kPast + kAllocator + 15) / 16 * 16 - kAllocator; }
@@ -77,6 +77,7 @@ std::size_t mask_bytes(std::size_t count) { return (count + 7) / 8; }
 // Returns its bytes.
 std::size_t encode(std::size_t count, const SupercubeBounds::OfBrick& bounds, std::uint8_t* to) {
   const std::uint8_t* const begin = to;
+  *to++ = bounds.time;
   for (std::size_t i = 0; i < mask_bytes(count); ++i) *to++ = std::uint8_t(bounds.kept >> (8 * i));
   const Head head = head_of(bounds);
   store(to, head);
@@ -97,6 +98,7 @@ std::size_t encode(std::size_t count, const SupercubeBounds::OfBrick& bounds, st
 }
 
 void decode(std::size_t count, const std::uint8_t* from, SupercubeBounds::OfBrick& to) {
+  to.time = *from++;
   to.kept = 0;
   for (std::size_t i = 0; i < mask_bytes(count); ++i) to.kept |= std::uint64_t(*from++) << (8 * i);
   const Head head = load_head(from);

@@ -26,28 +26,30 @@ struct Highest {
   friend bool operator==(const Highest&, const Highest&) = default;
 };
 
-// Bounds of some supercubes, which are counted within their brick. Memory: for each brick that has any, about seven bytes
+// Bounds of some supercubes, which are counted within their brick. Memory: for each brick that has any, about eight bytes
 // and a bit for each of its supercubes, and for each bound as many bits as the differences within the brick take, at most
 // 24; for each 32 bricks 8 bytes, and some 20 if any of them has bounds.
 class SupercubeBounds {
  public:
   static constexpr std::size_t kBrick = 64;  // most supercubes of one
-  // Those of a brick that are kept have a bit in `kept`; the others may be anything.
+  // Those of a brick that are kept have a bit in `kept`; the others may be anything. time: when they were valid, as its
+  // owner counts.
   struct OfBrick {
     std::uint64_t kept = 0;
+    std::uint8_t time = 0;
     std::array<Highest, kBrick> highest;
   };
 
   explicit SupercubeBounds(std::size_t bricks = 0) : pages_((bricks + kPage - 1) / kPage) {}
   // Overwrites the bounds of a brick that are kept, and tells which. count: of the brick's supercubes, here and below.
   void read(BrickIndex brick, std::size_t count, OfBrick& to) const;
-  // Replaces those of a brick. Moves up to 7 kB. bounds.kept: not 0, bits below `count`, and those that were kept at least.
+  // Replaces those of a brick. Moves up to 7 kB. bounds.kept: not 0, bits below `count`.
   void write(BrickIndex brick, std::size_t count, const OfBrick& bounds);
   [[nodiscard]] std::size_t memory_bytes() const { return pages_.capacity() * sizeof pages_[0] + block_bytes_; }  // with the allocator's
 
  private:
   // Of a page of bricks: a bit for each brick, whether it has a record; two bytes for each record, where it ends, from the
-  // first one's begin; the records. A record: which supercubes, a bit each; a head; the bounds, less the least values, with
+  // first one's begin; the records. A record: its time; which supercubes, a bit each; a head; the bounds, less the least values, with
   // the bits of each after another's. nullptr: there are none.
   using Block = std::unique_ptr<std::uint8_t[]>;
   static constexpr std::size_t kPage = 32;
