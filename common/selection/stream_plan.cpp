@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::uint32_t kFindVisits = 1 << 12;  // finding what a brick needs takes as long as so many visits
 constexpr std::uint32_t kBrickVisits = 128;     // and looking at a brick's bounds, as so many
+constexpr std::uint32_t kInVain = 3;            // times as many visits as a batch may have, if they find nothing
 
 }  // namespace
 
@@ -68,11 +69,10 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   const RelevantUpdates::PartMask new_parts = find_new_parts(before.get());
   const SupercubeSet& set = volume_->set();
   viewed_ = PagedArray<Viewed>(set.bricks().size());
-  const SparseArray<std::uint64_t> kept = std::exchange(pending_, SparseArray<std::uint64_t>(viewed_.size()));
   wanted_count_ = pending_bricks_ = 0;
   for (BrickIndex b{0}; b < viewed_.size(); ++b) {
     const unsigned sent = sent_in_.get(b);
-    const auto found = time_ == 0 ? std::nullopt : kept.find(b);
+    const auto found = pending_.find(b);
     if (sent == 0 && !found) continue;
     const RelevantUpdates::Bound all = relevant_->bound(b);
     Pending pending = first_pending(b, all);
@@ -97,6 +97,7 @@ RelevantUpdates::PartMask StreamPlan::find_new_parts(const RelevantUpdates* befo
   if (!shared) {
     time_ = 0;
     part_since_ = {};
+    pending_ = SparseArray<std::uint64_t>(volume_->set().bricks().size());
     supercube_bounds_ = SupercubeBounds(volume_->set().bricks().size());
     return RelevantUpdates::kAllParts;
   }
@@ -352,7 +353,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
     band_updates_ += builder.updates - updates;
     if (is_full) break;
     --next_brick_;
-    if (builder.visited >= max_visits) break;
+    if (builder.visited >= (builder.updates == 0 ? kInVain * std::uint64_t(max_visits) : max_visits)) break;
   }
   if (builder.updates == 0) return {};
   std::vector<SlotGroup>& groups = builder.groups;

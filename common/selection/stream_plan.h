@@ -122,9 +122,9 @@ class StreamPlan {
 
   // The next batch. nullopt when everything is sent, or when the search has taken long enough for one call: done()
   // tells which. max_bytes, at least 256, bounds the payload with its channels before compression, which takes about
-  // half of it. max_visits: of supercubes and updates, after which the batch ends; 2^13 take about a third of a
-  // millisecond. Few cut what a drag of a range needs, a few updates in many places, into small batches that name the
-  // same supercubes again.
+  // half of it. max_visits: of supercubes and updates, after which the batch ends, or three times as many that find
+  // nothing to send; 2^13 take about a third of a millisecond. Few cut what a drag of a range needs, a few updates in
+  // many places, into small batches that name the same supercubes again.
   std::optional<Batch> next(std::size_t max_bytes, std::uint32_t max_visits = kMostVisits);
   // A batch that says only how much is left.
   [[nodiscard]] Batch no_updates() const;

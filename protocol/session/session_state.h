@@ -33,7 +33,7 @@ class SessionState {
   // The next message to send. nullopt: none now; call again if has_work(). A fault ends the session, as that of receive():
   // the rest of a data set that was not whole is not to be had. max_payload bounds a batch's payload. With
   // has_work() a call takes some milliseconds at most; with less than the default, a third of a millisecond and what it
-  // takes to code the batch.
+  // takes to code the batch, or a millisecond that finds nothing.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
   // Nothing that is still to come of the data set is wanted by the last view, which has neither camera nor budget
