@@ -320,10 +320,11 @@ TEST_P(RangeStream, CoarseUpdatesOfEveryRangeFollowDone) {
     return updates;
   };
   const bool is_ahead = updates_of(with) != updates_of(without);
+  const bool may_be_ahead = view.lod.camera && view.lod.camera->pixel_error < 16 && !view.lod.max_updates;
   if (is_ahead) {
     EXPECT_EQ(updates_of(with), with_coarse(std::max(percent, 40.0)));
-    EXPECT_TRUE(view.lod.camera && view.lod.camera->pixel_error < 16 && !view.lod.max_updates);
-  } else {
+    EXPECT_TRUE(may_be_ahead);
+  } else if (!may_be_ahead) {  // otherwise they may have been looked for in vain, and the batches are others
     EXPECT_EQ(with.stats().bytes, without.stats().bytes);
   }
   other.run();
