@@ -29,10 +29,11 @@ unsigned finish(StreamPlan& plan) {
 }
 
 class PlanOfRanges : public ::testing::TestWithParam<unsigned> {
- public:
+ protected:
   // Surfaces at each of kEnds, of which ranges share some.
   [[nodiscard]] std::vector<Shared> surfaces(Distances distances) const {
     std::vector<Shared> all;
+    all.reserve(kEnds.size());
     for (const double end : kEnds) all.push_back(find_relevant_updates(volume_, {{{end, volume_->description().range.beta}}}, distances));
     return all;
   }
