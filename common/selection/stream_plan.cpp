@@ -75,11 +75,10 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
     const auto found = pending_.find(b);
     if (sent == 0 && !found) continue;
     const RelevantUpdates::Bound all = relevant_->bound(b);
-    Pending pending = first_pending(b, all);
+    Pending pending = found ? bits_as<Pending>(*found) : first_pending(b, all);
     unsigned unsent = all.updates;
     if (found) {
       const RelevantUpdates::Bound added = relevant_->bound(b, new_parts);
-      pending = bits_as<Pending>(*found);
       pending.wanted = 0;
       pending.raise_to({added.error_step, 0, added.slope, 0}, added.object_error);
       unsent = std::min(unsent, unsigned(pending.unsent) + added.updates);

@@ -269,15 +269,16 @@ class StreamPlan {
   std::shared_ptr<const RelevantUpdates> relevant_;  // not null
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
-  SparseArray<std::uint16_t> sent_in_;                             // how many of each brick, which has at most 64 * kSlots
-  PagedArray<Viewed> viewed_;                                      // by brick; those whose rank is 0 may be as at first
-  SparseArray<std::uint64_t> pending_;                             // by brick, the bits of Pending
-  SupercubeBounds supercube_bounds_;                               // of unsent updates, where they are not those of the relevant ones
-  std::uint8_t time_ = 0;                                          // how often relevant_ was replaced since supercube_bounds_ were last dropped
-  std::array<std::uint8_t, BrickNeeds::kMostParts> part_since_{};  // by part of relevant_: the time at which it came
-  std::vector<SentChannel> channels_;                              // of the data set
-  std::vector<std::size_t> wanted_channels_;                       // ascending
-  std::uint32_t next_lacking_ = 0;                                 // bricks before this one lack no value that is wanted
+  SparseArray<std::uint16_t> sent_in_;  // how many of each brick, which has at most 64 * kSlots
+  PagedArray<Viewed> viewed_;           // by brick; those whose rank is 0 may be as at first
+  SparseArray<std::uint64_t> pending_;  // by brick, the bits of Pending
+  SupercubeBounds supercube_bounds_;    // of unsent updates, where they are not those of the relevant ones
+  // How often relevant_ was replaced since what is known of unsent updates was dropped; and by part of it, when it came.
+  std::uint8_t time_ = 0;
+  std::array<std::uint8_t, BrickNeeds::kMostParts> part_since_{};
+  std::vector<SentChannel> channels_;         // of the data set
+  std::vector<std::size_t> wanted_channels_;  // ascending
+  std::uint32_t next_lacking_ = 0;            // bricks before this one lack no value that is wanted
   std::optional<Ranking> ranking_;
   std::shared_ptr<BudgetSearch> search_;  // with max_updates, until its result is taken
   std::optional<SplitSet> budget_;        // then: the updates within the budget
