@@ -97,8 +97,8 @@ class RelevantUpdates {
   [[nodiscard]] bool has_parts() const { return !parts_.empty(); }
   // Some of at most BrickNeeds::kMostParts parts, a bit each.
   using PartMask = std::uint8_t;
-  // Those of its parts that another one has, and where: for each of them its number there, or -1. nullopt: one has no parts,
-  // or what is known of their updates is not alike. Both of one volume.
+  // Those of its parts that another one has, and where: for each of them its number there, or -1. nullopt: one has no
+  // parts, or what is known of their updates is not alike. Both of one volume.
   using SharedParts = std::array<std::int8_t, BrickNeeds::kMostParts>;
   [[nodiscard]] std::optional<SharedParts> shared_with(const RelevantUpdates& other) const;
   // bound() and brick() of some parts.

@@ -88,9 +88,9 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   }
 }
 
-// Which parts of what is relevant were not relevant before: bounds that are known of unsent updates need to be raised to
-// those of these parts only, since what is not relevant any more leaves them as they are. before: may be null. If none of
-// these bounds can be kept, all of them are dropped, and time begins again.
+// Which parts of what is relevant were not relevant before: bounds that are known of unsent updates need to be raised
+// to those of these parts only, since what is not relevant any more leaves them as they are. before: may be null. If
+// none of these bounds can be kept, all of them are dropped, and time begins again.
 RelevantUpdates::PartMask StreamPlan::find_new_parts(const RelevantUpdates* before) {
   const auto shared = before != nullptr && time_ < UINT8_MAX ? relevant_->shared_with(*before) : std::nullopt;
   if (!shared) {

@@ -6,9 +6,9 @@
 // sent region by region, each after its missing ancestors: neighbours share names and code tables, which makes the
 // batch smaller. Bounds of the unsent updates are kept for each brick and supercube that something was sent of (those
 // of others are of all that is relevant), and a brick is visited only if its bound is in the band: a new view costs
-// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h). Bounds
-// outlive ranges, too: where one end of a range moves, they are raised to those of its new surface, and only bricks that
-// this one crosses are looked at again.
+// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h).
+// Bounds outlive ranges, too: where one end of a range moves, they are raised to those of its new surface, and only
+// bricks that this one crosses are looked at again.
 #pragma once
 
 #include <algorithm>
@@ -273,7 +273,8 @@ class StreamPlan {
   PagedArray<Viewed> viewed_;           // by brick; those whose rank is 0 may be as at first
   SparseArray<std::uint64_t> pending_;  // by brick, the bits of Pending
   SupercubeBounds supercube_bounds_;    // of unsent updates, where they are not those of the relevant ones
-  // How often relevant_ was replaced since what is known of unsent updates was dropped; and by part of it, when it came.
+  // How often relevant_ was replaced since what is known of unsent updates was dropped; and by part of it, when it
+  // came.
   std::uint8_t time_ = 0;
   std::array<std::uint8_t, BrickNeeds::kMostParts> part_since_{};
   std::vector<SentChannel> channels_;         // of the data set

@@ -26,9 +26,9 @@ struct Highest {
   friend bool operator==(const Highest&, const Highest&) = default;
 };
 
-// Bounds of some supercubes, which are counted within their brick. Memory: for each brick that has any, about eight bytes
-// and a bit for each of its supercubes, and for each bound as many bits as the differences within the brick take, at most
-// 24; for each 32 bricks 8 bytes, and some 20 if any of them has bounds.
+// Bounds of some supercubes, which are counted within their brick. Memory: for each brick that has any, about eight
+// bytes and a bit for each of its supercubes, and for each bound as many bits as the differences within the brick take,
+// at most 24; for each 32 bricks 8 bytes, and some 20 if any of them has bounds.
 class SupercubeBounds {
  public:
   static constexpr std::size_t kBrick = 64;  // most supercubes of one
@@ -48,9 +48,9 @@ class SupercubeBounds {
   [[nodiscard]] std::size_t memory_bytes() const { return pages_.capacity() * sizeof pages_[0] + block_bytes_; }  // with the allocator's
 
  private:
-  // Of a page of bricks: a bit for each brick, whether it has a record; two bytes for each record, where it ends, from the
-  // first one's begin; the records. A record: its time; which supercubes, a bit each; a head; the bounds, less the least values, with
-  // the bits of each after another's. nullptr: there are none.
+  // Of a page of bricks: a bit for each brick, whether it has a record; two bytes for each record, where it ends, from
+  // the first one's begin; the records. A record: its time; which supercubes, a bit each; a head; the bounds, less the
+  // least values, with the bits of each after another's. nullptr: there are none.
   using Block = std::unique_ptr<std::uint8_t[]>;
   static constexpr std::size_t kPage = 32;
   struct Place;
