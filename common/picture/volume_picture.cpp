@@ -11,7 +11,7 @@ namespace intervale {
 namespace {
 
 constexpr double kMostByDefault = 0.3;
-constexpr int kAcross = 2;  // rays of a pixel, each way
+constexpr int kRaysAcross = 2;  // rays of a pixel, each way
 
 // As the shaders have them (shaders.h).
 constexpr double kGamma = 2.2;
@@ -34,7 +34,7 @@ void write_pixel(std::span<const RayLight> light, std::size_t across, const Pale
   for (std::size_t k = 0; k < 3; ++k) {
     double sum = 0;
     for (const std::size_t ray : {std::size_t(0), std::size_t(1), across, across + 1}) sum += light[ray].colour[k] + light[ray].passes * behind[k];
-    rgb[k] = std::uint8_t(std::lround(255 * std::pow(std::min(sum / (kAcross * kAcross), 1.0), 1 / kGamma)));
+    rgb[k] = std::uint8_t(std::lround(255 * std::pow(std::min(sum / (kRaysAcross * kRaysAcross), 1.0), 1 / kGamma)));
   }
 }
 
@@ -49,15 +49,15 @@ Pixels draw_volume(const Mesh& mesh, const VolumeRays& rays, const VolumeLook& l
   const int width = rays.camera.viewport[0], height = rays.camera.viewport[1];
   Pixels pixels{width, height, std::vector<std::uint8_t>(3 * std::size_t(width) * std::size_t(height)), false};
   VolumeRays finer = rays;
-  for (int& side : finer.camera.viewport) side *= kAcross;
+  for (int& side : finer.camera.viewport) side *= kRaysAcross;
   std::atomic<bool> has_drawing = false;
   trace_rays(mesh, finer, transfer_of(look, rays.values), parallel, [&](const RayTile& tile, std::span<const RayLight> light) {
     const std::size_t across = std::size_t(tile.right - tile.left);
     if (std::any_of(light.begin(), light.end(), [](const RayLight& ray) { return ray.passes < 1; })) has_drawing = true;
-    for (int row = tile.top / kAcross; row < tile.bottom / kAcross; ++row) {
+    for (int row = tile.top / kRaysAcross; row < tile.bottom / kRaysAcross; ++row) {
       const Palette::Colour behind = background(row, height);
-      for (int column = tile.left / kAcross; column < tile.right / kAcross; ++column) {
-        const std::size_t first = std::size_t(row * kAcross - tile.top) * across + std::size_t(column * kAcross - tile.left);
+      for (int column = tile.left / kRaysAcross; column < tile.right / kRaysAcross; ++column) {
+        const std::size_t first = std::size_t(row * kRaysAcross - tile.top) * across + std::size_t(column * kRaysAcross - tile.left);
         write_pixel(light.subspan(first), across, behind, pixels.rgb.data() + 3 * (std::size_t(row) * std::size_t(width) + std::size_t(column)));
       }
     }

@@ -39,7 +39,7 @@ std::uint64_t status_of(int process, const std::string& key) {
 }
 
 // A data set of every range: "…/large.ivm"; made once a run.
-const std::filesystem::path& large() {
+const std::filesystem::path& large_data_set() {
   static const TempDir folder;
   static const std::filesystem::path path = [] {
     const std::string volume = folder / "volume.nrrd", made = folder / "large.ivm";
@@ -73,7 +73,7 @@ void expect_exact_meshes(const ServerProgram& server) {
 
 TEST(DataMemory, ServesWhatIsLargerWithinTheBudget) {
   const TempDir folder("/var/tmp");
-  ServerProgram plain(large().string(), {"--threads", "2"}), small(large().string(), in_scratch(folder));
+  ServerProgram plain(large_data_set().string(), {"--threads", "2"}), small(large_data_set().string(), in_scratch(folder));
   EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << "the file has no name";
   const std::string digest = digest_from(plain);
   EXPECT_EQ(digest_from(small), digest);
@@ -118,7 +118,7 @@ TEST(DataMemory, AFullScratchDiskRefusesWhatDoesNotFit) {
   const std::string disk = folder / "disk", files = folder / "files";
   std::filesystem::create_directories(disk);
   std::filesystem::create_directories(files);
-  std::filesystem::copy(large(), files + "/large.ivm");
+  std::filesystem::copy(large_data_set(), files + "/large.ivm");
   std::filesystem::copy(buckyball(), files + "/small.ivm");
   const std::string script =
       "mount -t tmpfs -o size=5m none \"" + disk + "\" && cd \"" + disk +

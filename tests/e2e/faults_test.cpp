@@ -77,7 +77,7 @@ class Idle {
 };
 
 // The gyroid, 97 samples a side: more than lies in the buffers on the way to who does not read.
-const std::filesystem::path& large() {
+const std::filesystem::path& large_gyroid() {
   static const TempDir folder;
   static const std::filesystem::path path = [] {
     const std::string volume = folder / "volume.nrrd", made = folder / "large.ivm";
@@ -108,7 +108,7 @@ TEST(Faults, ASlowReaderGetsItAllAndHoldsNobodyUp) {
 TEST(Faults, AReaderThatStopsIsCutWhateverItHasGranted) {
   ServeOptions options;
   options.write_time = std::chrono::milliseconds(50);
-  const auto server = start(options, large());
+  const auto server = start(options, large_gyroid());
   RawClient stopped(server->port(), {.narrow = true});
   stopped.send(Open{"large", "stopped", protocol::kMaxWindow});
   stopped.send(kEverything);
@@ -121,7 +121,7 @@ TEST(Faults, AReaderThatStopsIsCutWhateverItHasGranted) {
 TEST(Faults, PastWhatMayBeQueuedTheSlowestIsCut) {
   ServeOptions options;
   options.max_queued_bytes = protocol::kMinCredit;  // what is sent to the quick one is never more
-  const auto server = start(options, large());
+  const auto server = start(options, large_gyroid());
   const Open quick{"large", "quick", protocol::kMinCredit};
   const std::uint64_t all = everything(server->port(), quick);
   RawClient stopped(server->port(), {.narrow = true});
