@@ -56,11 +56,11 @@ export async function startFakeServer(token = null) {
   return { address: `http://127.0.0.1:${server.address().port}/`, close: () => server.close() };
 }
 
-// The page at an address, drawn at half the resolution, since software rendering takes as long as there are pixels. Its
-// `problems` collect console errors and warnings, exceptions, and violations of the policy.
+// The page at an address, drawn at a third of the resolution, since software rendering takes as long as there are pixels.
+// Its `problems` collect console errors and warnings, exceptions, and violations of the policy.
 // script: a function that runs in the page before its own scripts.
-export async function openPage(browser, url, { width = 800, height = 560, theme = 'dark', script } = {}) {
-  const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: 0.5, colorScheme: theme, acceptDownloads: true });
+export async function openPage(browser, url, { width = 800, height = 560, theme = 'dark', scale = 0.35, script } = {}) {
+  const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: scale, colorScheme: theme, acceptDownloads: true });
   const page = await context.newPage();
   page.problems = [];
   page.on('console', (message) => ['error', 'warning'].includes(message.type()) && page.problems.push(message.text()));

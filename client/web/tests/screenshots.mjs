@@ -38,7 +38,7 @@ const browser = await launch();
 for (const name of process.argv.length > 2 ? process.argv.slice(2) : Object.keys(kPictures)) {
   const { hash = '', act, token = null, isIncomplete, ...layout } = kPictures[name];
   const server = await startFakeServer(token);
-  const page = await openPage(browser, server.address + hash, layout);
+  const page = await openPage(browser, server.address + hash, { scale: 0.5, ...layout });
   if (!isIncomplete) await refined(page);
   if (act) await act(page);
   await settled(page);
