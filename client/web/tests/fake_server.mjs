@@ -56,6 +56,9 @@ export async function startFakeServer(token = null) {
   return { address: `http://127.0.0.1:${server.address().port}/`, close: () => server.close() };
 }
 
+// What the browser may say where a pixel is read back, as the probe does: it takes time.
+const kStall = /GL Driver Message \(OpenGL, Performance, .*GPU stall due to ReadPixels/;
+
 // The page at an address, drawn at a third of the resolution, since software rendering takes as long as there are pixels.
 // Its `problems` collect console errors and warnings, exceptions, and violations of the policy.
 // script: a function that runs in the page before its own scripts.
@@ -63,7 +66,8 @@ export async function openPage(browser, url, { width = 800, height = 560, theme 
   const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: scale, colorScheme: theme, acceptDownloads: true });
   const page = await context.newPage();
   page.problems = [];
-  page.on('console', (message) => ['error', 'warning'].includes(message.type()) && page.problems.push(message.text()));
+  const isProblem = (message) => ['error', 'warning'].includes(message.type()) && !kStall.test(message.text());
+  page.on('console', (message) => isProblem(message) && page.problems.push(message.text()));
   page.on('pageerror', (error) => page.problems.push(String(error)));
   await page.addInitScript(() =>
     document.addEventListener('securitypolicyviolation', (event) => console.error(`policy: ${event.violatedDirective} ${event.blockedURI}`)),
