@@ -4,7 +4,7 @@ import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 
-import { killServers, launch, makeData, open, program, serve, settled } from './support.mjs';
+import { eventually, killServers, launch, makeData, open, program, serve, settled } from './support.mjs';
 
 const kSide = 9;
 const kSpacing = 0.5;
@@ -41,11 +41,10 @@ after(async () => {
 const sizeOf = (page) => page.evaluate(() => [window.intervale.canvas.clientWidth, window.intervale.canvas.clientHeight]);
 
 // Looks at a sample of the side y = 0 straight ahead, so that the canvas's middle pixel has it in its centre; with this
-// clip plane. Returns what the probe tells there.
-async function toldAt(page, i, j, k, clip) {
+// clip plane. Ends when the probe tells there what is expected: the value, those of the others, and the position.
+async function tells(page, i, j, k, clip, expected) {
   await page.evaluate(([x, y, z, plane]) => {
     window.intervale.set({ clip: plane, pose: { eye: [x, y - 20, z], lookAt: [x, y, z], up: [0, 0, 1], fov: 30 } });
-    return new Promise((resolve) => setTimeout(resolve, 250));
   }, [i * kSpacing, j * kSpacing, k * kSpacing, clip]);
   await settled(page);
   const { x, y } = await page.locator('#canvas').boundingBox();
@@ -53,28 +52,23 @@ async function toldAt(page, i, j, k, clip) {
   assert.ok(width % 2 === 1 && height % 2 === 1, `there is a middle pixel: ${width} x ${height}`);
   await page.mouse.move(x + width / 2 + 3, y + height / 2);
   await page.mouse.move(x + (width - 1) / 2 + 0.5, y + (height - 1) / 2 + 0.5);
-  await page.waitForFunction(() => document.querySelector('#probe-value').textContent !== '' && !document.querySelector('#probe-label').hidden);
-  await page.waitForFunction(() => !document.querySelector('#probe-others').textContent.includes('…'));
-  await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 200)));
-  return page.$$eval('#probe-label *', (parts) => parts.map((part) => part.textContent));
+  const told = () => page.$$eval('#probe-label *', (parts) => parts.map((part) => part.textContent));
+  await eventually(async () => assert.deepEqual(await told(), expected, `sample ${i}, ${j}, ${k}`));
 }
 
 test('at a sample the probe tells its value exactly, on the side of the box and on a cut', async () => {
   const { page, errors, close } = await open(browser, `${server.url}#data=digits&show=probe&roi=${kRegion}`, { width: 401, height: 340 });
   await settled(page);
   if ((await sizeOf(page))[1] % 2 === 0) await page.setViewportSize({ width: 401, height: 341 });
-  for (const [i, k] of [[1, 1], [4, 6], [7, 3]]) {
-    assert.deepEqual(await toldAt(page, i, 0, k, null), [`density = ${valueAt(i, 0, k)} HU`, `heat = ${valueAt(i, 0, k, heat)} K`, `${i * kSpacing}, 0, ${k * kSpacing} mm`], `sample ${i}, 0, ${k}`);
-  }
-  const [i, j, k] = [5, 4, 2];
-  const cut = { normal: [0, -1, 0], offset: -j * kSpacing };
-  assert.deepEqual(await toldAt(page, i, j, k, cut), [`density = ${valueAt(i, j, k)} HU`, `heat = ${valueAt(i, j, k, heat)} K`, `${i * kSpacing}, ${j * kSpacing}, ${k * kSpacing} mm`]);
+  const density = (...at) => `density = ${valueAt(...at)} HU`, hot = (...at) => `heat = ${valueAt(...at, heat)} K`;
+  const position = (...at) => `${at.map((index) => index * kSpacing).join(', ')} mm`;
+  for (const [i, k] of [[1, 1], [4, 6], [7, 3]]) await tells(page, i, 0, k, null, [density(i, 0, k), hot(i, 0, k), position(i, 0, k)]);
+  const at = [5, 4, 2];
+  const cut = { normal: [0, -1, 0], offset: -at[1] * kSpacing };
+  await tells(page, ...at, cut, [density(...at), hot(...at), position(...at)]);
   await page.evaluate(() => window.intervale.set({ colorBy: 'value', channel: 'heat' }));
   await page.waitForFunction(() => document.querySelector('#legend-title').textContent === 'heat, K');
-  await settled(page);
-  const [value, others] = await toldAt(page, i, j, k, cut);
-  assert.equal(value, `heat = ${valueAt(i, j, k, heat)} K`);
-  assert.equal(others, `density = ${valueAt(i, j, k)} HU`);
+  await tells(page, ...at, cut, [hot(...at), density(...at), position(...at)]);
   assert.deepEqual(errors, []);
   await close();
 });
