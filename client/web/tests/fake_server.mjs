@@ -59,9 +59,9 @@ export async function startFakeServer(token = null) {
 // What the browser may say where a pixel is read back, as the probe does: it takes time.
 const kStall = /GL Driver Message \(OpenGL, Performance, .*GPU stall due to ReadPixels/;
 
-// The page at an address, drawn at a third of the resolution, since software rendering takes as long as there are pixels.
-// Its `problems` collect console errors and warnings, exceptions, and violations of the policy.
-// script: a function that runs in the page before its own scripts.
+// The page at an address. Its `problems` collect console errors and warnings, exceptions, and violations of the policy.
+// scale: of the resolution; a third, if not said, since software rendering takes as long as there are pixels. script: a
+// function that runs in the page before its own scripts.
 export async function openPage(browser, url, { width = 800, height = 560, theme = 'dark', scale = 0.35, script } = {}) {
   const context = await browser.newContext({ viewport: { width, height }, deviceScaleFactor: scale, colorScheme: theme, acceptDownloads: true });
   const page = await context.newPage();
