@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstdlib>
+#include <optional>
 
 #include "common/codec/range_coder.h"
 #include "common/codec/value_prediction.h"
@@ -49,10 +50,9 @@ struct SignedModel {
   }
 };
 
-// All models of values.
-struct ValueModels {
-  std::array<std::array<std::array<SignedModel, kActivityLevels>, 2>, 3> of;  // by class, whether the scale is 0, activity
-
+// All models of values. A small batch uses few of them, so each is made when it is first used.
+class ValueModels {
+ public:
   // Codes the key of a diamond's centre from those of its vertices, none of which is kNoKey. `key` matters to an encoder
   // only. A decoder may return a key that is greater than `last`, or wrap, if its bytes are damaged.
   template <class Coder>
@@ -62,10 +62,19 @@ struct ValueModels {
   // The same, after the prediction.
   template <class Coder>
   ValueKey code(Coder& coder, int cls, int scale, const PredictedValue& predicted, ValueKey key = 0) {
-    SignedModel& model = of[std::size_t(cls)][scale == 0][predicted.level];
+    SignedModel& model = of(cls, scale, predicted.level);
     const std::int64_t coded = std::int64_t(predicted.key) + model.code(coder, std::int64_t(key) - std::int64_t(predicted.key), predicted.quarter);
     return coded < 0 || coded > std::int64_t(kNoKey) ? kNoKey : ValueKey(coded);
   }
+  // Of the residuals of diamonds with this level of activity.
+  SignedModel& of(int cls, int scale, std::uint8_t level) {
+    auto& model = of_[std::size_t(cls)][scale == 0][level];
+    if (!model) model.emplace();
+    return *model;
+  }
+
+ private:
+  std::array<std::array<std::array<std::optional<SignedModel>, kActivityLevels>, 2>, 3> of_;  // by class, whether the scale is 0, activity
 };
 
 }  // namespace intervale

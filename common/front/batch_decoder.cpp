@@ -25,8 +25,8 @@ class BatchDecoder {
         ranges_(description.format, shown),
         max_tets_(max_tets),
         coder_(coder),
+        models_(is_plain),
         cursor_(fronts[0].state()) {
-    models_.is_plain = is_plain;
     others_.reserve(fronts.size() - 1);
     for (const Front& other : fronts.subspan(1)) others_.emplace_back(other.state());
   }

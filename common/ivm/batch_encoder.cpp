@@ -70,8 +70,7 @@ class BatchEncoder {
 
   [[nodiscard]] std::vector<std::uint8_t> coded(bool is_plain) const {
     RangeEncoder coder;
-    const auto models = std::make_unique<BatchModels>();
-    models->is_plain = is_plain;
+    const auto models = std::make_unique<BatchModels>(is_plain);
     coder.raw_bits(1, unsigned(is_plain));
     encode_supercubes(coder, is_plain, groups_);
     const ValueKey last = volume_.description().format.last;

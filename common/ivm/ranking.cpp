@@ -12,7 +12,8 @@ namespace {
 // h, in pixels, of a diamond that is large on the screen; and how much larger counts.
 constexpr double kLargePixels = 12, kLargest = 16;
 
-float clamp_weight(double weight) { return float(std::clamp(weight, 1e-30, 1e30)); }
+constexpr float kLeastWeight = 1e-30F, kMostWeight = 1e30F;
+float clamp_weight(double weight) { return float(std::clamp(weight, double(kLeastWeight), double(kMostWeight))); }
 
 }  // namespace
 
@@ -68,26 +69,54 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick) const {
   return b;
 }
 
-Ranking::BrickBounds::Bound Ranking::BrickBounds::operator()(BrickIndex brick, const Left& left) {
+Ranking::BrickBounds::BrickBounds(const Ranking& ranking) : ranking_(ranking) {
+  if (!ranking.screen_ || ranking.roi_) return;
+  now_.emplace(*ranking.screen_, ranking.volume_.brick_regions());
+  if (ranking.ahead_) soon_.emplace(*ranking.ahead_, ranking.volume_.brick_regions());
+}
+
+Ranking::BrickBounds::Bounds Ranking::BrickBounds::operator()(std::size_t block, std::uint32_t which, const Block<Left>& left) const {
   const Ranking& r = ranking_;
-  if (!r.screen_ || r.roi_) {
-    const Brick b = r.of_brick(brick);
-    return {b.bound(left), r.screen_ ? b.pixels(left.object_error) : 0, true};
+  Bounds bounds;
+  if (!now_) {
+    for (const std::size_t k : set_bits<std::size_t>(which)) {
+      const Brick b = r.of_brick(BrickIndex(std::uint32_t(block * kBlock + k)));
+      bounds.rank[k] = b.bound(left[k]);
+      bounds.pixels[k] = r.screen_ ? b.pixels(left[k].object_error) : 0;
+    }
+    return bounds;
   }
-  constexpr std::size_t kBlock = ScreenError::Regions::kBlock;
-  const std::size_t i = brick % kBlock;
-  if (brick / kBlock != block_) {
-    block_ = brick / kBlock;
-    now_ = r.screen_->bounds(r.volume_.brick_regions(), block_);
-    if (r.ahead_) soon_ = r.ahead_->bounds(r.volume_.brick_regions(), block_);
+  const ScreenError::Bounds now = (*now_)(block);
+  Block<float> width{}, removed{};  // width: h, in samples
+  for (const std::size_t k : set_bits<std::size_t>(which)) {
+    width[k] = float(1U << unsigned(scale_of_key(r.volume_.set().bricks()[block * kBlock + k].key)));
+    bounds.pixels[k] = std::clamp(left[k].object_error * now.pixels[k], kLeastImportance, kMostImportance);
+    removed[k] = r.relevant_.has_slopes() ? r.removed_[left[k].slope_of_wanted(now.pixels[k], r.pixel_error_)] : bounds.pixels[k] * bounds.pixels[k];
   }
-  const float pixels = std::clamp(left.object_error * now_.pixels[i], kLeastImportance, kMostImportance);
-  if (left.step < r.least_step_ || !(pixels > r.pixel_error_)) return {0, pixels, true};
-  const int scale = scale_of_key(r.volume_.set().bricks()[brick].key);
-  double weight = r.whole_weight(scale, double(now_.pixels[i])) * double(now_.share[i]);
-  if (r.ahead_) weight = std::max(weight, r.whole_weight(scale, double(soon_.pixels[i])) * double(soon_.share[i]));
-  const unsigned slope = left.slope_of_wanted(now_.pixels[i], r.pixel_error_);
-  return {rank_of(r.importance_of(pixels, slope, clamp_weight(weight)), true), pixels, false};
+  Block<float> weight = weights(now, width);
+  if (soon_) {
+    const Block<float> soon = weights((*soon_)(block), width);
+    for (std::size_t k = 0; k < kBlock; ++k) weight[k] = std::max(weight[k], soon[k]);
+  }
+  for (const std::size_t k : set_bits<std::size_t>(which)) {
+    if (left[k].step < r.least_step_ || !(bounds.pixels[k] > r.pixel_error_)) continue;
+    bounds.rank[k] = rank_of(std::max(removed[k] * weight[k], kLeastImportance), true);
+  }
+  return bounds;
+}
+
+// As weight_of() what is not exact, or a little more.
+Ranking::BrickBounds::Block<float> Ranking::BrickBounds::weights(const ScreenError::Bounds& bounds, const Block<float>& width) const {
+  const bool has_slopes = ranking_.relevant_.has_slopes();
+  Block<float> weight;
+  for (std::size_t k = 0; k < kBlock; ++k) {
+    const auto spacing = float(std::min(ranking_.spacing_ * double(bounds.pixels[k]), 1e30));
+    const float h = spacing * width[k], large = std::min(std::max(h / float(kLargePixels), 1.0F), float(kLargest));
+    const float area = has_slopes ? spacing * spacing : h;
+    const float whole = area * h * (large * large * large) * bounds.share[k] * (1 + 4e-6F);
+    weight[k] = std::min(std::max(whole, kLeastWeight), kMostWeight);
+  }
+  return weight;
 }
 
 float Ranking::pixels_per_unit(const ScreenError& screen, const ScreenError::Region& region) {
@@ -109,7 +138,7 @@ float Ranking::weight_of(const ScreenError::Region& region, int scale, float pix
   return clamp_weight(ahead_ ? std::max(weight, on(*ahead_, pixels_per_unit(*ahead_, region))) : weight);
 }
 
-Ranking::Supercube Ranking::Brick::supercube(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const {
+Ranking::Supercube Ranking::Brick::rough(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const {
   Supercube s;
   s.ranking_ = ranking_;
   s.needs_ = &needs;
@@ -121,13 +150,20 @@ Ranking::Supercube Ranking::Brick::supercube(const BrickNeeds& needs, SupercubeI
   s.pixels_ = pixels_;
   s.weight_ = weight_;
   s.is_seen_ = is_seen_;
-  const bool may_be_hidden = ranking_->occlusion_ && is_seen_;
-  if (is_exact_ && !may_be_hidden) return s;
+  s.has_own_weight_ = !is_exact_;
+  s.may_be_hidden_ = ranking_->occlusion_ && is_seen_;
+  if (is_exact_) return s;
   const ScreenError::Region region = region_of(ranking_->volume_.domain(), key, 1);
   if (near_) s.pixels_ = pixels_per_unit(*ranking_->screen_, region);
-  if (!is_exact_) s.weight_ = ranking_->weight_of(region, scale_, s.pixels_, true);
-  if (may_be_hidden) s.is_seen_ = !ranking_->occlusion_->hides(region);
+  s.weight_ = ranking_->weight_of(region, scale_, s.pixels_, false);
   return s;
+}
+
+void Ranking::Supercube::refine() {
+  if (!has_own_weight_ && !may_be_hidden_) return;
+  const ScreenError::Region region = region_of(ranking_->volume_.domain(), key_, 1);
+  if (has_own_weight_) weight_ = ranking_->weight_of(region, scale_, pixels_, true);
+  if (may_be_hidden_) is_seen_ = !ranking_->occlusion_->hides(region);
 }
 
 double Ranking::error(Rank rank) const { return rank == 0 ? 0 : double(volume_.error_steps()[rank - 1u]); }

@@ -70,6 +70,8 @@ class Ranking {
     }
     // No lower than the rank of any update here whose error step, distance and slope are no higher.
     [[nodiscard]] Rank bound(unsigned step, std::uint8_t distance, unsigned slope) const { return rank(importance(step, distance, slope)); }
+    // Makes a rough ranking exact.
+    void refine();
     // Whether the diamond in a slot meets the region of interest.
     [[nodiscard]] bool meets_roi(Slot slot) const {
       return !ranking_->roi_ || ranking_->roi_->meets(centre_of(key_, slot), std::int32_t(1) << scale_);
@@ -94,6 +96,7 @@ class Ranking {
     float pixels_ = 0;  // of one world unit
     float weight_ = 0;  // of what is removed
     bool is_seen_ = true;
+    bool has_own_weight_ = true, may_be_hidden_ = false;  // not those of the brick; see refine()
   };
 
   // Upper bounds over updates that are left. slope: of those whose object errors are above the limit; slope_below: of
@@ -127,7 +130,14 @@ class Ranking {
     // With a camera: about the largest object error that is not wanted here.
     [[nodiscard]] float unwanted() const { return ranking_->pixel_error_ / pixels_; }
     // needs: of the brick, must outlive it.
-    [[nodiscard]] Supercube supercube(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const;
+    [[nodiscard]] Supercube supercube(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const {
+      Supercube s = rough(needs, supercube, key);
+      s.refine();
+      return s;
+    }
+    // The same in half of the time, with ranks that may be too high, until it is refined: as if all of the supercube were
+    // seen.
+    [[nodiscard]] Supercube rough(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const;
     // With a camera: no less than the deviation in pixels of any update here whose object error is no larger, or 2^100.
     // Above 0.
     [[nodiscard]] float pixels(float object_error) const { return std::clamp(object_error * pixels_, kLeastImportance, kMostImportance); }
@@ -145,24 +155,27 @@ class Ranking {
   };
   [[nodiscard]] Brick of_brick(BrickIndex brick) const;
 
-  // Bounds of bricks in order of their numbers: no lower than those that of_brick() tells, in a fraction of the time.
-  // What is inside the picture and far away is taken for as near as its nearest point; what is hidden, for seen.
+  // Bounds of bricks, by block: no lower than the rank of any update there, in a fraction of the time that of_brick()
+  // takes. What is inside the picture and far away is taken for as near as its nearest point; what is hidden, for seen.
   class BrickBounds {
    public:
-    // ranking: must outlive it.
-    explicit BrickBounds(const Ranking& ranking) : ranking_(ranking) {}
-    struct Bound {
-      Rank rank = 0;
-      float pixels = 0;       // as Brick::pixels(); 0 without a camera
-      bool is_exact = false;  // Brick::bound() is the same
+    static constexpr std::size_t kBlock = ScreenError::Regions::kBlock;
+    template <class T>
+    using Block = std::array<T, kBlock>;
+    struct Bounds {
+      Block<Rank> rank{};
+      Block<float> pixels{};  // as Brick::pixels(); 0 without a camera
     };
-    // Of its updates that are left.
-    [[nodiscard]] Bound operator()(BrickIndex brick, const Left& left);
+    // ranking: must outlive it.
+    explicit BrickBounds(const Ranking& ranking);
+    // Of some bricks from `block` * kBlock on, a bit each; the others' ranks are 0. left: of their updates.
+    [[nodiscard]] Bounds operator()(std::size_t block, std::uint32_t which, const Block<Left>& left) const;
+    [[nodiscard]] bool is_exact() const { return !now_; }  // ranks are those of Brick::bound()
 
    private:
+    [[nodiscard]] Block<float> weights(const ScreenError::Bounds& bounds, const Block<float>& width) const;
     const Ranking& ranking_;
-    std::size_t block_ = ~std::size_t(0);
-    ScreenError::Bounds now_, soon_;  // of the regions of that block
+    std::optional<ScreenError::RegionBounds> now_, soon_;
   };
 
   // Without a camera: the largest field error that remains once all updates of higher ranks are applied.

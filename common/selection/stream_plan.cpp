@@ -23,7 +23,7 @@ constexpr std::uint32_t kInVain = 3;            // times as many visits as a bat
 struct StreamPlan::BatchBuilder {
   AncestorInserter inserter;
   SetNeighbours around;              // of the supercube visited
-  std::vector<SetNeighbours> above;  // of ancestors, by scale
+  std::vector<SetNeighbours> above;  // of ancestors, by scale; empty until the batch is nearly full
   std::vector<SlotGroup> groups;
   boost::unordered_flat_map<SupercubeIndex, std::uint32_t> group_of;  // by supercube
   boost::unordered_flat_set<BrickIndex> bricks;
@@ -34,7 +34,6 @@ struct StreamPlan::BatchBuilder {
   BatchBuilder(const IntervalVolume& volume, SplitSet& sent, std::span<const std::size_t> channels, std::size_t max_payload)
       : inserter(volume.set(), sent),
         around(volume.set()),
-        above(kMaxLevels, SetNeighbours(volume.set())),
         update_bytes(1 + volume.keys().width() + most_channel_bytes(volume, channels)),
         max_bytes(max_payload) {}
   // How much longer `count` updates of a supercube make the payload; and the most that it can be.
@@ -264,12 +263,17 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
   Unsent rest{.highest = highest};
   if (candidates == 0) return rest;
-  const Ranking::Supercube ranking = brick.supercube(in.needs, s, first.key);
+  Ranking::Supercube ranking = brick.rough(in.needs, s, first.key);
   if (ranking_->has_camera()) lower(in, occupancy, unsent, rest.highest);
-  const Rank bound = std::max(ranking.bound(rest.highest.error_step, rest.highest.distance, rest.highest.slope), budget_ ? Rank(1) : Rank(0));
-  if (bound < band_) {
-    rest.rank = bound;
-    rest.wanted = bound == 0 ? 0 : unsigned(std::popcount(candidates));
+  const Rank least = budget_ ? Rank(1) : Rank(0);
+  const auto bound = [&] { return std::max(ranking.bound(rest.highest.error_step, rest.highest.distance, rest.highest.slope), least); };
+  rest.rank = bound();
+  if (rest.rank >= band_) {
+    ranking.refine();
+    rest.rank = bound();
+  }
+  if (rest.rank < band_) {
+    rest.wanted = rest.rank == 0 ? 0 : unsigned(std::popcount(candidates));
     return rest;
   }
   builder.visited += count;
@@ -315,6 +319,7 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
   rest.wanted = wanted;
   rest.rank = ranking.rank(greatest);
   if (in_it.slots == 0 || add_all(in_it, builder)) return true;
+  while (builder.above.size() < std::size_t(kMaxLevels)) builder.above.emplace_back(volume_->set());
   builder.around.move_to(place.key);  // the batch is nearly full: one at a time
   for (const Slot slot : set_bits<Slot>(in_it.slots)) {
     if (!add_with_ancestors({place.key, place.brick, place.supercube, slot, first + count_below(occupancy, slot)}, builder.around, builder))

@@ -239,6 +239,7 @@ class StreamPlan {
   void keep(BrickIndex brick, const Bounds& bounds);
   void move_limit(const Ranking::Brick& ranking, Pending& pending, Bounds& bounds) const;
   void rank_bricks();
+  void rank_block(std::size_t begin, const Ranking::BrickBounds& bounds);
   // Lowers a loose rank to that which Ranking::of_brick() tells.
   void refine(BrickIndex brick, const Ranking::Brick& ranking);
   void begin_band();

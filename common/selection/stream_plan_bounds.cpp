@@ -99,20 +99,56 @@ void StreamPlan::Pending::lower_to(const Highest& highest, float error) {
 
 // Bricks are ranked by bounds that are found fast. Those that come first are ranked again, as well as can be.
 void StreamPlan::rank_bricks() {
-  Ranking::BrickBounds bounds(*ranking_);
-  for (BrickIndex b{0}; b < viewed_.size(); ++b) {
-    const Pending w = pending(b);
-    if (w.unsent == 0) continue;
-    const auto bound = bounds(b, left(w));
-    const Rank rank = std::max(bound.rank, budget_ ? Rank(1) : Rank(0));
-    if (rank == 0 && viewed_[b].rank == 0) continue;
-    set_pending(b, w, rank, w.unsent);
-    if (rank == 0) continue;
-    Viewed& viewed = viewed_.use(b);
-    viewed.pixels = Up16(bound.pixels);
-    viewed.is_loose = bound.is_exact ? 0 : 1;
-  }
+  const Ranking::BrickBounds bounds(*ranking_);
+  wanted_count_ = pending_bricks_ = 0;
+  for (std::size_t begin = 0; begin < viewed_.size(); begin += bounds.kBlock) rank_block(begin, bounds);
+  if (pending_bricks_ == 0) viewed_.release_all();
   begin_band();
+}
+
+// Ranks the bricks of a block, and counts what is wanted of them.
+void StreamPlan::rank_block(std::size_t begin, const Ranking::BrickBounds& bounds) {
+  constexpr std::size_t kBlock = Ranking::BrickBounds::kBlock;
+  static_assert(decltype(viewed_)::begin_of(1) % kBlock == 0, "a block is within a page");
+  std::uint32_t which = 0, kept = 0;  // bricks with something to send, and those that pending_ has
+  std::array<unsigned, kBlock> unsent{};
+  std::array<Ranking::Left, kBlock> left{};
+  for (std::size_t k = 0; k < std::min(kBlock, viewed_.size() - begin); ++k) {
+    const BrickIndex b{std::uint32_t(begin + k)};
+    if (const auto found = pending_.find(b)) {
+      const auto pending = bits_as<Pending>(*found);
+      unsent[k] = pending.unsent;
+      left[k] = this->left(pending);
+      kept |= std::uint32_t(1) << k;
+    } else {
+      const RelevantUpdates::Bound all = relevant_->bound(b);
+      unsent[k] = all.updates;
+      left[k] = {all.error_step, all.object_error, all.slope};
+    }
+    which |= std::uint32_t(unsent[k] != 0) << k;
+  }
+  auto bound = bounds(begin / kBlock, which, left);
+  Rank top = 0;
+  for (const std::size_t k : set_bits<std::size_t>(which)) {
+    if (budget_) bound.rank[k] = std::max(bound.rank[k], Rank(1));
+    top = std::max(top, bound.rank[k]);
+  }
+  if (top != 0 || viewed_.is_used(viewed_.page_of(begin))) {
+    Viewed* const viewed = &viewed_.use(begin);
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      viewed[k].rank = bound.rank[k] & 0x7fffU;
+      viewed[k].is_loose = bounds.is_exact() ? 0 : 1;
+      viewed[k].pixels = Up16(bound.pixels[k]);
+      pending_bricks_ += std::uint32_t(bound.rank[k] != 0);
+      wanted_count_ += bound.rank[k] != 0 ? unsent[k] : 0;
+    }
+  }
+  for (const std::size_t k : set_bits<std::size_t>(kept)) {
+    const BrickIndex b{std::uint32_t(begin + k)};
+    Pending pending = this->pending(b);
+    pending.wanted = bound.rank[k] != 0 ? pending.unsent : 0;
+    keep(b, pending);
+  }
 }
 
 void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
@@ -174,24 +210,20 @@ void StreamPlan::begin_band() {
 StreamPlan::Remaining StreamPlan::remaining() const {
   Rank top = 0;
   unsigned error_step = 0;
-  Remaining remaining{wanted_count_, 0, 0};
+  float pixels = 0;
   for (std::size_t page = 0; page < viewed_.pages(); ++page) {
     for (std::size_t i = viewed_.begin_of(page); viewed_.is_used(page) && i < viewed_.end_of(page); ++i) {
       const Viewed& viewed = viewed_[i];
       if (viewed.rank == 0) continue;
       top = std::max<Rank>(top, viewed.rank);
-      if (!ranking_->has_camera()) continue;
-      error_step = std::max(error_step, unsigned(pending(BrickIndex(std::uint32_t(i))).error_step));
-      remaining.pixels = std::max(remaining.pixels, double(float(viewed.pixels)));
+      pixels = std::max(pixels, float(viewed.pixels));
+      const BrickIndex b{std::uint32_t(i)};
+      if (ranking_->has_camera() && relevant_->bound(b).error_step > error_step) error_step = std::max<unsigned>(error_step, pending(b).error_step);
     }
   }
-  if (top == 0) return remaining;
-  if (!ranking_->has_camera()) {
-    remaining.error = ranking_->error(top);
-    return remaining;
-  }
-  remaining.error = volume_->error_steps()[error_step];
-  return remaining;
+  if (top == 0) return {wanted_count_, 0, 0};
+  if (!ranking_->has_camera()) return {wanted_count_, ranking_->error(top), 0};
+  return {wanted_count_, volume_->error_steps()[error_step], double(pixels)};
 }
 
 }  // namespace intervale

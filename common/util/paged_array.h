@@ -32,8 +32,8 @@ class PagedArray {
 
   // Pages, by number.
   [[nodiscard]] std::size_t pages() const { return pages_.size(); }
-  [[nodiscard]] static std::size_t page_of(std::size_t i) { return i / Page; }
-  [[nodiscard]] static std::size_t begin_of(std::size_t page) { return page * Page; }
+  [[nodiscard]] static constexpr std::size_t page_of(std::size_t i) { return i / Page; }
+  [[nodiscard]] static constexpr std::size_t begin_of(std::size_t page) { return page * Page; }
   [[nodiscard]] std::size_t end_of(std::size_t page) const { return std::min(size_, (page + 1) * Page); }
   [[nodiscard]] bool is_used(std::size_t page) const { return pages_[page] != nullptr; }
   void release(std::size_t page) {

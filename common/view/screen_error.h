@@ -54,7 +54,28 @@ class ScreenError {
   struct Bounds {
     std::array<float, Regions::kBlock> pixels{}, share{};
   };
-  [[nodiscard]] Bounds bounds(const Regions& regions, std::size_t block) const;
+  class RegionBounds {
+   public:
+    // regions: must outlive it.
+    RegionBounds(const ScreenError& screen, const Regions& regions);
+    [[nodiscard]] Bounds operator()(std::size_t block) const;
+
+   private:
+    using Floats3 = std::array<float, 3>;
+    // Of a plane through the eye.
+    struct Normal {
+      Floats3 of{}, size{};  // size: without signs
+    };
+    [[nodiscard, gnu::always_inline]] Bounds bounds_of(const Regions::Block& block) const;
+    [[nodiscard]] Bounds bounds_of_avx2(const Regions::Block& block) const;
+    const Regions& regions_;
+    // In units and along axes of the regions.
+    Floats3 eye_{};
+    Normal ahead_;
+    std::array<Normal, 4> inward_;  // of the picture's sides
+    float rounding_ = 0;            // of distances, at most
+    float least_depth_ = 0, cos_corner_ = 0, scale_ = 0;
+  };
 
   // Whether the region is so near that the pixels a unit of its parts differ by more than a third.
   [[nodiscard]] bool is_near(const Region& region) const;

@@ -17,30 +17,47 @@ namespace {
 class BrickBounds : public ::testing::TestWithParam<unsigned> {
  protected:
   void expect_bounds(const Ranking& ranking) {
-    Ranking::BrickBounds bounds(ranking);
+    constexpr std::size_t kBlock = Ranking::BrickBounds::kBlock;
+    const Ranking::BrickBounds bounds(ranking);
     const RelevantUpdates& relevant = volume_.relevant();
+    const std::size_t bricks = volume_.set().bricks().size();
     std::vector<Ranking::Rank> ranks;
-    for (BrickIndex b{0}; b < volume_.set().bricks().size(); ++b) {
-      const float object_error = relevant.bound(b).object_error;
-      const auto all = bounds(b, {relevant.bound(b).error_step, object_error, relevant.bound(b).slope});
-      ranks.push_back(all.rank);
-      const Ranking::Brick brick = ranking.of_brick(b);
-      if (ranking.has_camera()) {
-        ASSERT_GE(all.pixels, brick.pixels(object_error));
+    for (std::size_t block = 0; block * kBlock < bricks; ++block) {
+      const std::size_t count = std::min(kBlock, bricks - block * kBlock);
+      std::array<Ranking::Left, kBlock> all, some, hardly_wanted, steep;
+      for (std::size_t k = 0; k < count; ++k) {
+        const RelevantUpdates::Bound bound = relevant.bound(BrickIndex(std::uint32_t(block * kBlock + k)));
+        all[k] = {bound.error_step, bound.object_error, bound.slope};
+        const unsigned step = unsigned(random_()) % (bound.error_step + 1U), slope = unsigned(random_()) % (bound.slope + 1U);
+        some[k] = {step, bound.object_error / 2, slope};
+        hardly_wanted[k] = {step, bound.object_error, slope, 0, unsigned(random_()) % (bound.slope + 1U)};
+        steep[k] = {step, bound.object_error, slope};
       }
-      // Of what remains
-      const unsigned step = unsigned(random_()) % (relevant.bound(b).error_step + 1), slope = unsigned(random_()) % (relevant.bound(b).slope + 1);
-      const auto some = bounds(b, {step, object_error / 2, slope});
-      ASSERT_LE(some.rank, all.rank);
-      if (some.is_exact) {
-        ASSERT_EQ(some.rank, brick.bound({step, object_error / 2, slope}));
-      }
-      // Steep ones that are hardly wanted come last; those that may be wanted more count.
-      const unsigned steeper = unsigned(random_()) % (relevant.bound(b).slope + 1);
-      ASSERT_EQ(bounds(b, {step, object_error, slope, 0, steeper}).rank, bounds(b, {step, object_error, slope}).rank);
-      if (ranking.has_camera()) {
-        const float far = 2 * Ranking::Left::kHardly * brick.unwanted();
-        ASSERT_EQ(brick.bound({step, object_error, slope, far, steeper}), brick.bound({step, object_error, std::max(slope, steeper)}));
+      const std::uint32_t which = (std::uint32_t(1) << count) - 1;
+      const auto of_all = bounds(block, which, all), of_some = bounds(block, which, some);
+      const auto of_hardly_wanted = bounds(block, which, hardly_wanted), of_steep = bounds(block, which, steep);
+      for (std::size_t k = 0; k < kBlock; ++k) {
+        if (k >= count) {
+          ASSERT_EQ(of_all.rank[k], 0);
+          continue;
+        }
+        ranks.push_back(of_all.rank[k]);
+        const Ranking::Brick brick = ranking.of_brick(BrickIndex(std::uint32_t(block * kBlock + k)));
+        if (ranking.has_camera()) {
+          ASSERT_GE(of_all.pixels[k], brick.pixels(all[k].object_error));
+        }
+        ASSERT_LE(of_some.rank[k], of_all.rank[k]);
+        if (bounds.is_exact()) {
+          ASSERT_EQ(of_some.rank[k], brick.bound(some[k]));
+        }
+        // Steep ones that are hardly wanted come last; those that may be wanted more count.
+        ASSERT_EQ(of_hardly_wanted.rank[k], of_steep.rank[k]);
+        if (ranking.has_camera()) {
+          Ranking::Left wanted = hardly_wanted[k];
+          wanted.limit = 2 * Ranking::Left::kHardly * brick.unwanted();
+          steep[k].slope = std::max(wanted.slope, wanted.slope_below);
+          ASSERT_EQ(brick.bound(wanted), brick.bound(steep[k]));
+        }
       }
     }
     testing::for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ASSERT_LE(rank, ranks[p.brick]); });
@@ -93,9 +110,10 @@ TEST(RegionBounds, AreThoseOfEachRegion) {
       }
     }
     const ScreenError::Regions regions(grid, each);
+    const ScreenError::RegionBounds bounds_of(view, regions);
     constexpr std::size_t kBlock = ScreenError::Regions::kBlock;
     for (std::size_t i = 0; i < each.size(); ++i) {
-      const auto bounds = view.bounds(regions, i / kBlock);
+      const auto bounds = bounds_of(i / kBlock);
       const double pixels = std::min(view.pixels_per_unit(each[i]), 0x1p100), share = view.seen_share(each[i]);
       const auto bound = double(bounds.pixels[i % kBlock]);
       ASSERT_GE(bound, pixels * (1 - 1e-7)) << "trial " << trial;

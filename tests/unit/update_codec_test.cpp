@@ -256,8 +256,7 @@ Bytes batch_of_root(const IntervalVolume& v, bool is_plain, Code code) {
   EXPECT_TRUE(cursor.find(kSlotOfType[std::size_t(root.type)]));
   VertexKeys around = cursor.vertex_keys();
   fill_missing(around, root.row->vertices);
-  const auto models = std::make_unique<BatchModels>();
-  models->is_plain = is_plain;
+  const auto models = std::make_unique<BatchModels>(is_plain);
   RangeEncoder encoder;
   const SlotGroup group{{}, {}, supercube_key(root.scale, cursor.position()), 1};
   encoder.raw_bits(1, unsigned(is_plain));
@@ -291,7 +290,7 @@ TEST(UpdateCodec, AKeyBeyondTheLastIsRefused) {
     }
     const auto modelled = [&](std::int64_t key) {
       return batch_of_root(v, false, [&](RangeEncoder& encoder, BatchModels& models, const PredictedValue& predicted, int scale) {
-        models.values.of[0][scale == 0][predicted.level].code(encoder, key - std::int64_t(predicted.key));
+        models.values.of(0, scale, predicted.level).code(encoder, key - std::int64_t(predicted.key));
       });
     };
     for (const std::int64_t key : {std::int64_t(0), std::int64_t(last)}) EXPECT_FALSE(is_refused_for_its_value(v, modelled(key)));
