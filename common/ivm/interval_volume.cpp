@@ -28,6 +28,26 @@ std::vector<ScreenError::Region> regions_of_bricks(const Domain& domain, const S
   return regions;
 }
 
+// The least boxes around those of each run.
+std::vector<ScreenError::Region> regions_of_runs(const std::vector<ScreenError::Region>& bricks) {
+  std::vector<ScreenError::Region> regions;
+  for (std::size_t begin = 0; begin < bricks.size(); begin += RelevantUpdates::kRun) {
+    const std::size_t end = std::min(bricks.size(), begin + RelevantUpdates::kRun);
+    ScreenError::Region region;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double low = bricks[begin].middle[axis] - bricks[begin].reach[axis], high = bricks[begin].middle[axis] + bricks[begin].reach[axis];
+      for (std::size_t b = begin + 1; b < end; ++b) {
+        low = std::min(low, bricks[b].middle[axis] - bricks[b].reach[axis]);
+        high = std::max(high, bricks[b].middle[axis] + bricks[b].reach[axis]);
+      }
+      region.middle[axis] = (low + high) / 2;
+      region.reach[axis] = (high - low) / 2;
+    }
+    regions.push_back(region);
+  }
+  return regions;
+}
+
 // What counts for the data set's range, but for lost updates; empty: all. left: see IntervalVolume::Parts.
 std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const std::vector<std::uint64_t>& left) {
   const Description& d = volume.description();
@@ -49,6 +69,7 @@ IntervalVolume::IntervalVolume(Parts parts)
       left_(std::move(parts.left)),
       relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, relevant_slots(*this, left_), parts.surface),
       brick_regions_(description_.grid, regions_of_bricks(domain_, set_)),
+      run_regions_(description_.grid, regions_of_runs(regions_of_bricks(domain_, set_))),
       bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
 
@@ -120,7 +141,7 @@ std::size_t IntervalVolume::memory_bytes() const {
   }
   return of_channels + sizeof *this + description_.format.memory_bytes() + set_.memory_bytes() + keys_.memory_bytes() + steps_.size() +
          error_steps_.size() * sizeof(float) + left_.size() * sizeof(std::uint64_t) + relevant_.memory_bytes() + brick_regions_.memory_bytes() +
-         bounds_->bytes + (statistics_ ? statistics_->memory_bytes() : 0);
+         run_regions_.memory_bytes() + bounds_->bytes + (statistics_ ? statistics_->memory_bytes() : 0);
 }
 
 }  // namespace intervale

@@ -67,6 +67,8 @@ class IntervalVolume {
   [[nodiscard]] const RelevantUpdates& relevant() const { return relevant_; }
   // By brick: where its diamonds are.
   [[nodiscard]] const ScreenError::Regions& brick_regions() const { return brick_regions_; }
+  // The same by run of them (RelevantUpdates::kRun).
+  [[nodiscard]] const ScreenError::Regions& run_regions() const { return run_regions_; }
   // Of a supercube: the slots whose values a damaged file has not lost (page_faults.h). Closed under parents.
   [[nodiscard]] std::uint64_t left(SupercubeIndex s) const { return left_.empty() ? set_.occupancy()[s] : left_[s]; }
   // How many updates a damaged file has lost. O(supercubes) if there are any.
@@ -95,7 +97,7 @@ class IntervalVolume {
   std::vector<float> error_steps_;
   std::vector<std::uint64_t> left_;  // by supercube; empty: all
   RelevantUpdates relevant_;
-  ScreenError::Regions brick_regions_;
+  ScreenError::Regions brick_regions_, run_regions_;
   std::shared_ptr<LazyBounds> bounds_;  // not null; of all copies
   std::shared_ptr<const FieldStatistics> statistics_;
   std::vector<ChannelKeys> channel_keys_;

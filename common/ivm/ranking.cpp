@@ -69,27 +69,38 @@ Ranking::Brick Ranking::of_brick(BrickIndex brick) const {
   return b;
 }
 
-Ranking::BrickBounds::BrickBounds(const Ranking& ranking) : ranking_(ranking) {
-  if (!ranking.screen_ || ranking.roi_) return;
-  now_.emplace(*ranking.screen_, ranking.volume_.brick_regions());
-  if (ranking.ahead_) soon_.emplace(*ranking.ahead_, ranking.volume_.brick_regions());
+Ranking::BlockBounds::BlockBounds(const Ranking& ranking, Of of) : ranking_(ranking), of_(of) {
+  if (!ranking.screen_ || (ranking.roi_ && of == Of::bricks)) return;
+  const ScreenError::Regions& regions = of == Of::bricks ? ranking.volume_.brick_regions() : ranking.volume_.run_regions();
+  now_.emplace(*ranking.screen_, regions);
+  if (ranking.ahead_) soon_.emplace(*ranking.ahead_, regions);
 }
 
-Ranking::BrickBounds::Bounds Ranking::BrickBounds::operator()(std::size_t block, std::uint32_t which, const Block<Left>& left) const {
+// Without a camera; or of bricks that a region of interest may leave out.
+void Ranking::BlockBounds::bound_each(std::size_t block, std::uint32_t which, const Block<Left>& left, Bounds& bounds) const {
+  for (const std::size_t k : set_bits<std::size_t>(which)) {
+    if (of_ == Of::runs) {
+      bounds.rank[k] = left[k].step < ranking_.least_step_ ? Rank(0) : Rank(left[k].step + 1);
+      continue;
+    }
+    const Brick b = ranking_.of_brick(BrickIndex(std::uint32_t(block * kBlock + k)));
+    bounds.rank[k] = b.bound(left[k]);
+    bounds.pixels[k] = ranking_.screen_ ? b.pixels(left[k].object_error) : 0;
+  }
+}
+
+Ranking::BlockBounds::Bounds Ranking::BlockBounds::operator()(std::size_t block, std::uint32_t which, const Block<Left>& left) const {
   const Ranking& r = ranking_;
   Bounds bounds;
   if (!now_) {
-    for (const std::size_t k : set_bits<std::size_t>(which)) {
-      const Brick b = r.of_brick(BrickIndex(std::uint32_t(block * kBlock + k)));
-      bounds.rank[k] = b.bound(left[k]);
-      bounds.pixels[k] = r.screen_ ? b.pixels(left[k].object_error) : 0;
-    }
+    bound_each(block, which, left, bounds);
     return bounds;
   }
   const ScreenError::Bounds now = (*now_)(block);
-  Block<float> width{}, removed{};  // width: h, in samples
+  Block<float> width{}, removed{};  // width: h, in samples; the greatest of a run is that of its first brick
   for (const std::size_t k : set_bits<std::size_t>(which)) {
-    width[k] = float(1U << unsigned(scale_of_key(r.volume_.set().bricks()[block * kBlock + k].key)));
+    const std::size_t first = (block * kBlock + k) * (of_ == Of::bricks ? 1 : RelevantUpdates::kRun);
+    width[k] = float(1U << unsigned(scale_of_key(r.volume_.set().bricks()[first].key)));
     bounds.pixels[k] = std::clamp(left[k].object_error * now.pixels[k], kLeastImportance, kMostImportance);
     removed[k] = r.relevant_.has_slopes() ? r.removed_[left[k].slope_of_wanted(now.pixels[k], r.pixel_error_)] : bounds.pixels[k] * bounds.pixels[k];
   }
@@ -106,7 +117,7 @@ Ranking::BrickBounds::Bounds Ranking::BrickBounds::operator()(std::size_t block,
 }
 
 // As weight_of() what is not exact, or a little more.
-Ranking::BrickBounds::Block<float> Ranking::BrickBounds::weights(const ScreenError::Bounds& bounds, const Block<float>& width) const {
+Ranking::BlockBounds::Block<float> Ranking::BlockBounds::weights(const ScreenError::Bounds& bounds, const Block<float>& width) const {
   const bool has_slopes = ranking_.relevant_.has_slopes();
   Block<float> weight;
   for (std::size_t k = 0; k < kBlock; ++k) {

@@ -155,10 +155,12 @@ class Ranking {
   };
   [[nodiscard]] Brick of_brick(BrickIndex brick) const;
 
-  // Bounds of bricks, by block: no lower than the rank of any update there, in a fraction of the time that of_brick()
-  // takes. What is inside the picture and far away is taken for as near as its nearest point; what is hidden, for seen.
-  class BrickBounds {
+  // Bounds of bricks, or of runs of them (RelevantUpdates::kRun), by block: no lower than the rank of any update there, in
+  // a fraction of the time that of_brick() takes. What is inside the picture and far away is taken for as near as its
+  // nearest point; what is hidden, for seen.
+  class BlockBounds {
    public:
+    enum class Of { bricks, runs };
     static constexpr std::size_t kBlock = ScreenError::Regions::kBlock;
     template <class T>
     using Block = std::array<T, kBlock>;
@@ -167,14 +169,16 @@ class Ranking {
       Block<float> pixels{};  // as Brick::pixels(); 0 without a camera
     };
     // ranking: must outlive it.
-    explicit BrickBounds(const Ranking& ranking);
-    // Of some bricks from `block` * kBlock on, a bit each; the others' ranks are 0. left: of their updates.
+    BlockBounds(const Ranking& ranking, Of of);
+    // Of some bricks or runs from `block` * kBlock on, a bit each; the others' ranks are 0. left: of their updates.
     [[nodiscard]] Bounds operator()(std::size_t block, std::uint32_t which, const Block<Left>& left) const;
-    [[nodiscard]] bool is_exact() const { return !now_; }  // ranks are those of Brick::bound()
+    [[nodiscard]] bool is_exact() const { return of_ == Of::bricks && !now_; }  // ranks are those of Brick::bound()
 
    private:
+    void bound_each(std::size_t block, std::uint32_t which, const Block<Left>& left, Bounds& bounds) const;
     [[nodiscard]] Block<float> weights(const ScreenError::Bounds& bounds, const Block<float>& width) const;
     const Ranking& ranking_;
+    Of of_;
     std::optional<ScreenError::RegionBounds> now_, soon_;
   };
 

@@ -24,7 +24,14 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const UpdateErrors& errors, S
       known_(known),
       codes_(std::make_shared<const Codes>(grid, errors)),
       bounds_(std::move(bounds)),
-      found_(std::make_shared<Found>(bounds_.size(), std::move(find))) {}
+      found_(std::make_shared<Found>(bounds_.size(), std::move(find))) {
+  bound_runs();
+}
+
+void RelevantUpdates::bound_runs() {
+  runs_.assign((bounds_.size() + kRun - 1) / kRun, {});
+  for (std::size_t b = 0; b < bounds_.size(); ++b) runs_[b / kRun].add(bounds_[b]);
+}
 
 RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown,
                                  const std::vector<std::uint64_t>& slots, const SurfaceErrors& surface)
@@ -57,6 +64,7 @@ RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, cons
       bounds_[b].object_error = std::max(bounds_[b].object_error, object_error(needs[n].to_distance, scale, highest.error_step, highest.distance));
     }
   }
+  bound_runs();
 }
 
 const BrickPart& RelevantUpdates::Found::find_now(BrickIndex brick) {
@@ -115,7 +123,8 @@ bool RelevantUpdates::is_found(BrickIndex brick) const {
 
 std::size_t RelevantUpdates::memory_bytes() const {
   if (has_parts()) return sizeof *this + parts_.size() * sizeof parts_[0];
-  return sizeof *this + bounds_.size() * (sizeof(Bound) + sizeof(void*)) + sizeof *codes_ + codes_->error.size() * sizeof(float) + found_->bytes;
+  return sizeof *this + bounds_.size() * (sizeof(Bound) + sizeof(void*)) + runs_.size() * sizeof(RunBound) + sizeof *codes_ +
+         codes_->error.size() * sizeof(float) + found_->bytes;
 }
 
 namespace {

@@ -55,6 +55,24 @@ class RelevantUpdates {
     std::uint8_t error_step = 0, slope = 0;
     float object_error = 0;
   };
+  // The same of a run, kRun bricks with consecutive numbers from kRun times its number on: the most of each, and how many
+  // updates there are at most.
+  static constexpr std::size_t kRun = 64;
+  struct RunBound {
+    std::uint32_t updates = 0;
+    std::uint8_t error_step = 0, slope = 0;
+    float object_error = 0;
+    void add(const Bound& brick) { raise(brick.updates, brick.error_step, brick.slope, brick.object_error); }
+    void add(const RunBound& part) { raise(part.updates, part.error_step, part.slope, part.object_error); }
+
+   private:
+    void raise(std::uint32_t more_updates, std::uint8_t step, std::uint8_t steepest, float farthest) {
+      updates += more_updates;
+      error_step = std::max(error_step, step);
+      slope = std::max(slope, steepest);
+      object_error = std::max(object_error, farthest);
+    }
+  };
   // Finds what a brick needs, on any thread; may be called twice for one brick, with the same result.
   using Find = std::function<BrickPart(BrickIndex)>;
   // What is known of updates; and whether codes of an ErrorToDistance may be far ones.
@@ -67,6 +85,12 @@ class RelevantUpdates {
   [[nodiscard]] const ShownRanges& shown() const { return shown_; }
   // What is known without finding more: exact if all was known from the start.
   [[nodiscard]] Bound bound(BrickIndex brick) const { return parts_.empty() ? bounds_[brick] : bound(brick, kAllParts); }
+  [[nodiscard]] RunBound run_bound(std::size_t run) const {
+    if (parts_.empty()) return runs_[run];
+    RunBound all;
+    for (const auto& part : parts_) all.add(part->runs_[run]);
+    return all;
+  }
   // Found now if need be: some 50 microseconds for each part. Throws what prevents it, for example that memory is
   // exhausted. As long as this exists.
   [[nodiscard]] BrickNeeds brick(BrickIndex index) const { return parts_.empty() ? BrickNeeds(own_brick(index)) : brick(index, kAllParts); }
@@ -127,6 +151,7 @@ class RelevantUpdates {
     float reach = 0;                  // the largest object error for h = 1: half a diamond's width
     Codes(const Grid& grid, const UpdateErrors& errors);
   };
+  void bound_runs();
   using Parts = std::vector<std::shared_ptr<const RelevantUpdates>>;
   RelevantUpdates(const SupercubeSet& set, Parts parts, ShownRanges shown);
   friend RelevantUpdates united(const IntervalVolume& volume, Parts each, ShownRanges shown);
@@ -141,6 +166,7 @@ class RelevantUpdates {
   Parts parts_;                        // none of which has parts
   const SupercubeSet* set_ = nullptr;  // if there are parts
   std::vector<Bound> bounds_;          // by brick, unless there are parts
+  std::vector<RunBound> runs_;         // likewise by run
   std::shared_ptr<Found> found_;       // likewise; otherwise null
 };
 

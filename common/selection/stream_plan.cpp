@@ -67,18 +67,18 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   shown_ = std::move(shown);
   const RelevantUpdates::PartMask new_parts = find_new_parts(before.get());
   const SupercubeSet& set = volume_->set();
-  viewed_ = PagedArray<Viewed>(set.bricks().size());
+  viewed_ = decltype(viewed_)(set.bricks().size());
+  viewed_runs_.clear();
   wanted_count_ = pending_bricks_ = 0;
   for (BrickIndex b{0}; b < viewed_.size(); ++b) {
     const unsigned sent = sent_in_.get(b);
     const auto found = pending_.find(b);
     if (sent == 0 && !found) continue;
     const RelevantUpdates::Bound all = relevant_->bound(b);
-    Pending pending = found ? bits_as<Pending>(*found) : first_pending(b, all);
+    Pending pending = found ? bits_as<Pending>(*found) : first_pending(all);
     unsigned unsent = all.updates;
     if (found) {
       const RelevantUpdates::Bound added = relevant_->bound(b, new_parts);
-      pending.wanted = 0;
       pending.raise_to({added.error_step, 0, added.slope, 0}, added.object_error);
       unsent = std::min(unsent, unsigned(pending.unsent) + added.updates);
     }
@@ -117,7 +117,7 @@ void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* a
     search_ = lod.max_updates ? std::make_shared<BudgetSearch>(volume_, relevant_, lod) : nullptr;
   }
   ranking_.emplace(*volume_, *relevant_, lod, hidden, ahead);
-  rank_bricks();
+  rank_runs();
 }
 
 // Adds an update after its missing ancestors. around: of its supercube; those of the ancestors are cached in the
@@ -174,8 +174,9 @@ void StreamPlan::put(const SlotGroup& updates, BatchBuilder& builder) {
   if (!relevant_->is_found(updates.brick)) return;  // bounds stay as they are: these are ancestors
   Pending w = pending(updates.brick);
   w.set_unsent(w.unsent - unsigned(std::popcount(updates.slots & relevant_slots(updates.brick, updates.supercube))));
-  if (w.wanted > w.unsent)
-    set_pending(updates.brick, w, viewed_[updates.brick].rank, w.unsent);
+  const Viewed viewed = viewed_[updates.brick];
+  if (viewed.wanted > w.unsent)
+    set_pending(updates.brick, w, viewed.rank, w.unsent);
   else
     keep(updates.brick, w);
 }
@@ -238,7 +239,7 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
   Pending after = pending(brick);
   after.set_unsent(std::min<unsigned>(after.unsent, in.needs.updates()));
   after.lower_to(rest.highest, object_error);
-  set_pending(brick, after, rest.rank, std::min<unsigned>(after.wanted, rest.wanted));
+  set_pending(brick, after, rest.rank, std::min<unsigned>(viewed_[brick].wanted, rest.wanted));
   if (ranking_->has_camera() && viewed_[brick].rank != 0) viewed_.use(brick).pixels = Up16(ranking.pixels(float(after.object_error)));
   return true;
 }
@@ -334,7 +335,7 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
     if (search_->go_on()) return {};
     budget_ = std::move(*search_).result();
     search_.reset();
-    rank_bricks();
+    rank_runs();
   }
   BatchBuilder builder(*volume_, sent_, wanted_channels_, max_bytes);
   while (has_more()) {
@@ -342,9 +343,10 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
       if (builder.bytes >= max_bytes / 4 * 3) break;  // little room for another band: it would pay for its names twice
       begin_band();
     }
-    const std::size_t page = viewed_.page_of(next_brick_ - 1);
-    if (!viewed_.is_used(page)) {
-      next_brick_ = std::uint32_t(viewed_.begin_of(page));
+    const std::size_t run = viewed_.page_of(next_brick_ - 1);
+    if (viewed_runs_[run].rank >= band_ && viewed_runs_[run].rank != 0) rank_bricks(run);
+    if (!viewed_.is_used(run)) {
+      next_brick_ = std::uint32_t(viewed_.begin_of(run));
       continue;
     }
     if (viewed_[next_brick_ - 1].rank < band_) {

@@ -5,9 +5,9 @@
 // where next to nothing was found. The last band takes all that is left once that is little. Within a band they are
 // sent region by region, each after its missing ancestors: neighbours share names and code tables, which makes the
 // batch smaller. Bounds of the unsent updates are kept for each brick and supercube that something was sent of (those
-// of others are of all that is relevant), and a brick is visited only if its bound is in the band: a new view costs
-// O(bricks), and then the work for what it sends. What a brick needs may be found only then (relevant_updates.h).
-// Bounds outlive ranges, too: where one end of a range moves, they are raised to those of its new surface, and only
+// of others are of all that is relevant), and a brick is visited only if its bound is in the band. Bricks are ranked
+// only where their run may be in the band, too: a new view costs O(bricks) / 64, and then the work for what it sends. What a brick needs may be found
+// only then (relevant_updates.h). Bounds outlive ranges, too: where one end of a range moves, they are raised to those of its new surface, and only
 // bricks that this one crosses are looked at again.
 #pragma once
 
@@ -53,9 +53,9 @@ inline constexpr std::size_t kFirstPayloadOfRange = 128 << 10;
   return std::clamp(3 * sent, std::min(first, most), most);
 }
 
-// The stream of one session over one data set. One thread at a time. Memory besides the data set: a byte for each four
-// bricks; four bytes for each of 64 bricks of which one has something that is wanted and not sent; ten for each brick
-// that something was sent of; for each 32 updates of which one was sent four bytes and a little more (eight with
+// The stream of one session over one data set. One thread at a time. Memory besides the data set: a byte for each two
+// bricks; six bytes for each of 64 bricks of which one was ranked and has something that is wanted and not sent; ten for
+// each brick that something was sent of; for each 32 updates of which one was sent four bytes and a little more (eight with
 // max_updates, four more for each channel); for each supercube whose unsent updates matter less than all of it two
 // bytes, or three if distances are known.
 class StreamPlan {
@@ -173,17 +173,17 @@ class StreamPlan {
     std::uint16_t rank : 15 = 0;     // of the unsent updates that are wanted; 0: there are none
     std::uint16_t is_loose : 1 = 0;  // the rank may be much too high; see refine()
     Up16 pixels;                     // of those, on the camera's screen; 0 without one
+    std::uint16_t wanted = 0;        // bound on their number
   };
-  static_assert(sizeof(Viewed) == 4 && Ranking::kRankBits <= 15);
+  static_assert(sizeof(Viewed) == 6 && Ranking::kRankBits <= 15);
   // The unsent relevant updates of a brick, which has at most 64 * kSlots. The bounds are upper bounds.
   struct Pending {
     std::uint16_t unsent : 12 = 0;  // at most so many
     std::uint16_t slope : 4 = 0;
-    std::uint16_t wanted : 12 = 0;  // bound on the number of those that are wanted
-    std::uint16_t slope_below : 4 = 0;
     std::uint8_t error_step = 0;
     std::uint8_t limit = 0;  // a code: `slope` is of those whose object errors are above its distance
     Up16 object_error;
+    std::uint16_t slope_below = 0;
     void set_unsent(unsigned count) { unsent = count & 0xfffU; }
     void raise_to(const Highest& highest, float object_error);
     void lower_to(const Highest& highest, float object_error);
@@ -192,10 +192,9 @@ class StreamPlan {
   // What is not in pending_ is as it is known of all relevant updates, of which none was sent.
   [[nodiscard]] Pending pending(BrickIndex brick) const {
     const auto found = pending_.find(brick);
-    return found ? bits_as<Pending>(*found) : first_pending(brick);
+    return found ? bits_as<Pending>(*found) : first_pending(relevant_->bound(brick));
   }
-  [[nodiscard]] Pending first_pending(BrickIndex brick) const { return first_pending(brick, relevant_->bound(brick)); }
-  [[nodiscard]] Pending first_pending(BrickIndex brick, const RelevantUpdates::Bound& bound) const;
+  [[nodiscard]] static Pending first_pending(const RelevantUpdates::Bound& bound);
   void keep(BrickIndex brick, const Pending& pending);
   void count_sent(BrickIndex brick, int more) {
     sent_in_.update(brick, [more](std::uint16_t had) { return std::uint16_t(had + more); });
@@ -210,7 +209,12 @@ class StreamPlan {
     int scale = 0;
     float limit = 0;  // of the brick
   };
-  // Keeps what is pending, of which so many are wanted from now on; pending.wanted: until now.
+  // What a view looks at of a run of bricks that were not ranked.
+  struct ViewedRun {
+    Rank rank = 0;  // of its updates that are wanted; 0: there are none, or its bricks were ranked
+    Up16 pixels;
+  };
+  // Keeps what is pending, of which so many are wanted.
   void set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted);
   [[nodiscard]] InBrick in_brick(BrickIndex brick, SupercubeIndex s) const;
   [[nodiscard]] std::uint64_t relevant_slots(BrickIndex brick, SupercubeIndex s) const {
@@ -238,8 +242,9 @@ class StreamPlan {
   RelevantUpdates::PartMask find_new_parts(const RelevantUpdates* before);
   void keep(BrickIndex brick, const Bounds& bounds);
   void move_limit(const Ranking::Brick& ranking, Pending& pending, Bounds& bounds) const;
-  void rank_bricks();
-  void rank_block(std::size_t begin, const Ranking::BrickBounds& bounds);
+  void rank_runs();
+  void rank_bricks(std::size_t run);
+  void rank_block(std::size_t begin, const Ranking::BlockBounds& bounds);
   // Lowers a loose rank to that which Ranking::of_brick() tells.
   void refine(BrickIndex brick, const Ranking::Brick& ranking);
   void begin_band();
@@ -271,9 +276,10 @@ class StreamPlan {
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
   SparseArray<std::uint16_t> sent_in_;  // how many of each brick, which has at most 64 * kSlots
-  PagedArray<Viewed> viewed_;           // by brick; those whose rank is 0 may be as at first
-  SparseArray<std::uint64_t> pending_;  // by brick, the bits of Pending
-  SupercubeBounds supercube_bounds_;    // of unsent updates, where they are not those of the relevant ones
+  std::vector<ViewedRun> viewed_runs_;
+  PagedArray<Viewed, RelevantUpdates::kRun> viewed_;  // by brick; those whose rank is 0 may be as at first
+  SparseArray<std::uint64_t> pending_;                // by brick, the bits of Pending
+  SupercubeBounds supercube_bounds_;                  // of unsent updates, where they are not those of the relevant ones
   // How often relevant_ was replaced since what is known of unsent updates was dropped; and by part of it, when it
   // came.
   std::uint8_t time_ = 0;
@@ -286,7 +292,7 @@ class StreamPlan {
   std::optional<SplitSet> budget_;        // then: the updates within the budget
   std::optional<Lod> searched_;           // that both are of
   std::uint64_t sent_count_ = 0, wanted_count_ = 0, room_ = ~std::uint64_t(0);
-  std::uint32_t pending_bricks_ = 0;                  // whose rank is not 0
+  std::uint32_t pending_bricks_ = 0;                  // bricks, and runs of them, whose rank is not 0
   Rank band_ = 0;                                     // the lowest rank of the current band
   int band_width_ = 1;                                // see Ranking::band_below()
   std::uint64_t band_visits_ = 0, band_updates_ = 0;  // what was looked at for it, and found

@@ -97,20 +97,47 @@ void StreamPlan::Pending::lower_to(const Highest& highest, float error) {
   object_error = Up16(std::min(float(object_error), error));
 }
 
-// Bricks are ranked by bounds that are found fast. Those that come first are ranked again, as well as can be.
-void StreamPlan::rank_bricks() {
-  const Ranking::BrickBounds bounds(*ranking_);
+// Runs of bricks are ranked by bounds that are found fast; then the bricks of those that come first, likewise; and of
+// these again those that come first, as well as can be.
+void StreamPlan::rank_runs() {
+  constexpr std::size_t kBlock = Ranking::BlockBounds::kBlock;
+  const Ranking::BlockBounds bounds(*ranking_, Ranking::BlockBounds::Of::runs);
   wanted_count_ = pending_bricks_ = 0;
-  for (std::size_t begin = 0; begin < viewed_.size(); begin += bounds.kBlock) rank_block(begin, bounds);
-  if (pending_bricks_ == 0) viewed_.release_all();
+  viewed_.release_all();
+  viewed_runs_.assign(viewed_.pages(), {});
+  for (std::size_t begin = 0; begin < viewed_runs_.size(); begin += kBlock) {
+    std::uint32_t which = 0;
+    std::array<RelevantUpdates::RunBound, kBlock> all{};
+    std::array<Ranking::Left, kBlock> left{};
+    for (std::size_t k = 0; k < std::min(kBlock, viewed_runs_.size() - begin); ++k) {
+      all[k] = relevant_->run_bound(begin + k);
+      left[k] = {all[k].error_step, all[k].object_error, all[k].slope};
+      which |= std::uint32_t(all[k].updates != 0) << k;
+    }
+    const auto bound = bounds(begin / kBlock, which, left);
+    for (const std::size_t k : set_bits<std::size_t>(which)) {
+      const Rank rank = budget_ ? std::max(bound.rank[k], Rank(1)) : bound.rank[k];
+      if (rank == 0) continue;
+      viewed_runs_[begin + k] = {rank, Up16(bound.pixels[k])};
+      ++pending_bricks_;
+      wanted_count_ += all[k].updates;
+    }
+  }
   begin_band();
 }
 
-// Ranks the bricks of a block, and counts what is wanted of them.
-void StreamPlan::rank_block(std::size_t begin, const Ranking::BrickBounds& bounds) {
-  constexpr std::size_t kBlock = Ranking::BrickBounds::kBlock;
-  static_assert(decltype(viewed_)::begin_of(1) % kBlock == 0, "a block is within a page");
-  std::uint32_t which = 0, kept = 0;  // bricks with something to send, and those that pending_ has
+void StreamPlan::rank_bricks(std::size_t run) {
+  viewed_runs_[run] = {};
+  wanted_count_ -= relevant_->run_bound(run).updates;
+  const Ranking::BlockBounds bounds(*ranking_, Ranking::BlockBounds::Of::bricks);
+  for (std::size_t begin = viewed_.begin_of(run); begin < viewed_.end_of(run); begin += bounds.kBlock) rank_block(begin, bounds);
+  if (--pending_bricks_ == 0) viewed_.release_all();
+}
+
+void StreamPlan::rank_block(std::size_t begin, const Ranking::BlockBounds& bounds) {
+  constexpr std::size_t kBlock = Ranking::BlockBounds::kBlock;
+  static_assert(RelevantUpdates::kRun % kBlock == 0, "a block is within a page");
+  std::uint32_t which = 0;  // bricks with something to send
   std::array<unsigned, kBlock> unsent{};
   std::array<Ranking::Left, kBlock> left{};
   for (std::size_t k = 0; k < std::min(kBlock, viewed_.size() - begin); ++k) {
@@ -119,7 +146,6 @@ void StreamPlan::rank_block(std::size_t begin, const Ranking::BrickBounds& bound
       const auto pending = bits_as<Pending>(*found);
       unsent[k] = pending.unsent;
       left[k] = this->left(pending);
-      kept |= std::uint32_t(1) << k;
     } else {
       const RelevantUpdates::Bound all = relevant_->bound(b);
       unsent[k] = all.updates;
@@ -133,35 +159,29 @@ void StreamPlan::rank_block(std::size_t begin, const Ranking::BrickBounds& bound
     if (budget_) bound.rank[k] = std::max(bound.rank[k], Rank(1));
     top = std::max(top, bound.rank[k]);
   }
-  if (top != 0 || viewed_.is_used(viewed_.page_of(begin))) {
-    Viewed* const viewed = &viewed_.use(begin);
-    for (std::size_t k = 0; k < kBlock; ++k) {
-      viewed[k].rank = bound.rank[k] & 0x7fffU;
-      viewed[k].is_loose = bounds.is_exact() ? 0 : 1;
-      viewed[k].pixels = Up16(bound.pixels[k]);
-      pending_bricks_ += std::uint32_t(bound.rank[k] != 0);
-      wanted_count_ += bound.rank[k] != 0 ? unsent[k] : 0;
-    }
-  }
-  for (const std::size_t k : set_bits<std::size_t>(kept)) {
-    const BrickIndex b{std::uint32_t(begin + k)};
-    Pending pending = this->pending(b);
-    pending.wanted = bound.rank[k] != 0 ? pending.unsent : 0;
-    keep(b, pending);
+  if (top == 0) return;
+  Viewed* const viewed = &viewed_.use(begin);
+  for (std::size_t k = 0; k < kBlock; ++k) {
+    viewed[k].rank = bound.rank[k] & 0x7fffU;
+    viewed[k].is_loose = bounds.is_exact() ? 0 : 1;
+    viewed[k].pixels = Up16(bound.pixels[k]);
+    viewed[k].wanted = std::uint16_t(bound.rank[k] != 0 ? unsent[k] : 0);
+    pending_bricks_ += std::uint32_t(bound.rank[k] != 0);
+    wanted_count_ += viewed[k].wanted;
   }
 }
 
 void StreamPlan::refine(BrickIndex brick, const Ranking::Brick& ranking) {
   const Pending w = pending(brick);
-  viewed_.use(brick).is_loose = 0;
+  Viewed& viewed = viewed_.use(brick);
+  viewed.is_loose = 0;
   const Rank exact = ranking.bound(left(w));
-  set_pending(brick, w, std::min<Rank>(viewed_[brick].rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), w.wanted);
+  set_pending(brick, w, std::min<Rank>(viewed.rank, std::max(exact, budget_ ? Rank(1) : Rank(0))), viewed.wanted);
 }
 
-StreamPlan::Pending StreamPlan::first_pending(BrickIndex brick, const RelevantUpdates::Bound& bound) const {
+StreamPlan::Pending StreamPlan::first_pending(const RelevantUpdates::Bound& bound) {
   Pending first;
   first.set_unsent(bound.updates);
-  first.wanted = viewed_[brick].rank == 0 ? 0 : first.unsent;
   first.raise_to({bound.error_step, 0, bound.slope, 0}, bound.object_error);
   return first;
 }
@@ -174,12 +194,15 @@ void StreamPlan::keep(BrickIndex brick, const Pending& pending) {
 void StreamPlan::set_pending(BrickIndex brick, Pending pending, Rank rank, unsigned wanted) {
   if (pending.unsent == 0) rank = 0;
   wanted = rank == 0 ? 0 : std::min<unsigned>(wanted, pending.unsent);
-  wanted_count_ += wanted - std::uint64_t(pending.wanted);
-  const Rank before = viewed_[brick].rank;
-  if (rank != before) viewed_.use(brick).rank = rank & 0x7fffU;
-  pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(before != 0);
-  if (pending_bricks_ == 0) viewed_.release_all();
-  pending.wanted = wanted & 0xfffU;
+  const Viewed before = viewed_[brick];
+  if (rank != before.rank || wanted != before.wanted) {
+    Viewed& viewed = viewed_.use(brick);
+    viewed.rank = rank & 0x7fffU;
+    viewed.wanted = std::uint16_t(wanted);
+    wanted_count_ += wanted - std::uint64_t(before.wanted);
+    pending_bricks_ += std::uint32_t(rank != 0) - std::uint32_t(before.rank != 0);
+    if (pending_bricks_ == 0) viewed_.release_all();
+  }
   keep(brick, pending);
 }
 
@@ -192,16 +215,17 @@ void StreamPlan::begin_band() {
   band_visits_ = band_updates_ = 0;
   next_brick_ = std::uint32_t(viewed_.size());
   Rank top = 0;
-  for (std::size_t page = viewed_.pages(); page-- != 0;) {  // coarse ones have high ranks, so that few others are refined
-    if (!viewed_.is_used(page)) continue;
+  for (std::size_t run = 0; run < viewed_runs_.size(); ++run) {  // coarse ones come first and rank high, so that few others are ranked
+    if (viewed_runs_[run].rank > top) rank_bricks(run);
+    if (!viewed_.is_used(run)) continue;
     Rank most = 0;
-    for (std::size_t i = viewed_.end_of(page); i-- != viewed_.begin_of(page);) {
+    for (std::size_t i = viewed_.begin_of(run); i < viewed_.end_of(run); ++i) {
       const BrickIndex b{std::uint32_t(i)};
       if (viewed_[b].rank > top && viewed_[b].is_loose != 0) refine(b, ranking_->of_brick(b));
       most = std::max<Rank>(most, viewed_[b].rank);
       top = std::max(top, most);
     }
-    if (most == 0) viewed_.release(page);
+    if (most == 0) viewed_.release(run);
   }
   const bool is_rest = wanted_count_ < sent_count_ / kRest;
   band_ = top == 0 ? Rank(0) : ranking_->band_below(top, is_rest, band_width_);
@@ -211,8 +235,14 @@ StreamPlan::Remaining StreamPlan::remaining() const {
   Rank top = 0;
   unsigned error_step = 0;
   float pixels = 0;
-  for (std::size_t page = 0; page < viewed_.pages(); ++page) {
-    for (std::size_t i = viewed_.begin_of(page); viewed_.is_used(page) && i < viewed_.end_of(page); ++i) {
+  for (std::size_t run = 0; run < viewed_runs_.size(); ++run) {
+    if (viewed_runs_[run].rank != 0) {
+      top = std::max(top, viewed_runs_[run].rank);
+      pixels = std::max(pixels, float(viewed_runs_[run].pixels));
+      error_step = std::max<unsigned>(error_step, relevant_->run_bound(run).error_step);
+      continue;
+    }
+    for (std::size_t i = viewed_.begin_of(run); viewed_.is_used(run) && i < viewed_.end_of(run); ++i) {
       const Viewed& viewed = viewed_[i];
       if (viewed.rank == 0) continue;
       top = std::max<Rank>(top, viewed.rank);

@@ -100,7 +100,8 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
 
 std::size_t StreamPlan::memory_bytes() const {
   std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
-  bytes += sent_in_.memory_bytes() + viewed_.memory_bytes() + pending_.memory_bytes() + supercube_bounds_.memory_bytes();
+  bytes += sent_in_.memory_bytes() + viewed_.memory_bytes() + viewed_runs_.capacity() * sizeof(ViewedRun) + pending_.memory_bytes() +
+           supercube_bounds_.memory_bytes();
   if (ranking_) bytes += ranking_->memory_bytes();
   for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
   return bytes;

@@ -17,8 +17,8 @@ namespace {
 class BrickBounds : public ::testing::TestWithParam<unsigned> {
  protected:
   void expect_bounds(const Ranking& ranking) {
-    constexpr std::size_t kBlock = Ranking::BrickBounds::kBlock;
-    const Ranking::BrickBounds bounds(ranking);
+    constexpr std::size_t kBlock = Ranking::BlockBounds::kBlock;
+    const Ranking::BlockBounds bounds(ranking, Ranking::BlockBounds::Of::bricks);
     const RelevantUpdates& relevant = volume_.relevant();
     const std::size_t bricks = volume_.set().bricks().size();
     std::vector<Ranking::Rank> ranks;
@@ -84,6 +84,55 @@ TEST_P(BrickBounds, AreNeverTooLowWhateverTheCamera) {
     for (const double fov : {1e-306, 1e-100, 1e-37, 1e-30, 30.0, 179.999999}) {
       lod.camera->fov = fov;
       if (check_lod(lod)) expect_bounds(Ranking(volume_, lod));
+    }
+  }
+}
+
+// Of bricks of several scales; more of them than a block of bounds holds.
+TEST_P(BrickBounds, OfRunsAreNoLowerThanThoseOfTheirBricks) {
+  constexpr std::size_t kRun = RelevantUpdates::kRun, kBlock = Ranking::BlockBounds::kBlock;
+  const auto trial = testing::trial_of_seed(GetParam(), std::array<testing::Dims, 2>{{{9000, 3, 2}, {150, 5, 140}}});
+  const IntervalVolume volume = testing::build(GetParam() % 3 != 0 ? testing::stretched(trial.volume) : trial.volume, trial.options);
+  const RelevantUpdates& relevant = volume.relevant();
+  const std::size_t bricks = volume.set().bricks().size();
+  std::vector<RelevantUpdates::RunBound> runs((bricks + kRun - 1) / kRun);
+  for (std::size_t b = 0; b < bricks; ++b) runs[b / kRun].add(relevant.bound(BrickIndex(std::uint32_t(b))));
+  ASSERT_GT(runs.size(), 2u);
+  for (int trials = 0; trials < 60; ++trials) {
+    const Lod lod = testing::random_lod(volume.description().grid, random_);
+    const auto ahead = testing::random_ahead(lod, volume.description().grid, random_);
+    const Ranking ranking(volume, volume.relevant(), lod, nullptr, ahead ? &*ahead : nullptr);
+    const Ranking::BlockBounds bounds(ranking, Ranking::BlockBounds::Of::runs), of_bricks(ranking, Ranking::BlockBounds::Of::bricks);
+    for (std::size_t begin = 0; begin < runs.size(); begin += kBlock) {
+      std::array<Ranking::Left, kBlock> left{};
+      std::uint32_t which = 0;
+      for (std::size_t k = 0; k < std::min(kBlock, runs.size() - begin); ++k) {
+        const RelevantUpdates::RunBound known = relevant.run_bound(begin + k);
+        ASSERT_EQ(known.updates, runs[begin + k].updates);
+        ASSERT_EQ(known.error_step, runs[begin + k].error_step);
+        ASSERT_EQ(known.slope, runs[begin + k].slope);
+        ASSERT_EQ(known.object_error, runs[begin + k].object_error);
+        left[k] = {known.error_step, known.object_error, known.slope};
+        which |= std::uint32_t(1) << k;
+      }
+      const auto bound = bounds(begin / kBlock, which, left);
+      for (const std::size_t k : set_bits<std::size_t>(which)) {
+        const std::size_t first = (begin + k) * kRun, end = std::min(bricks, first + kRun);
+        for (std::size_t b = first; b < end; ++b) {
+          const RelevantUpdates::Bound all = relevant.bound(BrickIndex(std::uint32_t(b)));
+          std::array<Ranking::Left, kBlock> of_brick{};
+          of_brick[b % kBlock] = {all.error_step, all.object_error, all.slope};
+          const auto brick = of_bricks(b / kBlock, std::uint32_t(1) << b % kBlock, of_brick);
+          const Ranking::Brick exact = ranking.of_brick(BrickIndex(std::uint32_t(b)));
+          if (ranking.has_camera()) {
+            ASSERT_GE(bound.pixels[k], exact.pixels(all.object_error));
+          }
+          ASSERT_TRUE(bound.rank[k] != 0 || exact.bound() == 0);
+          // Brick::bound() is higher for bricks that are near, and beside the picture. Both are rounded up.
+          if (of_bricks.is_exact() && ranking.has_camera()) continue;
+          ASSERT_GE(bound.rank[k] + 1, brick.rank[b % kBlock]);
+        }
+      }
     }
   }
 }
