@@ -135,8 +135,8 @@ class Ranking {
       s.refine();
       return s;
     }
-    // The same in half of the time, with ranks that may be too high, until it is refined: as if all of the supercube were
-    // seen.
+    // The same in half of the time, with ranks that may be too high, until it is refined: as if all of the supercube
+    // were seen.
     [[nodiscard]] Supercube rough(const BrickNeeds& needs, SupercubeIndex supercube, SupercubeKey key) const;
     // With a camera: no less than the deviation in pixels of any update here whose object error is no larger, or 2^100.
     // Above 0.
@@ -155,9 +155,9 @@ class Ranking {
   };
   [[nodiscard]] Brick of_brick(BrickIndex brick) const;
 
-  // Bounds of bricks, or of runs of them (RelevantUpdates::kRun), by block: no lower than the rank of any update there, in
-  // a fraction of the time that of_brick() takes. What is inside the picture and far away is taken for as near as its
-  // nearest point; what is hidden, for seen.
+  // Bounds of bricks, or of runs of them (RelevantUpdates::kRun), by block: no lower than the rank of any update there,
+  // in a fraction of the time that of_brick() takes. What is inside the picture and far away is taken for as near as
+  // its nearest point; what is hidden, for seen.
   class BlockBounds {
    public:
     enum class Of { bricks, runs };

@@ -55,8 +55,8 @@ class RelevantUpdates {
     std::uint8_t error_step = 0, slope = 0;
     float object_error = 0;
   };
-  // The same of a run, kRun bricks with consecutive numbers from kRun times its number on: the most of each, and how many
-  // updates there are at most.
+  // The same of a run, kRun bricks with consecutive numbers from kRun times its number on: the most of each, and how
+  // many updates there are at most.
   static constexpr std::size_t kRun = 64;
   struct RunBound {
     std::uint32_t updates = 0;

@@ -70,20 +70,22 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   viewed_ = decltype(viewed_)(set.bricks().size());
   viewed_runs_.clear();
   wanted_count_ = pending_bricks_ = 0;
-  for (BrickIndex b{0}; b < viewed_.size(); ++b) {
-    const unsigned sent = sent_in_.get(b);
-    const auto found = pending_.find(b);
-    if (sent == 0 && !found) continue;
-    const RelevantUpdates::Bound all = relevant_->bound(b);
-    Pending pending = found ? bits_as<Pending>(*found) : first_pending(all);
-    unsigned unsent = all.updates;
-    if (found) {
-      const RelevantUpdates::Bound added = relevant_->bound(b, new_parts);
-      pending.raise_to({added.error_step, 0, added.slope, 0}, added.object_error);
-      unsent = std::min(unsent, unsigned(pending.unsent) + added.updates);
+  for (std::size_t begin = 0; begin < viewed_.size(); begin += 64) {
+    for (const std::size_t k : set_bits<std::size_t>(sent_in_.used(begin) | pending_.used(begin))) {
+      const BrickIndex b{std::uint32_t(begin + k)};
+      const unsigned sent = sent_in_.get(b);
+      const auto found = pending_.find(b);
+      const RelevantUpdates::Bound all = relevant_->bound(b);
+      Pending pending = found ? bits_as<Pending>(*found) : first_pending(all);
+      unsigned unsent = all.updates;
+      if (found) {
+        const RelevantUpdates::Bound added = relevant_->bound(b, new_parts);
+        pending.raise_to({added.error_step, 0, added.slope, 0}, added.object_error);
+        unsent = std::min(unsent, unsigned(pending.unsent) + added.updates);
+      }
+      pending.set_unsent(std::min(unsent, set.updates(b) - sent));
+      keep(b, pending);
     }
-    pending.set_unsent(std::min(unsent, set.updates(b) - sent));
-    keep(b, pending);
   }
 }
 

@@ -6,9 +6,9 @@
 // sent region by region, each after its missing ancestors: neighbours share names and code tables, which makes the
 // batch smaller. Bounds of the unsent updates are kept for each brick and supercube that something was sent of (those
 // of others are of all that is relevant), and a brick is visited only if its bound is in the band. Bricks are ranked
-// only where their run may be in the band, too: a new view costs O(bricks) / 64, and then the work for what it sends. What a brick needs may be found
-// only then (relevant_updates.h). Bounds outlive ranges, too: where one end of a range moves, they are raised to those of its new surface, and only
-// bricks that this one crosses are looked at again.
+// only where their run may be in the band, too: a new view costs O(bricks / 64), and then the work for what it sends.
+// What a brick needs may be found only then (relevant_updates.h). Bounds outlive ranges, too: where one end of a range
+// moves, they are raised to those of its new surface, and only bricks that this one crosses are looked at again.
 #pragma once
 
 #include <algorithm>
@@ -54,10 +54,10 @@ inline constexpr std::size_t kFirstPayloadOfRange = 128 << 10;
 }
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: a byte for each two
-// bricks; six bytes for each of 64 bricks of which one was ranked and has something that is wanted and not sent; ten for
-// each brick that something was sent of; for each 32 updates of which one was sent four bytes and a little more (eight with
-// max_updates, four more for each channel); for each supercube whose unsent updates matter less than all of it two
-// bytes, or three if distances are known.
+// bricks; six bytes for each of 64 bricks of which one was ranked and has something that is wanted and not sent; ten
+// for each brick that something was sent of; for each 32 updates of which one was sent four bytes and a little more
+// (eight with max_updates, four more for each channel); for each supercube whose unsent updates matter less than all of
+// it two bytes, or three if distances are known.
 class StreamPlan {
  public:
   static constexpr std::uint32_t kMostVisits = 1 << 19;
@@ -99,7 +99,8 @@ class StreamPlan {
   void set_room(std::uint64_t updates) { room_ = updates; }
 
   // Replaces the ranges that are looked at: updates that are not relevant to them are not sent, nor any twice.
-  // relevant: of this volume. Before the set_lod() of the same view. O(bricks).
+  // relevant: of this volume. Before the set_lod() of the same view. O(bricks / 64), and O(bricks that something was
+  // sent of).
   void set_relevant(const std::shared_ptr<const RelevantUpdates>& relevant) { set_relevant(relevant, relevant->shown()); }
   // The same for a client that shows other ranges: batches are coded for those.
   void set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown);
@@ -112,8 +113,8 @@ class StreamPlan {
   bool resume(std::size_t channel, SupercubeKey key, std::uint64_t slots);
 
   // Replaces the level of detail; check_lod(lod) must hold. hidden: a depth map of its camera; what lies behind is sent
-  // last. ahead: where the camera will be soon; another order of the same updates. O(bricks). The search of an equal
-  // level of detail goes on.
+  // last. ahead: where the camera will be soon; another order of the same updates. O(bricks / 64). The search of an
+  // equal level of detail goes on.
   void set_lod(const Lod& lod, const DepthMap* hidden = nullptr, const Camera* ahead = nullptr);
 
   // The search for what is within max_updates, which is to be done before the next batch; nullptr: none. Another thread

@@ -56,6 +56,11 @@ class SparseArray {
     const std::uint64_t third = load<T>(at) & (0 - (used >> 2 & 1));
     return (first | second << 32) >> shift | third << 1 << (63 - shift);
   }
+  // Which of 64 elements from i on, a multiple of 64, are used; a bit each.
+  [[nodiscard]] std::uint64_t used(std::size_t i) const {
+    const Block& block = pages_[i / kPage];
+    return block ? load<std::uint64_t>(block.get() + i % kPage / 64 * 8) : 0;
+  }
   // Whether an element in [begin, end) is used.
   [[nodiscard]] bool uses_any(std::size_t begin, std::size_t end) const {
     for (std::size_t i = begin; i < end; i = (i / 64 + 1) * 64) {

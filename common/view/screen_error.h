@@ -49,8 +49,8 @@ class ScreenError {
     Vec3 middle_{};
     double unit_ = 1;
   };
-  // Upper bounds on pixels_per_unit() and seen_share() of the regions of a block, little above them for regions that are
-  // in the picture and far away. In floats: at most 2^100.
+  // Upper bounds on pixels_per_unit() and seen_share() of the regions of a block, little above them for regions that
+  // are in the picture and far away. In floats: at most 2^100.
   struct Bounds {
     std::array<float, Regions::kBlock> pixels{}, share{};
   };

@@ -80,6 +80,8 @@ TEST_P(SparseArrays, TellWhetherAnyOfSomeIsUsed) {
     bool expected = false;
     for (std::size_t i = begin; i < end; ++i) expected = expected || model[i];
     EXPECT_EQ(array.uses_any(begin, end), expected) << begin << " to " << end;
+    const std::uint64_t used = array.used(begin / 64 * 64);
+    EXPECT_EQ((used >> (begin % 64) & 1) != 0, array.uses_any(begin, begin + 1)) << begin;
   }
 }
 
