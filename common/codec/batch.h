@@ -105,7 +105,7 @@ struct BatchModels {
   bool is_plain = false;
   FlagModel flags;
   ValueModels values;
-  explicit BatchModels(bool plain) : is_plain(plain) {}
+  explicit BatchModels(bool plain = false) : is_plain(plain) {}
 
   template <class Coder>
   bool code_flag(Coder& coder, int cls, int near, bool value = false) {

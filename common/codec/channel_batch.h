@@ -8,8 +8,8 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
 #include "common/codec/batch.h"
 #include "common/codec/range_coder.h"
@@ -35,9 +35,8 @@ template <class Coder, class Values>
 bool code_channel(Coder& coder, bool is_plain, const Channel& channel, const Domain& domain, std::span<const SlotGroup> groups, Values& values) {
   constexpr bool kDecodes = std::is_same_v<Coder, RangeDecoder>;
   const std::size_t components = channel.components.size();
-  std::vector<BatchModels> models;  // by component
-  models.reserve(components);
-  while (models.size() < components) models.emplace_back(is_plain);
+  const auto models = std::make_unique<std::array<BatchModels, kMaxComponents>>();
+  for (BatchModels& model : *models) model.is_plain = is_plain;
   bool is_valid = true;
   std::array<VertexKeys, kMaxComponents> around{};
   // Gathers the keys at a diamond's vertices.
@@ -72,7 +71,7 @@ bool code_channel(Coder& coder, bool is_plain, const Channel& channel, const Dom
             const ChannelComponent& component = channel.components[c];
             const ValueKey last = component.format.last;
             const PredictedValue predicted = predict_value(cls, scale, around[c], component.weights, last);
-            keys[c] = models[c].code_key(coder, cls, scale, predicted, last, keys[c]);
+            keys[c] = (*models)[c].code_key(coder, cls, scale, predicted, last, keys[c]);
             is_valid = is_valid && keys[c] <= last;
           }
           if constexpr (kDecodes) {

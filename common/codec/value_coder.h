@@ -69,11 +69,12 @@ class ValueModels {
   // Of the residuals of diamonds with this level of activity.
   SignedModel& of(int cls, int scale, std::uint8_t level) {
     auto& model = of_[std::size_t(cls)][scale == 0][level];
-    if (!model) model.emplace();
+    if (!model) make(model);
     return *model;
   }
 
  private:
+  [[gnu::noinline]] static void make(std::optional<SignedModel>& model) { model.emplace(); }  // seldom
   std::array<std::array<std::array<std::optional<SignedModel>, kActivityLevels>, 2>, 3> of_;  // by class, whether the scale is 0, activity
 };
 
