@@ -75,7 +75,8 @@ class ValueModels {
 
  private:
   [[gnu::noinline]] static void make(std::optional<SignedModel>& model) { model.emplace(); }  // seldom
-  std::array<std::array<std::array<std::optional<SignedModel>, kActivityLevels>, 2>, 3> of_;  // by class, whether the scale is 0, activity
+  // By class, whether the scale is 0, activity.
+  std::array<std::array<std::array<std::optional<SignedModel>, kActivityLevels>, 2>, 3> of_;
 };
 
 }  // namespace intervale

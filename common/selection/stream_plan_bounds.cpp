@@ -215,7 +215,8 @@ void StreamPlan::begin_band() {
   band_visits_ = band_updates_ = 0;
   next_brick_ = std::uint32_t(viewed_.size());
   Rank top = 0;
-  for (std::size_t run = 0; run < viewed_runs_.size(); ++run) {  // coarse ones come first and rank high, so that few others are ranked
+  // Coarse runs come first and rank high, so that the bricks of few others are ranked.
+  for (std::size_t run = 0; run < viewed_runs_.size(); ++run) {
     if (viewed_runs_[run].rank > top) rank_bricks(run);
     if (!viewed_.is_used(run)) continue;
     Rank most = 0;
