@@ -1,5 +1,6 @@
 #include "common/parallel/all_cores.h"
 
+#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
@@ -13,21 +14,16 @@ namespace intervale {
 
 void on_all_cores(std::size_t count, const std::function<void(std::size_t)>& piece) { tbb::parallel_for(std::size_t(0), count, piece); }
 
+void on_all_cores_in_runs(std::size_t count, const std::function<void(std::size_t begin, std::size_t end)>& run) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count), [&run](const auto& part) { run(part.begin(), part.end()); });
+}
+
 ParallelFor on_all_cores_until(std::stop_token stop) {
   return [stop = std::move(stop)](std::size_t count, const std::function<void(std::size_t)>& piece) {
     on_all_cores(count, [&](std::size_t i) {
       if (stop.stop_requested()) throw Stopped();
       piece(i);
     });
-  };
-}
-
-ParallelFor serial_until(std::stop_token stop) {
-  return [stop = std::move(stop)](std::size_t count, const std::function<void(std::size_t)>& piece) {
-    for (std::size_t i = 0; i < count; ++i) {
-      if (stop.stop_requested()) throw Stopped();
-      piece(i);
-    }
   };
 }
 

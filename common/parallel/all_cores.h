@@ -14,13 +14,15 @@ namespace intervale {
 // A ParallelFor (common/util/parallel.h).
 void on_all_cores(std::size_t count, const std::function<void(std::size_t)>& piece);
 
+// The same in runs: calls run(begin, end) for parts of [0, count) that cover it, some for each core.
+void on_all_cores_in_runs(std::size_t count, const std::function<void(std::size_t begin, std::size_t end)>& run);
+
 // Thrown by what was stopped.
 struct Stopped : std::exception {
   [[nodiscard]] const char* what() const noexcept override { return "stopped"; }
 };
-// on_all_cores(), or serial(), that throws Stopped, instead of beginning a piece, once `stop` is requested.
+// on_all_cores() that throws Stopped, instead of beginning a piece, once `stop` is requested.
 ParallelFor on_all_cores_until(std::stop_token stop);
-ParallelFor serial_until(std::stop_token stop);
 
 // Runs `work`; what it runs on all cores gets those that others do not want.
 void on_spare_cores(const std::function<void()>& work);

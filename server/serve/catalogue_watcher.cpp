@@ -75,8 +75,7 @@ Read read(const fs::path& path, const std::string& name, const Memory& memory, s
 
 }  // namespace
 
-Result<Catalogue> CatalogueWatcher::load(std::stop_token stop) {
-  const ParallelFor parallel = serial_until(std::move(stop));
+Result<Catalogue> CatalogueWatcher::load(const ParallelFor& parallel) {
   for (const fs::path& input : inputs_) {
     std::error_code ignored;
     if (fs::is_directory(input, ignored)) {
@@ -121,8 +120,7 @@ Catalogue::Volume CatalogueWatcher::load_coarse(const fs::path& path, const Cata
   return counted(memory_, Memory::Holder::datasets, std::move(*volume));
 }
 
-Result<std::optional<Catalogue>> CatalogueWatcher::complete(std::stop_token stop) {
-  const ParallelFor parallel = serial_until(std::move(stop));
+Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& parallel) {
   const fs::path* path = nullptr;
   Catalogue::Volume* least = nullptr;
   File* in_folder = nullptr;  // that has it
@@ -143,6 +141,7 @@ Result<std::optional<Catalogue>> CatalogueWatcher::complete(std::stop_token stop
     least->reset();
     poll_file(*path, *in_folder, parallel);
   }
+  if (*least && (*least)->is_whole()) spdlog::info("{}: all scales are loaded", path->string());
   return std::optional(*catalogue(false));
 }
 
@@ -195,8 +194,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
   }
 }
 
-std::optional<Catalogue> CatalogueWatcher::poll(std::stop_token stop) {
-  const ParallelFor parallel = serial_until(std::move(stop));
+std::optional<Catalogue> CatalogueWatcher::poll(const ParallelFor& parallel) {
   bool changed = [&] {
     const ScratchMemory::Scope scope(memory_.data_memory());
     return remote_.poll(parallel);

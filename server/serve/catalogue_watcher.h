@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,21 +32,21 @@ class CatalogueWatcher {
 
   // The catalogue at the start. A file in a folder that is damaged, or whose name is invalid, is logged and skipped.
   // A named file or URL with such a fault is an error; so are two data sets of one name, and a folder that cannot be read.
-  // Once stop is requested, load() and poll() give up what they read within milliseconds, and throw Stopped.
-  // Of large files of every range, only the coarse scales are in it (coarse_scales.h).
-  Result<Catalogue> load(std::stop_token stop = {});
+  // `parallel` may stop load(), complete() and poll(): they throw what it throws. Of large files of every range, only the
+  // coarse scales are in it (coarse_scales.h).
+  Result<Catalogue> load(const ParallelFor& parallel = serial);
 
   // After load(): reads on, of the data set that has fewest updates of those that are not whole: as far as the next scale,
   // at last all of it. Returns the new catalogue; nullopt once all are whole. A named file that turns out to be damaged is
   // an error; such a file in a folder is logged, and leaves the catalogue.
-  Result<std::optional<Catalogue>> complete(std::stop_token stop = {});
+  Result<std::optional<Catalogue>> complete(const ParallelFor& parallel = serial);
 
   // Reads the folders again. Returns the new catalogue, or nullopt if nothing changed. A new or changed file is
   // loaded once it is the same in two consecutive polls, so that no file is read while it is written. If a file is
   // damaged or cannot be read, which is logged once, its last good contents stay; a file that cannot be read is tried
   // again in every poll. A file that was removed leaves the catalogue. Of two data sets of one name, the one whose
   // file comes first counts, and URLs come last.
-  std::optional<Catalogue> poll(std::stop_token stop = {});
+  std::optional<Catalogue> poll(const ParallelFor& parallel = serial);
 
  private:
   struct File {

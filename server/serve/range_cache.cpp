@@ -1,14 +1,12 @@
 #include "server/serve/range_cache.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <exception>
 #include <utility>
 
 #include "common/parallel/all_cores.h"
 #include "server/scratch/scratch_memory.h"
-#include "server/serve/thread_time.h"
 
 namespace intervale {
 namespace {
@@ -16,55 +14,13 @@ namespace {
 // A hand that drags a range asks again soon: the field that was restored for it is kept so long.
 constexpr std::chrono::seconds kFinderKept(5);
 
-// Rests after each piece of work while sessions wait for a worker, so that they have nine tenths of each core. Those of
-// heavy accounts do not count: their workers have low priority, too, and must not put off what others wait for. Low
-// priority alone does not do: where the system has put two workers on one core, what measures keeps the other for half a
-// second. time: of the piece, on this thread.
-void rest_after(FairScheduler::Time time, const FairScheduler& scheduler, const std::stop_token& stop) {
-  constexpr FairScheduler::Time kSlice = std::chrono::milliseconds(1), kRest = std::chrono::milliseconds(2);
-  thread_local FairScheduler::Time worked{0};
-  worked += time;
-  if (worked < kSlice) return;
-  const auto until = FairScheduler::Clock::now() + 9 * std::exchange(worked, FairScheduler::Time(0));
-  while (scheduler.has_waiters(FairScheduler::Lane::usual) && !stop.stop_requested() && FairScheduler::Clock::now() < until)
-    std::this_thread::sleep_for(kRest);
-}
-
 }  // namespace
-
-// The cores that find something for a thread of the cache, and their processor time.
-class RangeCache::Cores {
- public:
-  // rests: see rest_after(). On the thread that calls the others, too.
-  Cores(const std::stop_token& stop, const FairScheduler& scheduler, bool rests)
-      : all_([this, stop, &scheduler, rests, parallel = on_all_cores_until(stop)](std::size_t count, const std::function<void(std::size_t)>& piece) {
-          parallel(count, [&](std::size_t i) {
-            const FairScheduler::Time since = thread_time();
-            piece(i);
-            const FairScheduler::Time time = thread_time() - since;
-            if (std::this_thread::get_id() != owner_) others_ += time.count();
-            if (rests) rest_after(time, scheduler, stop);
-          });
-        }) {}
-  [[nodiscard]] const ParallelFor& all() const { return all_; }
-  // Since the last call.
-  FairScheduler::Time take_time() {
-    const FairScheduler::Time own = thread_time();
-    return own - std::exchange(own_, own) + FairScheduler::Time(others_.exchange(0));
-  }
-
- private:
-  const std::thread::id owner_ = std::this_thread::get_id();
-  std::atomic<FairScheduler::Time::rep> others_ = 0;
-  FairScheduler::Time own_ = thread_time();
-  ParallelFor all_;
-};
 
 RangeCache::RangeCache(Memory& memory, FairScheduler& scheduler, Find find, std::size_t most_bytes)
     : memory_(memory), scheduler_(scheduler), find_(std::move(find)), most_bytes_(most_bytes) {
   threads_.reserve(2);
-  threads_.emplace_back([this](const std::stop_token& stop) { serve(soon_, false, stop); });
-  threads_.emplace_back([this](const std::stop_token& stop) { serve(measuring_, true, stop); });
+  threads_.emplace_back([this](const std::stop_token& stop) { serve(soon_, SpareCores::Rests::no, stop); });
+  threads_.emplace_back([this](const std::stop_token& stop) { serve(measuring_, SpareCores::Rests::while_sessions_wait, stop); });
 }
 
 // The same, whose memory counts as long as anybody has it: it grows.
@@ -286,7 +242,7 @@ std::vector<RangeCache::Request> RangeCache::take_complete(const Volume& volume,
 }
 
 // Finds the next part that a request lacks, or puts its parts together.
-void RangeCache::work_for(Request request, PartFinder& finder, Cores& cores) {
+void RangeCache::work_for(Request request, PartFinder& finder, SpareCores& cores) {
   std::vector<Request> done;
   std::unique_lock lock(mutex_);
   const auto* const lacking = request->first_lacking();
@@ -311,9 +267,9 @@ void RangeCache::work_for(Request request, PartFinder& finder, Cores& cores) {
   for (const Request& one : done) one->on_ready_();
 }
 
-void RangeCache::serve(Queue& queue, bool rests, const std::stop_token& stop) {
+void RangeCache::serve(Queue& queue, SpareCores::Rests rests, const std::stop_token& stop) {
   yield_to_other_threads();
-  Cores cores(stop, scheduler_, rests);
+  SpareCores cores(stop, scheduler_, rests, memory_.data_memory());
   Volume volume;
   std::optional<PartFinder> finder;  // of `volume`; both while there is something to find, and a little longer
   std::unique_lock lock(mutex_);

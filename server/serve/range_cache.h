@@ -26,6 +26,7 @@
 #include "protocol/session/session_worker.h"
 #include "server/serve/fair_scheduler.h"
 #include "server/serve/memory.h"
+#include "server/serve/spare_cores.h"
 
 namespace intervale {
 
@@ -107,7 +108,6 @@ class RangeCache {
     std::weak_ptr<const RelevantUpdates> relevant;
   };
   using Request = std::shared_ptr<Answer>;
-  class Cores;
   struct Queue {
     std::vector<std::weak_ptr<Answer>> requests;  // the newest is the last
     std::condition_variable_any has_requests;
@@ -120,10 +120,10 @@ class RangeCache {
   [[nodiscard]] Relevant counted(Relevant relevant) const;
   [[nodiscard]] Relevant get_part(PartFinder& finder, const Volume& volume, const RangePart& part);
   [[nodiscard]] Entries take_old(const Volume& volume, const RangePart& found);
-  void serve(Queue& queue, bool rests, const std::stop_token& stop);
+  void serve(Queue& queue, SpareCores::Rests rests, const std::stop_token& stop);
   [[nodiscard]] Request next_request(Queue& queue) const;
   [[nodiscard]] std::vector<Request> take_complete(const Volume& volume, const RangePart& part, const Relevant& relevant);
-  void work_for(Request request, PartFinder& finder, Cores& cores);
+  void work_for(Request request, PartFinder& finder, SpareCores& cores);
   void answer(Answer& request);
   void find_now(Answer& request);
 

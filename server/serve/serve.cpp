@@ -24,6 +24,7 @@
 #include "common/parallel/all_cores.h"
 #include "server/serve/catalogue_watcher.h"
 #include "server/serve/server.h"
+#include "server/serve/spare_cores.h"
 
 namespace intervale {
 namespace {
@@ -85,7 +86,7 @@ class Loading {
         server_(server),
         where_(std::move(where)),
         failed_(std::move(failed)),
-        thread_([this](const auto& stop) { run(stop); }) {}
+        thread_([this](const std::stop_token& stop) { on_spare_cores([&] { run(stop); }); }) {}
   void poll_now() {
     const std::lock_guard lock(mutex_);
     wanted_ = true;
@@ -96,17 +97,19 @@ class Loading {
  private:
   void run(const std::stop_token& stop) {
     try {
-      auto catalogue = watcher_.load(stop);
+      SpareCores cores(stop, server_.scheduler(), SpareCores::Rests::while_sessions_wait, server_.memory().data_memory());
+      const ParallelFor& parallel = cores.all();
+      auto catalogue = watcher_.load(parallel);
       if (!catalogue) return failed_(catalogue.error());
       const std::size_t count = catalogue->volumes().size();
       server_.offer(std::move(*catalogue));
       spdlog::info("serving {} data set{}{}", count, count == 1 ? "" : "s", where_);
-      for (auto more = watcher_.complete(stop); !more || *more; more = watcher_.complete(stop)) {
+      for (auto more = watcher_.complete(parallel); !more || *more; more = watcher_.complete(parallel)) {
         if (!more) return failed_(more.error());
         server_.offer(std::move(**more));
       }
       for (wait(stop); !stop.stop_requested(); wait(stop)) {
-        if (auto changed = watcher_.poll(stop)) server_.offer(std::move(*changed));
+        if (auto changed = watcher_.poll(parallel)) server_.offer(std::move(*changed));
       }
     } catch (const Stopped&) {
     } catch (const std::exception& exception) {

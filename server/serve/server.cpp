@@ -115,6 +115,7 @@ void Server::reload() {
 }
 
 Memory& Server::memory() { return running_->context.memory; }
+const FairScheduler& Server::scheduler() const { return running_->context.scheduler; }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }
 

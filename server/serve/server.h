@@ -12,6 +12,8 @@
 
 namespace intervale {
 
+class FairScheduler;
+
 class Server {
  public:
   // Listens, and serves on its own threads. Not ready (503) until offer() is called. Failures: an address that is
@@ -27,7 +29,9 @@ class Server {
   // ones stay in use. One thread at a time.
   void reload();
 
-  [[nodiscard]] Memory& memory();  // what the server holds; as long as the server
+  // As long as the server.
+  [[nodiscard]] Memory& memory();                        // what it holds
+  [[nodiscard]] const FairScheduler& scheduler() const;  // of its sessions
   [[nodiscard]] std::uint16_t port() const;
   [[nodiscard]] std::uint16_t metrics_port() const;  // port() if /metrics has no port of its own
   [[nodiscard]] std::string url() const;             // "http://127.0.0.1:8080/"

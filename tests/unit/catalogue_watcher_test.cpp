@@ -211,9 +211,9 @@ TEST_F(CatalogueWatcherTest, ReadsNothingMoreOnceItIsStopped) {
   save(folder / "a.ivm", -0.3);
   std::stop_source stopped;
   stopped.request_stop();
-  EXPECT_THROW((void)watcher.load(stopped.get_token()), Stopped);
+  EXPECT_THROW((void)watcher.load(on_all_cores_until(stopped.get_token())), Stopped);
   EXPECT_FALSE(watcher.poll());
-  EXPECT_THROW((void)watcher.poll(stopped.get_token()), Stopped);
+  EXPECT_THROW((void)watcher.poll(on_all_cores_until(stopped.get_token())), Stopped);
   EXPECT_TRUE(watcher.poll()) << "nothing was lost";
 }
 
