@@ -97,7 +97,7 @@ Result<IntervalVolume> of_every_range(ValueVolume::Parts values, const ParallelF
   parts.keys = std::move(values.keys);
   parts.left = std::move(values.left);
   parts.finer = values.finer;
-  auto made = IntervalVolume::assemble(std::move(parts));
+  auto made = IntervalVolume::assemble(std::move(parts), parallel);
   if (!made) return made;
   (void)made->bounds(parallel);  // whoever asks for a range first would wait for them
   if (auto ok = made->set_channels(std::move(values.description.channels), std::move(values.channel_keys)); !ok) return tl::unexpected(ok.error());

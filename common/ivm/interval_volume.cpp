@@ -59,7 +59,7 @@ std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const st
 
 }  // namespace
 
-IntervalVolume::IntervalVolume(Parts parts)
+IntervalVolume::IntervalVolume(Parts parts, const BrickRegions& regions, const ParallelFor& parallel)
     : description_(std::move(parts.description)),
       domain_(description_.grid.dims),
       set_(std::move(parts.set)),
@@ -67,13 +67,14 @@ IntervalVolume::IntervalVolume(Parts parts)
       steps_(std::move(parts.steps)),
       error_steps_(std::move(parts.error_steps)),
       left_(std::move(parts.left)),
-      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, relevant_slots(*this, left_), parts.surface),
-      brick_regions_(description_.grid, regions_of_bricks(domain_, set_)),
-      run_regions_(description_.grid, regions_of_runs(regions_of_bricks(domain_, set_))),
+      relevant_(description_.grid, set_, {steps_, error_steps_}, ShownRanges{description_.whole()}, relevant_slots(*this, left_), parts.surface,
+                parallel),
+      brick_regions_(description_.grid, regions),
+      run_regions_(description_.grid, regions_of_runs(regions)),
       bounds_(std::make_shared<LazyBounds>()),
       statistics_(std::move(parts.statistics)) {}
 
-Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
+Result<IntervalVolume> IntervalVolume::assemble(Parts parts, const ParallelFor& parallel) {
   const Description& d = parts.description;
   if (auto ok = check_description(d); !ok) return tl::unexpected(ok.error());
   if (parts.keys.size() != parts.set.size() || parts.steps.size() != parts.set.size() || parts.surface.to_distance.size() != parts.set.supercubes() ||
@@ -93,14 +94,22 @@ Result<IntervalVolume> IntervalVolume::assemble(Parts parts) {
   for (const SupercubeSet::Brick& brick : parts.set.bricks()) {
     if (scale_of_key(brick.key) >= levels) return fail("a brick is coarser than the box");
   }
-  for (const std::uint16_t step : parts.steps) {
-    if (step >= parts.error_steps.size()) return fail("an update's error is out of range");
-  }
-  for (std::size_t i = 0; i < parts.keys.size(); ++i) {
-    if (parts.keys[i] > d.format.last) return fail("an update's value is out of range");
-  }
+  std::atomic<bool> has_wrong_error = false, has_wrong_value = false;
+  parallel(parts.set.bricks().size(), [&](std::size_t b) {
+    const BrickIndex brick{std::uint32_t(b)};
+    const std::size_t first = parts.set.bricks()[brick].first, end = first + parts.set.updates(brick);
+    bool is_wrong = false;
+    for (std::size_t i = first; i < end; ++i) is_wrong |= parts.steps[i] >= parts.error_steps.size();
+    if (is_wrong) has_wrong_error = true;
+    is_wrong = false;
+    for (std::size_t i = first; i < end; ++i) is_wrong |= parts.keys[i] > d.format.last;
+    if (is_wrong) has_wrong_value = true;
+  });
+  if (has_wrong_error) return fail("an update's error is out of range");
+  if (has_wrong_value) return fail("an update's value is out of range");
   parts.description.updates = std::uint64_t(parts.set.size()) + parts.finer;
-  return IntervalVolume(std::move(parts));
+  const BrickRegions regions = regions_of_bricks(Domain(d.grid.dims), parts.set);
+  return IntervalVolume(std::move(parts), regions, parallel);
 }
 
 const ValueBounds& IntervalVolume::bounds(const ParallelFor& parallel) const {

@@ -46,7 +46,7 @@ class IntervalVolume {
     std::size_t finer = 0;                 // updates of finer scales that are still to come
   };
   // Fails where sizes or ranges of the parts do not match; validate() checks the meaning.
-  static Result<IntervalVolume> assemble(Parts parts);
+  static Result<IntervalVolume> assemble(Parts parts, const ParallelFor& parallel = serial);
 
   [[nodiscard]] const Description& description() const { return description_; }
   [[nodiscard]] const Domain& domain() const { return domain_; }
@@ -88,7 +88,8 @@ class IntervalVolume {
 
  private:
   struct LazyBounds;
-  explicit IntervalVolume(Parts parts);
+  using BrickRegions = std::vector<ScreenError::Region>;
+  IntervalVolume(Parts parts, const BrickRegions& regions, const ParallelFor& parallel);
   Description description_;
   Domain domain_;
   SupercubeSet set_;

@@ -254,7 +254,7 @@ Result<IntervalVolume> decode_ivm(std::span<const std::byte> bytes, std::string 
   auto channels = read_channels(*file, d.grid, parts.set, parallel, faults);
   if (!channels) return tl::unexpected(channels.error());
   parts.left = take_faults(Domain(d.grid.dims), parts.set, faults, d.content_hash);
-  auto volume = IntervalVolume::assemble(std::move(parts));
+  auto volume = IntervalVolume::assemble(std::move(parts), parallel);
   if (!volume) return volume;
   if (auto ok = volume->set_channels(std::move(channels->channels), std::move(channels->keys)); !ok) return tl::unexpected(ok.error());
   return volume;

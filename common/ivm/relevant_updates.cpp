@@ -34,37 +34,55 @@ void RelevantUpdates::bound_runs() {
 }
 
 RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown,
-                                 const std::vector<std::uint64_t>& slots, const SurfaceErrors& surface)
-    : RelevantUpdates(grid, errors, std::move(shown), std::vector<Bound>(set.bricks().size()),
-                      {!surface.slopes.empty(), !surface.distances.empty(),
-                       std::any_of(surface.to_distance.begin(), surface.to_distance.end(), [](ErrorToDistance code) { return code.is_far(); })},
-                      {}) {
-  std::vector<BrickPart::Supercube> needs;
-  for (BrickIndex b{0}; b < bounds_.size(); ++b) {
-    needs.clear();
-    BrickPart::Surface of_updates;
-    set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
-      const std::uint64_t occupancy = set.occupancy()[s];
-      needs.push_back({slots.empty() ? occupancy : slots[s], surface.to_distance[s]});
-      for (const Slot slot : set_bits<Slot>(has_slopes() || has_distances() ? needs.back().slots : 0)) {
-        const UpdateIndex i = set.first(b, s) + count_below(occupancy, slot);
-        if (has_slopes()) of_updates.slopes.push_back(surface.slopes[i]);
-        if (has_distances()) of_updates.distances.push_back(surface.distances[i]);
-      }
-    });
-    const BrickPart& brick = found_->bricks.keep(b, BrickPart(set, b, errors.steps, needs, std::move(of_updates))).value;
+                                 const std::vector<std::uint64_t>& slots, const SurfaceErrors& surface, const ParallelFor& parallel)
+    : RelevantUpdates(
+          grid, set, errors, std::move(shown),
+          {!surface.slopes.empty(), !surface.distances.empty(),
+           std::any_of(surface.to_distance.begin(), surface.to_distance.end(), [](ErrorToDistance code) { return code.is_far(); })},
+          [&](BrickIndex b) {
+            std::vector<BrickPart::Supercube> needs;
+            BrickPart::Surface of_updates;
+            set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
+              const std::uint64_t occupancy = set.occupancy()[s];
+              needs.push_back({slots.empty() ? occupancy : slots[s], surface.to_distance[s]});
+              for (const Slot slot : set_bits<Slot>(needs.back().slots)) {
+                const UpdateIndex i = set.first(b, s) + count_below(occupancy, slot);
+                if (!surface.slopes.empty()) of_updates.slopes.push_back(surface.slopes[i]);
+                if (!surface.distances.empty()) of_updates.distances.push_back(surface.distances[i]);
+              }
+            });
+            return BrickPart(set, b, errors.steps, needs, std::move(of_updates));
+          },
+          parallel) {}
+
+RelevantUpdates::RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown, Known known,
+                                 const FindAny& find, const ParallelFor& parallel)
+    : RelevantUpdates(grid, errors, std::move(shown), std::vector<Bound>(set.bricks().size()), known, {}) {
+  parallel(bounds_.size(), [&](std::size_t i) {
+    const BrickIndex b{std::uint32_t(i)};
+    auto found = find(b);
+    if (!found) return;
+    const BrickPart& brick = found_->bricks.keep(b, std::move(*found)).value;
     found_->bytes += brick.memory_bytes();
-    bounds_[b].updates = std::uint16_t(brick.updates());
-    const int scale = scale_of_key(set.bricks()[b].key);
-    for (std::size_t n = 0; n < needs.size(); ++n) {
-      if (needs[n].slots == 0) continue;
-      const BrickNeeds::Highest highest = BrickNeeds(brick).highest(n);
-      bounds_[b].error_step = std::max(bounds_[b].error_step, highest.error_step);
-      bounds_[b].slope = std::max(bounds_[b].slope, highest.slope);
-      bounds_[b].object_error = std::max(bounds_[b].object_error, object_error(needs[n].to_distance, scale, highest.error_step, highest.distance));
-    }
-  }
+    bounds_[b] = bound_of(set, b, brick);
+  });
   bound_runs();
+}
+
+RelevantUpdates::Bound RelevantUpdates::bound_of(const SupercubeSet& set, BrickIndex b, const BrickPart& brick) const {
+  Bound bound{.updates = std::uint16_t(brick.updates())};
+  const BrickNeeds needs(brick);
+  const int scale = scale_of_key(set.bricks()[b].key);
+  std::size_t n = 0;
+  set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) {
+    const std::size_t number = n++;
+    if (brick.slots(number, set.occupancy()[s]) == 0) return;
+    const BrickNeeds::Highest highest = needs.highest(number);
+    bound.error_step = std::max(bound.error_step, highest.error_step);
+    bound.slope = std::max(bound.slope, highest.slope);
+    bound.object_error = std::max(bound.object_error, object_error(needs.to_distance(number), scale, highest.error_step, highest.distance));
+  });
+  return bound;
 }
 
 const BrickPart& RelevantUpdates::Found::find_now(BrickIndex brick) {
@@ -117,8 +135,8 @@ RelevantUpdates::Bound RelevantUpdates::bound(BrickIndex brick, PartMask parts) 
 }
 
 bool RelevantUpdates::is_found(BrickIndex brick) const {
-  if (parts_.empty()) return found_->bricks.find(brick) != nullptr;
-  return std::all_of(parts_.begin(), parts_.end(), [&](const auto& part) { return part->bounds_[brick].updates == 0 || part->is_found(brick); });
+  if (parts_.empty()) return bounds_[brick].updates == 0 || found_->bricks.find(brick) != nullptr;
+  return std::all_of(parts_.begin(), parts_.end(), [&](const auto& part) { return part->is_found(brick); });
 }
 
 std::size_t RelevantUpdates::memory_bytes() const {

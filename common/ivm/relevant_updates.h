@@ -23,6 +23,7 @@
 #include "common/ivm/distance_codes.h"
 #include "common/patch/description.h"
 #include "common/util/lazy_array.h"
+#include "common/util/parallel.h"
 
 namespace intervale {
 
@@ -44,10 +45,18 @@ struct UpdateErrors {
 // Any thread. Copies share what is found.
 class RelevantUpdates {
  public:
+  // What is known of updates; and whether codes of an ErrorToDistance may be far ones.
+  struct Known {
+    bool slopes = false, distances = false, far = false;
+  };
   // All of it is known. slots: by supercube; empty: all updates of the set. shown: what they are relevant to, one range
   // at least. The set must outlive the constructor only.
   RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown, const std::vector<std::uint64_t>& slots,
-                  const SurfaceErrors& surface);
+                  const SurfaceErrors& surface, const ParallelFor& parallel = serial);
+  // The same, found at once. nullopt: nothing of that brick is relevant.
+  using FindAny = std::function<std::optional<BrickPart>(BrickIndex)>;
+  RelevantUpdates(const Grid& grid, const SupercubeSet& set, const UpdateErrors& errors, ShownRanges shown, Known known, const FindAny& find,
+                  const ParallelFor& parallel);
 
   // Upper bounds over the relevant updates of a brick; all 0 if it has none.
   struct Bound {
@@ -75,10 +84,6 @@ class RelevantUpdates {
   };
   // Finds what a brick needs, on any thread; may be called twice for one brick, with the same result.
   using Find = std::function<BrickPart(BrickIndex)>;
-  // What is known of updates; and whether codes of an ErrorToDistance may be far ones.
-  struct Known {
-    bool slopes = false, distances = false, far = false;
-  };
   // Found by brick. bounds: of each brick. known: of all bricks.
   RelevantUpdates(const Grid& grid, const UpdateErrors& errors, ShownRanges shown, std::vector<Bound> bounds, Known known, Find find);
 
@@ -93,7 +98,7 @@ class RelevantUpdates {
   }
   // Found now if need be: some 50 microseconds for each part. Throws what prevents it, for example that memory is
   // exhausted. As long as this exists.
-  [[nodiscard]] BrickNeeds brick(BrickIndex index) const { return parts_.empty() ? BrickNeeds(own_brick(index)) : brick(index, kAllParts); }
+  [[nodiscard]] BrickNeeds brick(BrickIndex index) const { return parts_.empty() ? own_needs(index) : brick(index, kAllParts); }
   [[nodiscard]] bool is_found(BrickIndex brick) const;
 
   // How far the surfaces can still move, in world units, while an update's diamond is refined completely. An estimate:
@@ -152,12 +157,18 @@ class RelevantUpdates {
     Codes(const Grid& grid, const UpdateErrors& errors);
   };
   void bound_runs();
+  [[nodiscard]] Bound bound_of(const SupercubeSet& set, BrickIndex b, const BrickPart& brick) const;
   using Parts = std::vector<std::shared_ptr<const RelevantUpdates>>;
   RelevantUpdates(const SupercubeSet& set, Parts parts, ShownRanges shown);
   friend RelevantUpdates united(const IntervalVolume& volume, Parts each, ShownRanges shown);
   [[nodiscard]] const BrickPart& own_brick(BrickIndex brick) const {
     const BrickPart* const found = found_->bricks.find(brick);
     return found != nullptr ? *found : found_->find_now(brick);
+  }
+  // Nothing, too, where nothing was kept since nothing is relevant.
+  [[nodiscard]] BrickNeeds own_needs(BrickIndex brick) const {
+    const BrickPart* const found = found_->bricks.find(brick);
+    return found == nullptr && bounds_[brick].updates == 0 ? BrickNeeds() : BrickNeeds(own_brick(brick));
   }
 
   ShownRanges shown_;

@@ -59,8 +59,8 @@ ValueBounds::ValueBounds(const PagedValues& values, const ParallelFor& parallel)
   });
   supercube_least_ = supercube_greatest_ = ValueKeys(set.supercubes(), last);
   brick_least_ = brick_greatest_ = ValueKeys(set.bricks().size(), last);
-  for (BrickIndex brick{0}; brick < set.bricks().size(); ++brick) {
-    may_stop(parallel);
+  parallel(set.bricks().size(), [&](std::size_t b) {
+    const BrickIndex brick{std::uint32_t(b)};
     KeySpan all{least[set.bricks()[brick].first], greatest[set.bricks()[brick].first]};
     set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
       const UpdateIndex first = set.first(brick, s), end = first + std::uint32_t(std::popcount(set.occupancy()[s]));
@@ -75,7 +75,7 @@ ValueBounds::ValueBounds(const PagedValues& values, const ParallelFor& parallel)
     });
     brick_least_.set(brick, all.least);
     brick_greatest_.set(brick, all.greatest);
-  }
+  });
   const std::size_t coarse = coarse_diamonds(set);
   least_ = first_of(least, coarse, last);
   greatest_ = first_of(greatest, coarse, last);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <limits>
 #include <utility>
 
@@ -48,54 +49,95 @@ std::vector<RangePart> parts_of(const ValueFormat& format, const ShownRange& sho
   return parts;
 }
 
-SurfaceErrors PartFinder::measure(const Range& range, const std::vector<std::uint64_t>& slots) {
-  const SupercubeSet& all = volume_.set();
-  std::vector<SupercubeKey> keys;
-  std::vector<std::uint64_t> occupancy;
-  std::vector<std::uint8_t> steps;  // of those that are relevant
-  std::vector<UpdateIndex> update;
-  std::vector<SupercubeIndex> number;
-  for (BrickIndex brick{0}; brick < all.bricks().size(); ++brick) {
-    all.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-      if (slots[s] == 0) return;
-      keys.push_back(key);
-      occupancy.push_back(slots[s]);
-      number.push_back(s);
-      for (const Slot slot : set_bits<Slot>(slots[s])) {
-        update.push_back(all.first(brick, s) + count_below(all.occupancy()[s], slot));
-        steps.push_back(std::uint8_t(volume_.error_step(update.back())));
-      }
-    });
-  }
-  SurfaceErrors result{std::vector<ErrorToDistance>(all.supercubes()), std::vector<std::uint8_t>(all.size()), std::vector<std::uint8_t>(all.size())};
-  if (keys.empty()) return result;
-  const SupercubeSet relevant(keys, std::move(occupancy));
-  if (!field_) field_.emplace(volume_, parallel_);
-  const auto found = measure_error_to_distance(
-      field_->samples(), field_->surface_of(range), volume_.domain(), relevant,
-      [&](UpdateIndex i) { return double(volume_.error_steps()[steps[i]]); }, volume_.description().max_error, true, parallel_);
-  for (std::size_t i = 0; i < number.size(); ++i) result.to_distance[number[i]] = found.to_distance[i];
-  for (std::size_t i = 0; i < update.size(); ++i) {
-    result.slopes[update[i]] = found.slopes[i];
-    result.distances[update[i]] = found.distances[i];
-  }
-  return result;
+namespace {
+
+// What a part needs of a brick.
+struct NeededSlots {
+  std::vector<std::uint64_t> counting, closed;  // by supercube; closed: with ancestors; empty: it has none of those
+  std::size_t first_supercube = 0;              // of those that have any, and of their updates, so many are in bricks before
+  UpdateIndex first;
+};
+
+std::vector<NeededSlots> needed_slots(const IntervalVolume& volume, const ShownRange& shown, const ParallelFor& parallel) {
+  const RelevantSlots relevant(volume, shown, parallel);
+  std::vector<NeededSlots> all(volume.set().bricks().size());
+  parallel(all.size(), [&](std::size_t b) {
+    const BrickIndex brick{std::uint32_t(b)};
+    if (!relevant.has_any(brick)) return;
+    std::vector<std::uint64_t> closed = relevant.with_ancestors(brick);
+    if (std::all_of(closed.begin(), closed.end(), [](std::uint64_t slots) { return slots == 0; })) return;
+    all[b].closed = std::move(closed);
+    all[b].counting = relevant.of(brick);
+  });
+  return all;
 }
+
+}  // namespace
 
 std::shared_ptr<const RelevantUpdates> PartFinder::find_measured(const RangePart& part) {
   const SupercubeSet& set = volume_.set();
-  const RelevantSlots relevant(volume_, part.shown, parallel_);
-  std::vector<std::uint64_t> slots(set.supercubes()), closed(set.supercubes());
-  parallel_(set.bricks().size(), [&](std::size_t b) {
-    const BrickIndex brick{std::uint32_t(b)};
-    const SupercubeIndex first = set.bricks()[brick].first_supercube;
-    const std::vector<std::uint64_t> with_ancestors = relevant.with_ancestors(brick), counting = relevant.of(brick);
-    std::copy(with_ancestors.begin(), with_ancestors.end(), closed.begin() + first);
-    std::copy(counting.begin(), counting.end(), slots.begin() + first);
+  std::vector<NeededSlots> needed = needed_slots(volume_, part.shown, parallel_);
+  std::vector<SupercubeKey> keys;
+  std::vector<std::uint64_t> occupancy;
+  UpdateIndex end{0};
+  for (BrickIndex b{0}; b < needed.size(); ++b) {
+    NeededSlots& of_brick = needed[b];
+    if (of_brick.closed.empty()) continue;
+    of_brick.first_supercube = keys.size();
+    of_brick.first = end;
+    std::size_t n = 0;
+    set.for_each_supercube(b, [&](SupercubeIndex, SupercubeKey key) {
+      const std::uint64_t slots = of_brick.closed[n++];
+      if (slots == 0) return;
+      keys.push_back(key);
+      occupancy.push_back(slots);
+      end = end + std::uint32_t(std::popcount(slots));
+    });
+  }
+  const SupercubeSet relevant(keys, std::move(occupancy));
+  keys = {};
+  std::vector<std::uint8_t> steps(relevant.size());
+  parallel_(needed.size(), [&](std::size_t b) {
+    const NeededSlots& of_brick = needed[b];
+    UpdateIndex to = of_brick.first;
+    std::size_t n = 0;
+    if (of_brick.closed.empty()) return;
+    set.for_each_supercube(BrickIndex(std::uint32_t(b)), [&](SupercubeIndex s, SupercubeKey) {
+      const UpdateIndex first = set.first(BrickIndex(std::uint32_t(b)), s);
+      for (const Slot slot : set_bits<Slot>(of_brick.closed[n++]))
+        steps[to++] = std::uint8_t(volume_.error_step(first + count_below(set.occupancy()[s], slot)));
+    });
   });
-  const SurfaceErrors surface = measure(part.shown.range, closed);
+  SurfaceErrors surface;
+  if (relevant.size() > 0) {
+    if (!field_) field_.emplace(volume_, parallel_);
+    surface = measure_error_to_distance(
+        field_->samples(), field_->surface_of(part.shown.range), volume_.domain(), relevant,
+        [&](UpdateIndex i) { return double(volume_.error_steps()[steps[i]]); }, volume_.description().max_error, true, parallel_);
+  }
+  const bool is_far = std::any_of(surface.to_distance.begin(), surface.to_distance.end(), [](ErrorToDistance code) { return code.is_far(); });
+  const auto find_brick = [&](BrickIndex b) -> std::optional<BrickPart> {
+    const NeededSlots& of_brick = needed[b];
+    if (of_brick.closed.empty()) return {};
+    std::vector<BrickPart::Supercube> needs(of_brick.closed.size());
+    BrickPart::Surface of_updates;
+    std::size_t supercube = of_brick.first_supercube;
+    UpdateIndex first = of_brick.first;
+    for (std::size_t n = 0; n < needs.size(); ++n) {
+      const std::uint64_t closed = of_brick.closed[n];
+      if (closed == 0) continue;
+      needs[n] = {of_brick.counting[n], surface.to_distance[supercube++]};
+      for (const Slot slot : set_bits<Slot>(needs[n].slots)) {
+        const UpdateIndex i = first + count_below(closed, slot);
+        of_updates.slopes.push_back(surface.slopes[i]);
+        of_updates.distances.push_back(surface.distances[i]);
+      }
+      first = first + std::uint32_t(std::popcount(closed));
+    }
+    return BrickPart(set, b, volume_.steps(), needs, std::move(of_updates));
+  };
   return std::make_shared<const RelevantUpdates>(volume_.description().grid, set, UpdateErrors{volume_.steps(), volume_.error_steps()},
-                                                 ShownRanges{part.shown}, slots, surface);
+                                                 ShownRanges{part.shown}, RelevantUpdates::Known{true, true, is_far}, find_brick, parallel_);
 }
 
 std::shared_ptr<const RelevantUpdates> PartFinder::find(const RangePart& part) {

@@ -48,7 +48,6 @@ class PartFinder {
   [[nodiscard]] const IntervalVolume& volume() const { return volume_; }
 
  private:
-  [[nodiscard]] SurfaceErrors measure(const Range& range, const std::vector<std::uint64_t>& slots);
   [[nodiscard]] std::shared_ptr<const RelevantUpdates> find_measured(const RangePart& part);
 
   const IntervalVolume& volume_;

@@ -90,17 +90,19 @@ RangeCache::Relevant RangeCache::get_part(PartFinder& finder, const Volume& volu
   }
 }
 
-// What is better known by now, what was used least recently, and what belongs to data sets that are served no more: taken
-// out of the list. With the lock held.
+// What is better known by now, what was used least recently of what nobody has, and what belongs to data sets that are
+// served no more: taken out of the list. With the lock held.
 RangeCache::Entries RangeCache::take_old(const Volume& volume, const RangePart& found) {
+  constexpr std::size_t kEnds = 2;  // of a range: both stay, however large they are
   Entries old;
-  std::size_t bytes = 0;
-  for (auto entry = entries_.begin(); entry != entries_.end();) {
-    const bool is_computed = entry->bytes != 0, is_first = entry == entries_.begin();
+  std::size_t bytes = 0, newer = 0;
+  for (auto entry = entries_.begin(); entry != entries_.end(); ++newer) {
+    const bool is_computed = entry->bytes != 0;
     const bool is_worse = entry->key.part.distances < found.distances && entry->key.part.shown == found.shown && entry->is_of(volume);
     if (is_computed) entry->bytes = entry->relevant.get()->memory_bytes();
     bytes += is_worse ? 0 : entry->bytes;
-    const bool is_old = is_worse || entry->volume.expired() || (bytes > most_bytes_ && !is_first);
+    const bool is_in_use = is_computed && entry->relevant.get().use_count() > 1;
+    const bool is_old = is_worse || entry->volume.expired() || (bytes > most_bytes_ && newer >= kEnds && !is_in_use);
     const auto next = std::next(entry);
     if (is_computed && is_old) {
       hide(entry);

@@ -40,7 +40,8 @@ class RangeCache {
   using Payer = std::shared_ptr<FairScheduler::Account>;
 
   // memory: counts what is kept or in use, and must outlive that. scheduler: of the accounts that pay; it must outlive
-  // this. most_bytes: of the parts that are kept for later; those in use stay anyway.
+  // this. most_bytes: of the parts that are kept for later; those in use, and the two that were used last, stay
+  // anyway.
   RangeCache(Memory& memory, FairScheduler& scheduler, Find find = &PartFinder::find, std::size_t most_bytes = std::size_t(256) << 20);
   RangeCache(const RangeCache&) = delete;
   RangeCache& operator=(const RangeCache&) = delete;

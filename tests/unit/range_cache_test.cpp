@@ -118,6 +118,20 @@ TEST_F(RangeCacheTest, KeepsWhatWasUsedLast) {
   EXPECT_EQ(found, 4);
 }
 
+// However little may be kept: neither are both ends of the last range.
+TEST_F(RangeCacheTest, WhatIsInUseIsNotFoundAgain) {
+  RangeCache cache(memory, scheduler, find, 1);
+  const auto in_use = get(cache, volume, above(1));
+  for (const int other : {2, 3, 4, 5}) (void)get(cache, volume, above(other));
+  EXPECT_EQ(found, 5);
+  (void)get(cache, volume, above(1));
+  EXPECT_EQ(found, 5);
+  (void)get(cache, volume, between(-0.5, 0.5));
+  EXPECT_EQ(found, 7);
+  (void)get(cache, volume, between(-0.5, 0.5));
+  EXPECT_EQ(found, 7);
+}
+
 TEST_F(RangeCacheTest, DropsWhatBelongsToDataSetsThatAreGone) {
   std::vector<std::weak_ptr<const RelevantUpdates>> parts;
   RangeCache cache(memory, scheduler, [&](PartFinder& finder, const RangePart& part) {
