@@ -40,7 +40,8 @@ class RemoteVolume {
   // The same for all that is left.
   [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> whole(const ParallelFor& parallel = serial);
 
-  [[nodiscard]] std::uint64_t file_bytes() const;  // 0: not known yet
+  [[nodiscard]] const RemoteStamp& stamp() const { return file_.stamp(); }  // of what was returned last
+  [[nodiscard]] std::uint64_t file_bytes() const;                           // 0: not known yet
   [[nodiscard]] std::uint64_t read_bytes() const { return read_before_ + bytes_here(); }
   [[nodiscard]] std::uint64_t requests() const { return requests_before_ + file_.requests(); }
 

@@ -89,6 +89,7 @@ class RemoteFile::Reader {
   }
 
   [[nodiscard]] FileEnds ends() const { return {bytes_, last_, stamp_.bytes}; }
+  [[nodiscard]] const RemoteStamp& stamp() const { return stamp_; }
   [[nodiscard]] std::uint64_t requests() const { return requests_; }
   [[nodiscard]] RemoteContents take() { return {std::move(bytes_), std::move(stamp_)}; }
 
@@ -338,6 +339,7 @@ RemoteOutcome<void> RemoteFile::read_places(std::span<const StreamPlace> places,
 }
 RemoteOutcome<void> RemoteFile::read_all(const ParallelFor& parallel) { return reader_->read_all(parallel); }
 FileEnds RemoteFile::ends() const { return reader_->ends(); }
+const RemoteStamp& RemoteFile::stamp() const { return reader_->stamp(); }
 std::uint64_t RemoteFile::requests() const { return reader_->requests(); }
 RemoteContents RemoteFile::take() && { return reader_->take(); }
 

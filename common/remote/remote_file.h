@@ -74,7 +74,8 @@ class RemoteFile {
 
   // What is there; valid until the next call.
   [[nodiscard]] FileEnds ends() const;
-  [[nodiscard]] std::uint64_t requests() const;  // made by now, failed ones and redirects included
+  [[nodiscard]] const RemoteStamp& stamp() const;  // after begin()
+  [[nodiscard]] std::uint64_t requests() const;    // made by now, failed ones and redirects included
   // The first bytes; after read_all().
   [[nodiscard]] RemoteContents take() &&;
 

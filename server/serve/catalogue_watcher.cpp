@@ -132,6 +132,11 @@ Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& p
   };
   for (auto& [at, volume] : files_) look_at(at, volume, nullptr);
   for (auto& [at, file] : folder_files_) look_at(at, file.volume, &file);
+  if (auto* const remote = remote_.unfinished(); remote != nullptr && (least == nullptr || remote->volume->size() < (*least)->size())) {
+    const ScratchMemory::Scope scope(memory_.data_memory());
+    remote_.read_on(*remote, parallel);
+    return std::optional(*catalogue(false));
+  }
   if (least == nullptr) return std::nullopt;
   if (auto finer = load_coarse(*path, *least, parallel)) {
     *least = std::move(finer);

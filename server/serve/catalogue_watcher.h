@@ -38,7 +38,7 @@ class CatalogueWatcher {
 
   // After load(): reads on, of the data set that has fewest updates of those that are not whole: as far as the next scale,
   // at last all of it. Returns the new catalogue; nullopt once all are whole. A named file that turns out to be damaged is
-  // an error; such a file in a folder is logged, and leaves the catalogue.
+  // an error; such a file in a folder is logged, and leaves the catalogue. What is wrong with a URL then is logged.
   Result<std::optional<Catalogue>> complete(const ParallelFor& parallel = serial);
 
   // Reads the folders again. Returns the new catalogue, or nullopt if nothing changed. A new or changed file is

@@ -15,6 +15,24 @@ namespace {
 
 std::optional<RemoteContents> as_optional(RemoteContents contents) { return contents; }
 
+// What prevents reading is an error that begins with the URL.
+template <class Read>
+auto catching(const RemoteUrl& url, const Read& read) -> decltype(read()) {
+  try {
+    return read();
+  } catch (const Stopped&) {
+    throw;
+  } catch (const NoRoom&) {
+    return fail(url.shown + ": it takes more memory than --max-memory leaves");
+  } catch (const std::exception& exception) {
+    return fail(url.shown + ": cannot be read: " + exception.what());
+  }
+}
+
+void warn(RemoteDataSets::DataSet& set, const std::string& why) {
+  if (std::exchange(set.last_warning, why) != why) spdlog::warn("the data read before stays in use: {}", why);
+}
+
 }  // namespace
 
 RemoteDataSets::RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage)
@@ -24,10 +42,47 @@ RemoteDataSets::RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerat
 
 Result<void> RemoteDataSets::load(const ParallelFor& parallel) {
   for (DataSet& set : sets_) {
-    if (auto done = read(set, inputs_.limits, parallel); !done) return tl::unexpected(done.error());
+    if (memory_.room() == kAnyRoom && !tolerates_damage_) {
+      set.rest = std::make_unique<RemoteVolume>(set.url, inputs_.access, inputs_.limits);
+      if (auto done = read_next(set, parallel); !done) return done;
+    } else if (auto done = read(set, inputs_.limits, parallel); !done) {
+      return tl::unexpected(done.error());
+    }
   }
   next_poll_ = std::chrono::steady_clock::now() + inputs_.poll_time;
   return {};
+}
+
+RemoteDataSets::DataSet* RemoteDataSets::unfinished() {
+  DataSet* least = nullptr;
+  for (DataSet& set : sets_) {
+    if (set.rest && (least == nullptr || set.volume->size() < least->volume->size())) least = &set;
+  }
+  return least;
+}
+
+void RemoteDataSets::read_on(DataSet& set, const ParallelFor& parallel) {
+  if (auto done = read_next(set, parallel); !done) {
+    set.rest.reset();
+    set.stamp = {};
+    return warn(set, done.error().message);
+  }
+  if (!set.rest) spdlog::info("{}: all scales are loaded", set.url.shown);
+}
+
+Result<void> RemoteDataSets::read_next(DataSet& set, const ParallelFor& parallel) {
+  return catching(set.url, [&]() -> Result<void> {
+    const auto volume = set.rest->next(parallel);
+    if (!volume) return tl::unexpected(volume.error());
+    if (auto fits = protocol::check_sendable((*volume)->description()); !fits) return fail(set.url.shown + ": " + fits.error().message);
+    set.stamp = set.rest->stamp();
+    if ((*volume)->is_whole()) {
+      set.rest.reset();
+      complete_in_data_memory(**volume, memory_, parallel);
+    }
+    set.volume = counted(memory_, Memory::Holder::datasets, *volume);
+    return {};
+  });
 }
 
 bool RemoteDataSets::poll(const ParallelFor& parallel) {
@@ -39,7 +94,7 @@ bool RemoteDataSets::poll(const ParallelFor& parallel) {
 }
 
 bool RemoteDataSets::poll_one(DataSet& set, const ParallelFor& parallel) {
-  if (!set.stamp.is_known()) return false;
+  if (set.volume->is_whole() && !set.stamp.is_known()) return false;
   // Folders wait meanwhile. There is another try soon.
   RemoteLimits once = inputs_.limits;
   once.attempts = 1;
@@ -49,8 +104,7 @@ bool RemoteDataSets::poll_one(DataSet& set, const ParallelFor& parallel) {
     if (*changed) spdlog::info("{} was reloaded", set.url.shown);
     return *changed;
   }
-  const std::string& why = changed.error().message;
-  if (std::exchange(set.last_warning, why) != why) spdlog::warn("the data read before stays in use: {}", why);
+  warn(set, changed.error().message);
   return false;
 }
 
@@ -60,7 +114,7 @@ Result<bool> RemoteDataSets::read(DataSet& set, const RemoteLimits& given, const
   const std::uint64_t room = memory_.room();
   limits.most_bytes = std::min(limits.most_bytes, room);
   spdlog::debug("reads {}", set.url.shown);
-  try {
+  return catching(set.url, [&]() -> Result<bool> {
     auto contents = set.stamp.is_known() ? read_remote_if_changed(set.url, inputs_.access, limits, set.stamp, parallel)
                                          : read_remote(set.url, inputs_.access, limits, parallel).map(as_optional);
     if (!contents) return tl::unexpected(contents.error());
@@ -73,17 +127,11 @@ Result<bool> RemoteDataSets::read(DataSet& set, const RemoteLimits& given, const
     if (auto fits = protocol::check_sendable(volume->description()); !fits) return fail(set.url.shown + ": " + fits.error().message);
     complete_in_data_memory(*volume, memory_, parallel);
     // It includes a hash of the contents.
-    if (set.volume && set.volume->description() == volume->description()) return false;
+    if (set.volume && set.volume->is_whole() && set.volume->description() == volume->description()) return false;
     if (faults.any()) spdlog::warn("{}: {}; {} of {} updates are not served", set.url.shown, to_text(faults), faults.lost_updates, volume->size());
     set.volume = counted(memory_, Memory::Holder::datasets, std::make_shared<const IntervalVolume>(std::move(*volume)));
     return true;
-  } catch (const Stopped&) {
-    throw;
-  } catch (const NoRoom&) {
-    return fail(set.url.shown + ": it takes more memory than --max-memory leaves");
-  } catch (const std::exception& exception) {
-    return fail(set.url.shown + ": cannot be read: " + exception.what());
-  }
+  });
 }
 
 }  // namespace intervale

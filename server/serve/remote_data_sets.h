@@ -2,10 +2,12 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "common/remote/load_remote.h"
 #include "common/remote/read_remote.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
@@ -21,26 +23,36 @@ struct RemoteInputs {
   std::chrono::milliseconds poll_time{60'000};  // between questions whether a file has changed
 };
 
-// One thread at a time. Files lie in memory as a whole: what becomes of them on their servers does not affect sessions.
+// One thread at a time. What was read of a file lies in memory: what becomes of it on its server does not affect sessions.
 class RemoteDataSets {
  public:
   struct DataSet {
     RemoteUrl url;
-    Catalogue::Volume volume;  // the last good contents; nullptr: not read yet
-    RemoteStamp stamp;         // of what was read last
-    std::string last_warning;  // logged since then, not to be repeated
+    Catalogue::Volume volume;                      // the last good contents; nullptr: not read yet
+    RemoteStamp stamp;                             // of what was read last
+    std::string last_warning;                      // logged since then, not to be repeated
+    std::unique_ptr<RemoteVolume> rest = nullptr;  // which is read on; nullptr: all of it was read, or could not be
   };
 
   // memory: counts the data sets, and must outlive them. Callers have a Scope of its data memory. tolerates_damage: as
   // of CatalogueWatcher.
   RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage);
+  RemoteDataSets(const RemoteDataSets&) = delete;
+  RemoteDataSets& operator=(const RemoteDataSets&) = delete;
 
-  // Reads all of them. Fails if one cannot be read. Throws what `parallel` throws.
+  // Reads all of them; of large files of every range the coarse scales, if memory is not limited. Fails if one cannot be
+  // read. Throws what `parallel` throws.
   Result<void> load(const ParallelFor& parallel);
 
-  // Once poll_time is over, asks for each whether it has changed, and reads those that have. True if contents are new.
-  // What fails is logged, and tried again the next time; the last good contents stay. A server that sends neither ETag
-  // nor Last-Modified is not asked.
+  // After load(): the data set with fewest updates whose rest is still to be read; nullptr: there is none.
+  [[nodiscard]] DataSet* unfinished();
+  // Reads on of it, as far as the next scale. If that fails, it is logged, and what was read before stays: poll() tries
+  // to read all of it.
+  void read_on(DataSet& set, const ParallelFor& parallel);
+
+  // Once poll_time is over, asks for each whether it has changed, and reads those that have, whole. True if contents are
+  // new. What fails is logged, and tried again the next time; the last good contents stay. A server that sends neither
+  // ETag nor Last-Modified is not asked.
   bool poll(const ParallelFor& parallel);
 
   [[nodiscard]] const std::vector<DataSet>& all() const { return sets_; }
@@ -48,6 +60,7 @@ class RemoteDataSets {
  private:
   bool poll_one(DataSet& set, const ParallelFor& parallel);
   Result<bool> read(DataSet& set, const RemoteLimits& limits, const ParallelFor& parallel);
+  Result<void> read_next(DataSet& set, const ParallelFor& parallel);
 
   RemoteInputs inputs_;
   Memory& memory_;
