@@ -71,13 +71,11 @@ Result<ChannelComponent> take_component(std::span<const std::byte>& bytes, int l
 
 }  // namespace
 
-void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set, const std::vector<Channel>& channels,
-                     const std::vector<ChannelKeys>& keys, const ParallelFor& parallel, KeptPages* kept) {
+void append_channels(Streams& streams, const Grid& grid, const std::vector<Channel>& channels, const AppendIndex& index) {
   if (channels.empty()) return;
   std::vector<std::byte>& out = streams[StreamType::channels];
   const auto scales = std::size_t(Domain(grid.dims).levels());
   const auto count = std::uint8_t(channels.size());
-  std::uint32_t values = 0;  // the last ones whose pages were appended: the field's
   append(out, std::span(&count, 1));
   for (std::size_t i = 0; i < channels.size(); ++i) {
     append_text(out, channels[i].name);
@@ -89,9 +87,17 @@ void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set
       const ComponentRecord record = record_of(component);
       append(out, std::span(&record, 1));
       append(out, std::span<const PredictorWeights>(&component.weights.of[0][0], scales * 3));
-      append_pages({grid, set, component, keys[i][c]}, out, streams[StreamType::channel_pages], parallel, {kept, ++values});
+      index(out, i, c);
     }
   }
+}
+
+void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set, const std::vector<Channel>& channels,
+                     const std::vector<ChannelKeys>& keys, const ParallelFor& parallel, KeptPages* kept) {
+  std::uint32_t values = 0;  // the last ones whose pages were appended: the field's
+  append_channels(streams, grid, channels, [&](std::vector<std::byte>& to, std::size_t i, std::size_t c) {
+    append_pages({grid, set, channels[i].components[c], keys[i][c]}, to, streams[StreamType::channel_pages], parallel, {kept, ++values});
+  });
 }
 
 Result<StoredChannels> read_channels(const Container& file, const Grid& grid, const SupercubeSet& set, const ParallelFor& parallel,

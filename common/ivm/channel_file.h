@@ -1,6 +1,8 @@
 // The channels of an .ivm file: two streams that a reader may skip. FORMAT.md is the specification.
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "common/diamond/grid.h"
@@ -19,6 +21,11 @@ namespace intervale {
 // same bytes whatever `parallel` is, and whichever of their pages were kept; kept may be null.
 void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set, const std::vector<Channel>& channels,
                      const std::vector<ChannelKeys>& keys, const ParallelFor& parallel, KeptPages* kept);
+
+// The stream of channels, if there are any, whose pages are elsewhere. index: calls are for each channel and component in
+// turn, and append a record for each page (value_streams.h).
+using AppendIndex = std::function<void(std::vector<std::byte>& to, std::size_t channel, std::size_t component)>;
+void append_channels(Streams& streams, const Grid& grid, const std::vector<Channel>& channels, const AppendIndex& index);
 
 struct StoredChannels {
   std::vector<Channel> channels;

@@ -158,47 +158,69 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
 
 }  // namespace
 
-ContainerFrame make_frame(FileScope scope, const Streams& streams, std::uint64_t pages_bytes) {
+namespace {
+
+// The header and the table. checksum: of a stream.
+struct StreamSize {
+  std::uint64_t bytes = 0, checksum = 0;
+};
+template <class SizeOf>
+std::pair<std::vector<std::byte>, std::vector<Entry>> make_head(FileScope scope, const SizeOf& size_of) {
+  std::array<StreamSize, kStreamTypes> sizes;
   std::uint32_t types = types_of(scope);
-  for (const int type : set_bits(kSometimes)) {
-    if (streams[StreamType(type)].empty()) types &= ~bit_of(StreamType(type));
+  for (const int type : set_bits(types)) {
+    sizes[std::size_t(type)] = size_of(StreamType(type));
+    if (sizes[std::size_t(type)].bytes == 0) types &= ~(kSometimes & bit_of(StreamType(type)));
   }
   Header header{};
   std::memcpy(header.magic, kMagic, sizeof kMagic);
   header.version = kIvmVersion;
   header.streams = std::uint32_t(std::popcount(types));
   header.file_bytes = sizeof(Header) + header.streams * sizeof(Entry);
-  std::vector<std::byte> file(sizeof(Header));
   std::vector<Entry> entries;
   entries.reserve(header.streams);
   for (const int type : set_bits(types)) {
-    const auto& bytes = streams[StreamType(type)];
-    const bool is_pages = StreamType(type) == StreamType::pages;
-    const Entry e{std::uint32_t(type), (kNotNeeded >> type & 1) != 0 ? kOptional : 0, header.file_bytes, is_pages ? pages_bytes : bytes.size(),
-                  is_pages ? 0 : XXH3_64bits(bytes.data(), bytes.size())};
-    entries.push_back(e);
-    header.file_bytes += e.bytes;
+    const StreamSize& size = sizes[std::size_t(type)];
+    entries.push_back({std::uint32_t(type), (kNotNeeded >> type & 1) != 0 ? kOptional : 0, header.file_bytes, size.bytes,
+                       StreamType(type) == StreamType::pages ? 0 : size.checksum});
+    header.file_bytes += size.bytes;
   }
-  append<Entry>(file, entries);
   header.content_hash = hash_of_contents(entries);
-  std::memcpy(file.data(), &header, sizeof header);
-  header.checksum = head_checksum(file);
-  std::memcpy(file.data(), &header, sizeof header);
-  ContainerFrame frame{std::move(file), {}, 0, header.file_bytes};
-  for (const int type : set_bits(types)) {
-    if (StreamType(type) != StreamType::pages)
-      append<std::byte>(type < int(StreamType::pages) ? frame.before : frame.after, streams[StreamType(type)]);
+  std::vector<std::byte> head(sizeof header);
+  append<Entry>(head, entries);
+  std::memcpy(head.data(), &header, sizeof header);
+  header.checksum = head_checksum(head);
+  std::memcpy(head.data(), &header, sizeof header);
+  return {std::move(head), std::move(entries)};
+}
+
+StreamSize size_of(const std::vector<std::byte>& bytes) { return {bytes.size(), XXH3_64bits(bytes.data(), bytes.size())}; }
+
+}  // namespace
+
+ContainerFrame make_frame(FileScope scope, const Streams& streams, const PagesElsewhere& elsewhere) {
+  auto [head, entries] = make_head(scope, [&](StreamType type) {
+    if (type == StreamType::pages) return StreamSize{elsewhere.pages_bytes, 0};
+    if (type == StreamType::channel_pages) return StreamSize{elsewhere.channel_pages_bytes, elsewhere.channel_pages_checksum};
+    return size_of(streams[type]);
+  });
+  ContainerFrame frame{{{0, std::move(head)}}, 0, 0, entries.back().offset + entries.back().bytes};
+  for (const Entry& e : entries) {
+    const auto type = StreamType(e.type);
+    if (type == StreamType::pages || type == StreamType::channel_pages) {
+      (type == StreamType::pages ? frame.pages_at : frame.channel_pages_at) = e.offset;
+      frame.pieces.push_back({e.offset + e.bytes, {}});
+    } else {
+      append<std::byte>(frame.pieces.back().bytes, streams[type]);
+    }
   }
-  frame.pages_at = frame.before.size();
   return frame;
 }
 
 std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
-  ContainerFrame frame = make_frame(scope, streams, streams[StreamType::pages].size());
-  std::vector<std::byte> file = std::move(frame.before);
-  file.reserve(frame.file_bytes);
-  append<std::byte>(file, streams[StreamType::pages]);
-  append<std::byte>(file, frame.after);
+  auto [file, entries] = make_head(scope, [&](StreamType type) { return size_of(streams[type]); });
+  file.reserve(std::size_t(entries.back().offset + entries.back().bytes));
+  for (const Entry& e : entries) append<std::byte>(file, streams[StreamType(e.type)]);
   return file;
 }
 

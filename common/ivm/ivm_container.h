@@ -86,13 +86,22 @@ struct FileEnds {
   std::uint64_t file_bytes = 0;
 };
 
-// What is around the pages of a file, whose stream of pages is left out and will have so many bytes.
-struct ContainerFrame {
-  std::vector<std::byte> before, after;
-  std::uint64_t pages_at = 0;    // where in the file the pages begin
-  std::uint64_t file_bytes = 0;  // of all
+// What is known of streams that are elsewhere.
+struct PagesElsewhere {
+  std::uint64_t pages_bytes = 0, channel_pages_bytes = 0;
+  std::uint64_t channel_pages_checksum = 0;  // XXH3-64
 };
-[[nodiscard]] ContainerFrame make_frame(FileScope scope, const Streams& streams, std::uint64_t pages_bytes);
+// What is around those of a file: the streams of pages are left out.
+struct ContainerFrame {
+  struct Piece {
+    std::uint64_t offset = 0;  // in the file
+    std::vector<std::byte> bytes;
+  };
+  std::vector<Piece> pieces;  // the first one begins with the header, which has all checksums
+  std::uint64_t pages_at = 0, channel_pages_at = 0;
+  std::uint64_t file_bytes = 0;
+};
+[[nodiscard]] ContainerFrame make_frame(FileScope scope, const Streams& streams, const PagesElsewhere& elsewhere);
 
 // A file from outside: its header, table and checksums are in order, and it has the streams of its scope; optional ones
 // of an unknown type are skipped, once their checksums were checked. Pages have checksums of their own, which whoever

@@ -135,21 +135,19 @@ void append_values(Streams& streams, const PagedValues& values, bool is_exact, c
   append_pages(values, streams[StreamType::page_index], streams[StreamType::pages], parallel, {kept, 0});
 }
 
+std::vector<std::uint8_t> encode_page(const PagedValues& values, const ValuePage& page, const PageName& name, KeptPages* kept) {
+  if (kept == nullptr) return encode_page(values, page);
+  if (auto found = kept->find(name)) return std::move(*found);
+  std::vector<std::uint8_t> coded = encode_page(values, page);
+  kept->keep(name, coded);
+  return coded;
+}
+
 void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& to, const ParallelFor& parallel,
                   const PageKeeping& kept) {
   const std::vector<ValuePage> pages = pages_of(values.set);
   std::vector<std::vector<std::uint8_t>> coded(pages.size());
-  parallel(pages.size(), [&](std::size_t page) {
-    const PageName name{kept.values, std::uint32_t(page)};
-    if (kept.by != nullptr) {
-      if (auto found = kept.by->find(name)) {
-        coded[page] = std::move(*found);
-        return;
-      }
-    }
-    coded[page] = encode_page(values, pages[page]);
-    if (kept.by != nullptr) kept.by->keep(name, coded[page]);
-  });
+  parallel(pages.size(), [&](std::size_t page) { coded[page] = encode_page(values, pages[page], {kept.values, std::uint32_t(page)}, kept.by); });
   for (auto& page : coded) {
     const PageRecord record = record_of(page);
     append(index, std::span(&record, 1));

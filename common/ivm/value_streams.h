@@ -11,6 +11,7 @@
 #include "common/ivm/kept_pages.h"
 #include "common/ivm/page_faults.h"
 #include "common/ivm/paged_values.h"
+#include "common/ivm/value_page.h"
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 
@@ -46,6 +47,8 @@ struct PageKeeping {
   KeptPages* by = nullptr;
   std::uint32_t values = 0;
 };
+// As encode_page() makes a page, or as it was kept. kept: or null.
+[[nodiscard]] std::vector<std::uint8_t> encode_page(const PagedValues& values, const ValuePage& page, const PageName& name, KeptPages* kept);
 // Appends the pages of some values, and their index: for each page its bytes and their XXH3-64, two numbers of 8 bytes.
 void append_pages(const PagedValues& values, std::vector<std::byte>& index, std::vector<std::byte>& pages, const ParallelFor& parallel,
                   const PageKeeping& kept);

@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "common/util/printable.h"
 #include "server/builder/channel_builder.h"
 #include "server/builder/find_keys.h"
 #include "server/builder/value_builder.h"
@@ -14,10 +13,6 @@ namespace {
 
 // The compression, which follows, takes memory of its own.
 void free_samples(Volume& volume) { volume.bytes = std::vector<std::byte>(); }
-
-std::string text_of_dims(const Grid& grid) {
-  return std::to_string(grid.dims[0]) + " x " + std::to_string(grid.dims[1]) + " x " + std::to_string(grid.dims[2]);
-}
 
 }  // namespace
 
@@ -43,11 +38,10 @@ Result<ValueVolume::Parts> build_every_range(Volume& volume, std::optional<doubl
 
 Result<void> add_channel(BuiltChannels& built, Volume& volume, const std::string& name, std::optional<double> step, std::optional<double> nan,
                          const Grid& grid, const SupercubeSet& set) {
-  const std::string who = "channel '" + printable(name) + "'";
-  if (volume.grid.dims != grid.dims) return fail(who + " has " + text_of_dims(volume.grid) + " samples, the field has " + text_of_dims(grid));
+  if (auto same = check_channel_grid(name, volume.grid, grid); !same) return same;
   if (auto finite = check_finite(volume, nan); !finite) return finite;
   auto channel = build_channel(volume, name, step, set);
-  if (!channel) return tl::unexpected(Error{who + ": " + channel.error().message, channel.error().usage});
+  if (!channel) return of_channel(name, channel.error());
   built.channels.push_back(std::move(channel->channel));
   built.keys.push_back(std::move(channel->keys));
   return {};

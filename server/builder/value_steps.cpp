@@ -138,9 +138,7 @@ ValueFormat format_of_numbers(double least, double greatest) {
 
 Result<ValueFormat> exact_format(SampleType type, const SampleSummary& samples) {
   if (type == SampleType::f32) return format_of_numbers(samples.range.least, samples.range.greatest);
-  auto all = samples.all();
-  if (!all) return tl::unexpected(all.error());
-  std::vector<double> values = std::move(*all);
+  std::vector<double> values = samples.all();
   if (is_float(type)) {
     if (const auto found = find_exact_format(type, values, std::numeric_limits<ValueKey>::max() - 1)) return *found;
   }
@@ -169,8 +167,8 @@ Result<ValueFormat> choose_value_format(SampleType type, const SampleSummary& sa
 }
 
 Result<ValueFormat> choose_value_format(const Volume& volume, std::optional<double> step) {
-  const auto all = [&]() -> Result<std::vector<double>> { return visit_samples(volume, [](auto samples) { return all_distinct(samples); }); };
-  return choose_value_format(volume.type, {sample_range(volume), [&] { return few_distinct_samples(volume); }, all}, step);
+  const SampleSummary samples{sample_range(volume), [&] { return few_distinct_samples(volume); }, [&] { return all_distinct_samples(volume); }};
+  return choose_value_format(volume.type, samples, step);
 }
 
 std::vector<double> few_distinct_samples(const Volume& volume) {
@@ -180,6 +178,10 @@ std::vector<double> few_distinct_samples(const Volume& volume) {
     else
       return {};
   });
+}
+
+std::vector<double> all_distinct_samples(const Volume& volume) {
+  return visit_samples(volume, [](auto samples) { return all_distinct(samples); });
 }
 
 std::vector<ValueKey> keys_of(const Volume& volume, const ValueFormat& format) {

@@ -40,13 +40,14 @@ namespace intervale {
 // What the choice asks of samples that are not all in one place.
 struct SampleSummary {
   SampleRange range;
-  std::function<std::vector<double>()> few;          // the distinct ones of floats, ascending; none if they are more than kMostExact
-  std::function<Result<std::vector<double>>()> all;  // the distinct ones, ascending
+  std::function<std::vector<double>()> few;  // the distinct ones of floats, ascending; none if they are more than kMostExact
+  std::function<std::vector<double>()> all;  // the distinct ones, ascending
 };
 inline constexpr std::size_t kMostExact = std::size_t(1) << 16;  // values of an exact format that is chosen unasked
 [[nodiscard]] Result<ValueFormat> choose_value_format(SampleType type, const SampleSummary& samples, std::optional<double> step);
-// SampleSummary::few of a volume.
+// SampleSummary::few and all of a volume.
 [[nodiscard]] std::vector<double> few_distinct_samples(const Volume& volume);
+[[nodiscard]] std::vector<double> all_distinct_samples(const Volume& volume);
 
 // The key of a sample. format: chosen for its volume.
 template <class T>

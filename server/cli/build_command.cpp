@@ -22,6 +22,7 @@
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
 #include "server/builder/build_data_set.h"
+#include "server/cli/build_input.h"
 #include "server/cli/build_options.h"
 #include "server/cli/commands.h"
 #include "server/cli/describe_volume.h"
@@ -29,14 +30,10 @@
 #include "server/resume/fingerprint.h"
 #include "server/scratch/scratch_memory.h"
 #include "server/volume/read_volume.h"
-#include "server/volume/volume_header.h"
+#include "server/volume/volume_reader.h"
 
 namespace intervale {
 namespace {
-
-std::string text_of_dims(const std::string& who, const Grid& grid) {
-  return fmt::format("{} has {} x {} x {} samples", who, grid.dims[0], grid.dims[1], grid.dims[2]);
-}
 
 // A build, and where it keeps what is finished.
 struct Build {
@@ -50,12 +47,12 @@ struct Build {
 // The field, its samples finite.
 Result<Volume> read_field(const Build& build) {
   const BuildCommand& options = build.options;
-  const NamedVolume input = named_volume(options.input, options.part);
+  const auto reader = open_field(options, build.layout);
+  if (!reader) return tl::unexpected(reader.error());
   const auto crop = crop_of(options);
-  auto volume = read_volume(input.path, build.layout, options.time_point, input.part, crop);
+  auto volume = read_samples(**reader, crop);
   if (!volume) return volume;
-  if (volume->components != 1)
-    return misuse("'" + options.input + "' has vectors: choose a component with --part 0, 1 or 2; --channel reads all of it");
+  volume->name = volume_name(named_volume(options.input, options.part).path);
   if (auto finite = check_finite(*volume, options.nan, crop ? crop->first : SampleBox{}.first); !finite) return tl::unexpected(finite.error());
   if (auto set = set_labels(options, volume->labels); !set) return tl::unexpected(set.error());
   volume->name = build.name();
@@ -91,29 +88,20 @@ void tell_of_errors(const Build& build) {
              build.checkpoint->error_scales());
 }
 
-// The samples of a channel. whole: the grid of the field before it was cropped, if it is known.
+// The samples of a channel. whole: as of open_channel().
 Result<Volume> read_channel(const BuildCommand& options, const ChannelInput& input, const std::optional<Grid>& whole) {
-  NamedVolume named = named_volume(input.file.string());
-  const auto header = read_volume_header(named.path, named.part);
-  const bool has_several = header && *header && (*header)->time_points > 1, has_parts = header && *header && !(*header)->parts.empty();
-  if (has_parts && !named.part) named.part = options.part;
-  if (whole && header && *header && (*header)->grid.dims != whole->dims)
-    return fail(text_of_dims("channel '" + printable(input.name) + "'", (*header)->grid) + text_of_dims(", the field", *whole));
-  return read_volume(named.path, {}, has_several && !(*header)->time_point ? options.time_point : std::nullopt, named.part, crop_of(options));
+  const auto reader = open_channel(options, input, whole);
+  if (!reader) return tl::unexpected(reader.error());
+  auto volume = read_samples(**reader, crop_of(options));
+  if (volume) volume->name = volume_name(named_volume(input.file.string()).path);
+  return volume;
 }
 
 // The channels of a data set of this grid and set.
 Result<BuiltChannels> build_channels(const Build& build, const Grid& grid, const SupercubeSet& set, KnownChannels known) {
   const BuildCommand& options = build.options;
   BuiltChannels built;
-  std::optional<Grid> whole;  // of the field, before it was cropped
-  if (!options.dims.empty()) {
-    whole.emplace();
-    std::copy_n(options.dims.begin(), 3, whole->dims.begin());
-  } else if (const NamedVolume field = named_volume(options.input, options.part); !options.crop.empty() && !build.channels.empty()) {
-    const auto header = read_volume_header(field.path, field.part);
-    if (header && *header) whole = (*header)->grid;
-  }
+  const std::optional<Grid> whole = build.channels.empty() ? std::nullopt : whole_grid(options);
   for (std::size_t i = 0; i < build.channels.size(); ++i) {
     if (known[i]) {
       built.channels.push_back(std::move(known[i]->channel));
@@ -228,19 +216,9 @@ Result<std::unique_ptr<BuildCheckpoint>> open_checkpoint(const BuildCommand& opt
   if (!options.resume) return nullptr;
   const std::filesystem::path journal = journal_of(options);
   const std::array<std::filesystem::path, 2> ours{options.output, journal};
-  Fingerprint fingerprint;
-  add_to(fingerprint, options);
-  const NamedVolume input = named_volume(options.input, options.part);
-  fingerprint.add(input.part);
-  if (auto ok = fingerprint.add_input(input.path, ours); !ok) return tl::unexpected(ok.error());
-  for (const ChannelInput& channel : channels) {
-    const NamedVolume named = named_volume(channel.file.string());
-    fingerprint.add(channel.name);
-    fingerprint.add(channel.step);
-    fingerprint.add(named.part);
-    if (auto ok = fingerprint.add_input(named.path, ours); !ok) return tl::unexpected(ok.error());
-  }
-  return BuildCheckpoint::open(journal, fingerprint.value(), [journal](const std::string& what) {
+  const auto fingerprint = fingerprint_of(options, channels, ours);
+  if (!fingerprint) return tl::unexpected(fingerprint.error());
+  return BuildCheckpoint::open(journal, fingerprint->value(), [journal](const std::string& what) {
     fmt::print(stderr, "intervale: warning: '{}' {}\n", printable(journal.string()), what);
   });
 }
@@ -271,21 +249,12 @@ Result<void> run(const BuildCommand& options) {
   if (!layout) return tl::unexpected(layout.error());
   const auto channels = parse_channels(options);
   if (!channels) return tl::unexpected(channels.error());
-  Labels labels;
-  if (auto valid = set_labels(options, labels); !valid) return valid;
   // Before the long computation, not after it.
-  const std::filesystem::path folder = std::filesystem::absolute(options.output).parent_path();
-  if (!std::filesystem::is_directory(folder))
-    return fail("cannot write '" + options.output + "': the folder '" + folder.string() + "' does not exist");
-  const NamedVolume input = named_volume(options.input, options.part);
-  if (auto output = check_output(input.path, options.output); !output) return output;
-  for (const ChannelInput& channel : *channels) {
-    if (auto output = check_output(named_volume(channel.file.string()).path, options.output); !output) return output;
-  }
+  if (auto valid = check_paths(options, *channels); !valid) return valid;
 
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  const auto memory = limit_memory(options, folder, threads);
+  const auto memory = limit_memory(options, std::filesystem::absolute(options.output).parent_path(), threads);
   if (!memory) return tl::unexpected(memory.error());
   const auto checkpoint = open_checkpoint(options, *channels);
   if (!checkpoint) return tl::unexpected(checkpoint.error());

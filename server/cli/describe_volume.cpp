@@ -48,7 +48,9 @@ std::string place_of(const Grid& grid, const Labels& labels) {
   return text;
 }
 
-std::string text_of(const std::vector<Channel>& channels) {
+}  // namespace
+
+std::string text_of(std::span<const Channel> channels) {
   std::string text;
   for (const Channel& channel : channels) {
     text += fmt::format("channel {}: {}{}{}", printable(channel.name), channel.components.size() == 1 ? "scalar" : "vector",
@@ -60,8 +62,6 @@ std::string text_of(const std::vector<Channel>& channels) {
   }
   return text;
 }
-
-}  // namespace
 
 std::uint64_t file_size_of(const std::filesystem::path& file) {
   std::error_code code;

@@ -4,12 +4,16 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/value_file.h"
 
 namespace intervale {
+
+// A line for each channel.
+[[nodiscard]] std::string text_of(std::span<const Channel> channels);
 
 [[nodiscard]] nlohmann::ordered_json stats_of(const IntervalVolume& volume, std::uint64_t file_bytes);
 [[nodiscard]] std::string text_of(const IntervalVolume& volume, std::uint64_t file_bytes);

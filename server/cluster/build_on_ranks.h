@@ -1,5 +1,6 @@
 // Builds a data set of every range by several ranks, each of which has some of the samples.
 //
+// Each rank reads the samples of its boxes, one field after the other: first that of the data set, then the channels.
 // Every byte is that of a build by one program (value_builder.h): what ranks add up are whole numbers, largest errors and
 // bits, which do not depend on the order, and pages are coded by themselves.
 #pragma once
@@ -8,10 +9,11 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "common/ivm/kept_pages.h"
 #include "common/ivm/value_volume.h"
-#include "common/patch/volume.h"
 #include "common/util/result.h"
 #include "server/builder/kept_errors.h"
 #include "server/cluster/rank_samples.h"
@@ -19,13 +21,21 @@
 
 namespace intervale {
 
+// Another field on the grid of the data set.
+struct RankChannel {
+  std::string name;
+  RankInput input;
+  std::optional<double> step;
+};
+
 struct RankBuild {
   FieldDescription field;  // name, grid and labels are known
-  SampleType type = SampleType::u8;
-  ReadBox read_box;  // of that grid
+  RankInput input;         // of that grid, with one number a sample
   std::optional<double> step;
+  std::vector<RankChannel> channels;
   std::filesystem::path output;                                   // the same file for all ranks
-  std::function<void(double)> progress;                           // as of BuildOptions
+  std::function<void(double)> progress;                           // as of BuildOptions, of the field
+  std::function<void(const std::string&)> begins = {};            // called before a channel is read, with its name
   std::function<void(const std::filesystem::path&)> writes = {};  // called with the temporary file before it is written, and with nothing after it
   KeptErrors* errors = nullptr;                                   // of this rank; as of BuildOptions
   KeptPages* pages = nullptr;                                     // likewise

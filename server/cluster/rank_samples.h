@@ -4,28 +4,35 @@
 // computes with a volume computes with it, as long as it reads no other samples.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/diamond/domain.h"
 #include "common/patch/volume.h"
 #include "common/util/result.h"
+#include "server/cluster/ranks.h"
+#include "server/volume/volume_header.h"
+#include "server/volume/volume_reader.h"
 
 namespace intervale {
 
-// Samples of a box of a volume, finite.
-using ReadBox = std::function<Result<Volume>(const SampleBox&)>;
+// A volume that all ranks read.
+struct RankInput {
+  std::string name;                                             // in complaints
+  std::function<Result<std::unique_ptr<VolumeReader>>()> open;  // from its beginning
+  std::optional<SampleBox> crop = {};                           // what is kept of it; nothing: all
+  std::optional<double> nan = {};                               // as of check_finite()
+};
 
 class RankSamples {
  public:
   RankSamples(const Domain& domain, SampleType type);
-
-  // Reads the samples of these cells, a layer of cells after the other. seen: called with each layer that is read, which
-  // may have more samples than those of the cells.
-  [[nodiscard]] Result<void> read(const std::vector<bool>& cells, const ReadBox& read_box, const std::function<void(const Volume&)>& seen);
 
   // Calls visit with the samples of these cells, side by side, a layer of cells after the other. The dims of those
   // volumes say nothing. changes: what it did to them is kept.
@@ -34,15 +41,24 @@ class RankSamples {
   [[nodiscard]] std::span<std::byte> bytes() { return {bytes_.get(), count_ * size_of(type_)}; }  // of all samples
   [[nodiscard]] std::span<const std::byte> bytes() const { return {bytes_.get(), count_ * size_of(type_)}; }
   [[nodiscard]] SampleType type() const { return type_; }
-
- private:
   [[nodiscard]] std::byte* at(std::int32_t x, std::int32_t y, std::int32_t z) const {
     return bytes_.get() + ((std::size_t(z) * std::size_t(last_.y + 1) + std::size_t(y)) * std::size_t(last_.x + 1) + std::size_t(x)) * size_of(type_);
   }
+
+ private:
   Vertex last_;
   SampleType type_;
   std::size_t count_;
   std::unique_ptr<std::byte[]> bytes_;
 };
+
+// What its file says. Fails on all ranks if on one, as all that follows.
+[[nodiscard]] Result<VolumeHeader> read_header_on_ranks(Ranks& ranks, const RankInput& input);
+
+// Reads these cells of a volume, which has the domain's dims once it is cropped: an array for each component. Slope and
+// intercept are applied, and samples that are not finite replaced. Reads a layer of cells after the other, in one pass; in
+// two with slope or intercept, since the type of the values depends on all of them.
+[[nodiscard]] Result<std::vector<RankSamples>> read_on_ranks(Ranks& ranks, const RankInput& input, const VolumeHeader& header, const Domain& domain,
+                                                             const std::vector<bool>& cells);
 
 }  // namespace intervale

@@ -2,8 +2,12 @@
 
 #include <fcntl.h>
 #include <unistd.h>
+#include <xxhash.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -39,7 +43,7 @@ Result<void> write_pieces(const std::filesystem::path& path, std::span<const Sha
 
 }  // namespace
 
-Result<void> write_shared_file(Ranks& ranks, const std::filesystem::path& path, std::span<const SharedPiece> pieces,
+Result<void> write_shared_file(Ranks& ranks, const std::filesystem::path& path, std::span<const SharedPiece> pieces, const LastPieces& last,
                                const std::function<void(const std::filesystem::path&)>& writes) {
   std::optional<AtomicFile> file;
   Result<void> result;
@@ -59,13 +63,32 @@ Result<void> write_shared_file(Ranks& ranks, const std::filesystem::path& path, 
   const std::vector<char> name = joined<char>(ranks, temporary);  // of rank 0 only
   temporary.assign(name.begin(), name.end());
   if (writes) writes(temporary);
-  result = write_pieces(temporary, pieces);
-  if (!result) result = fail("rank " + std::to_string(ranks.rank()) + " cannot write '" + path.string() + "': " + result.error().message);
-  result = agree(ranks, result);
+  const auto write = [&](std::span<const SharedPiece> some) -> Result<void> {
+    auto written = write_pieces(temporary, some);
+    if (!written) return fail("rank " + std::to_string(ranks.rank()) + " cannot write '" + path.string() + "': " + written.error().message);
+    return written;
+  };
+  result = agree(ranks, write(pieces));
+  if (result && file) result = last(temporary).and_then(write);
   if (result && file) result = file->commit();
   file.reset();
   if (writes) writes({});
   return agree(ranks, result);
+}
+
+Result<std::uint64_t> checksum_of(const std::filesystem::path& file, std::uint64_t offset, std::uint64_t bytes) {
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(std::streamoff(offset));
+  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+  XXH3_64bits_reset(state.get());
+  std::vector<char> chunk(std::min<std::uint64_t>(bytes, 1 << 20));
+  while (bytes > 0) {
+    const auto some = std::min<std::uint64_t>(bytes, chunk.size());
+    if (!in.read(chunk.data(), std::streamsize(some))) return fail("cannot read '" + file.string() + "'");
+    XXH3_64bits_update(state.get(), chunk.data(), some);
+    bytes -= some;
+  }
+  return XXH3_64bits_digest(state.get());
 }
 
 }  // namespace intervale

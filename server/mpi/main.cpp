@@ -25,11 +25,14 @@
 #include <vector>
 
 #include "common/parallel/all_cores.h"
+#include "common/program/describe.h"
 #include "common/program/program.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
+#include "server/cli/build_input.h"
 #include "server/cli/build_options.h"
+#include "server/cli/describe_volume.h"
 #include "server/cluster/build_on_ranks.h"
 #include "server/mpi/mpi_ranks.h"
 #include "server/resume/build_checkpoint.h"
@@ -80,77 +83,61 @@ class OwnErrors {
 };
 
 Result<void> check_supported(const BuildCommand& options) {
-  const auto refuse = [](const char* what) { return misuse(std::string(what) + " under mpirun is not supported yet: build with one process"); };
   const auto range = parse_range(options.range);
   if (!range) return tl::unexpected(range.error());
-  if (*range) return refuse("a data set of one range");
+  if (*range) return misuse("a data set of one range under mpirun is not supported yet: build with one process");
   if (options.refine != "boundary") return misuse("--refine belongs to a range: give --range too, or --refine to extract");
-  if (!options.channels.empty() || !options.channel_steps.empty()) return refuse("--channel");
-  if (!options.crop.empty()) return refuse("--crop");
   if (options.scratch && !options.memory && !options.resume)
     return misuse("--scratch belongs to a limit of memory, or to --resume: give --memory or --resume too");
-  const std::filesystem::path folder = std::filesystem::absolute(options.output).parent_path();
-  if (!std::filesystem::is_directory(folder))
-    return fail("cannot write '" + options.output + "': the folder '" + folder.string() + "' does not exist");
-  return check_output(named_volume(options.input, options.part).path, options.output);
+  return {};
 }
 
-// What is to be built, as far as the header of the input says it.
-struct Input {
-  NamedVolume named;
-  std::optional<RawLayout> layout;
-  RankBuild build;
-};
-
-Result<Volume> read_box(const BuildCommand& options, const Input& input, const SampleBox& box) {
-  auto volume = read_volume(input.named.path, input.layout, options.time_point, input.named.part, box);
-  if (!volume) return volume;
-  if (auto finite = check_finite(*volume, options.nan, box.first); !finite) return tl::unexpected(finite.error());
-  return volume;
-}
-
-Result<Input> open_input(const BuildCommand& options) {
+// What is to be built, as far as the options and the headers of the inputs say it. options: must outlive it.
+Result<RankBuild> open_inputs(const BuildCommand& options, const std::vector<ChannelInput>& channels) {
   if (auto ok = check_supported(options); !ok) return tl::unexpected(ok.error());
   const auto layout = parse_layout(options);
   if (!layout) return tl::unexpected(layout.error());
-  Input input{named_volume(options.input, options.part), *layout, {}};
-  const auto reader = open_volume(input.named.path, input.layout, options.time_point, input.named.part);
+  if (auto ok = check_paths(options, channels); !ok) return tl::unexpected(ok.error());
+  RankBuild build;
+  const auto input_of = [&](const std::string& file, const std::optional<std::string>& part) {
+    return RankInput{volume_name(named_volume(file, part).path), {}, crop_of(options), options.nan};
+  };
+  build.input = input_of(options.input, options.part);
+  build.input.open = [&options, layout = *layout] { return open_field(options, layout); };
+  const auto whole = channels.empty() ? std::nullopt : whole_grid(options);
+  for (const ChannelInput& channel : channels) {
+    RankChannel& to = build.channels.emplace_back(RankChannel{channel.name, input_of(channel.file.string(), {}), channel.step});
+    to.input.open = [&options, channel, whole] { return open_channel(options, channel, whole); };
+  }
+  const auto reader = build.input.open();
   if (!reader) return tl::unexpected(reader.error());
   const VolumeHeader& header = (*reader)->header();
-  if (header.encoding != Encoding::raw || header.base64_skip || header.slope != 1 || header.intercept != 0)
-    return misuse("under mpirun, samples must lie in their file as they are, neither compressed nor to be rescaled: convert '" + options.input +
-                  "', or build with one process");
-  if (header.components != 1 && !header.component)
-    return misuse("'" + options.input + "' has vectors: choose a component with --part 0, 1 or 2; --channel reads all of it");
-  RankBuild& build = input.build;
+  const auto grid = build.input.crop ? cropped(header.grid, *build.input.crop) : Result<Grid>(header.grid);
+  if (!grid) return tl::unexpected(grid.error());
+  if (auto ok = check_grid(*grid); !ok) return tl::unexpected(ok.error());
   build.field.name = std::filesystem::path(options.output).stem().string();
-  build.field.grid = header.grid;
+  build.field.grid = *grid;
   build.field.labels = header.labels;
-  build.type = header.type;
+  if (auto set = set_labels(options, build.field.labels); !set) return tl::unexpected(set.error());
   build.step = options.step;
   build.output = options.output;
-  if (auto ok = check_grid(header.grid); !ok) return tl::unexpected(ok.error());
-  if (auto set = set_labels(options, build.field.labels); !set) return tl::unexpected(set.error());
-  return input;
+  return build;
 }
 
 // What a job of as many ranks before this one has finished, if it is to be kept: a journal for each rank.
-Result<std::unique_ptr<BuildCheckpoint>> open_checkpoint(const BuildCommand& options, const Ranks& ranks) {
+Result<std::unique_ptr<BuildCheckpoint>> open_checkpoint(const BuildCommand& options, const std::vector<ChannelInput>& channels, const Ranks& ranks) {
   if (!options.resume) return nullptr;
   std::filesystem::path journal = options.output + fmt::format(".{}-of-{}.resume", ranks.rank(), ranks.size());
-  Fingerprint fingerprint;
   if (options.scratch) {
     Fingerprint folder;
     folder.add(std::filesystem::absolute(options.output).lexically_normal().string());
     journal = std::filesystem::path(*options.scratch) / fmt::format("{:016x}-{}", folder.value(), journal.filename().string());
   }
-  add_to(fingerprint, options);
-  fingerprint.add(ranks.size());
-  const NamedVolume input = named_volume(options.input, options.part);
-  fingerprint.add(input.part);
   const std::array<std::filesystem::path, 2> ours{options.output, journal};
-  if (auto ok = fingerprint.add_input(input.path, ours); !ok) return tl::unexpected(ok.error());
-  return BuildCheckpoint::open(journal, fingerprint.value(), [journal](const std::string& what) {
+  auto fingerprint = fingerprint_of(options, channels, ours);
+  if (!fingerprint) return tl::unexpected(fingerprint.error());
+  fingerprint->add(ranks.size());
+  return BuildCheckpoint::open(journal, fingerprint->value(), [journal](const std::string& what) {
     fmt::print(stderr, "intervale: warning: '{}' {}\n", printable(journal.string()), what);
   });
 }
@@ -166,6 +153,7 @@ Result<void> tell(const BuildCommand& options, const BuiltByRanks& built, const 
   if (options.json) {
     return print_json({{"name", d.name},
                        {"scope", "every"},
+                       {"channels", to_json(d.channels)},
                        {"type", name_of(d.format.type)},
                        {"values", {{"least", d.format.least()}, {"greatest", d.format.greatest()}}},
                        {"step", d.is_exact ? 0.0 : d.format.step},
@@ -177,19 +165,22 @@ Result<void> tell(const BuildCommand& options, const BuiltByRanks& built, const 
                        {"resident_bytes", resident},
                        {"seconds", seconds}});
   }
-  return print(fmt::format(
-      "{}: {} x {} x {} samples of type {}, every range\n{} updates, {} supercubes, largest error {:g}, in the file {}\n"
-      "{} ranks, each with {} resident at most\nwrote {} in {:.2f} s\n",
-      printable(d.name), d.grid.dims[0], d.grid.dims[1], d.grid.dims[2], name_of(d.format.type), built.updates, built.supercubes, d.max_error,
-      human_bytes(built.file_bytes), resident.size(), human_bytes(*std::max_element(resident.begin(), resident.end())), options.output, seconds));
+  return print(
+      fmt::format("{}: {} x {} x {} samples of type {}, every range\n{}{} updates, {} supercubes, largest error {:g}, in the file {}\n"
+                  "{} ranks, each with {} resident at most\nwrote {} in {:.2f} s\n",
+                  printable(d.name), d.grid.dims[0], d.grid.dims[1], d.grid.dims[2], name_of(d.format.type), text_of(d.channels), built.updates,
+                  built.supercubes, d.max_error, human_bytes(built.file_bytes), resident.size(),
+                  human_bytes(*std::max_element(resident.begin(), resident.end())), options.output, seconds));
 }
 
 Result<void> run(const BuildCommand& options, MpiRanks& ranks) {
   const auto start = std::chrono::steady_clock::now();
   // What fails on one rank must fail on all: none may wait for it.
   const auto all_have = [&ranks](const auto& result) { return agree(ranks, result ? Result<void>() : Result<void>(tl::unexpected(result.error()))); };
-  auto input = open_input(options);
-  if (auto ok = all_have(input); !ok) return ok;
+  const auto channels = parse_channels(options);
+  if (auto ok = all_have(channels); !ok) return ok;
+  auto build = open_inputs(options, *channels);
+  if (auto ok = all_have(build); !ok) return ok;
   const unsigned threads = options.threads != 0 ? options.threads : unsigned(tbb::info::default_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   Result<std::unique_ptr<ScratchMemory>> memory = nullptr;
@@ -199,22 +190,21 @@ Result<void> run(const BuildCommand& options, MpiRanks& ranks) {
   }
   if (auto ok = all_have(memory); !ok) return ok;
   if (*memory) ScratchMemory::install(**memory);
-  auto checkpoint = open_checkpoint(options, ranks);
+  auto checkpoint = open_checkpoint(options, *channels, ranks);
   if (auto ok = all_have(checkpoint); !ok) return ok;
 
   std::optional<Progress> progress;
-  RankBuild& build = input->build;
-  build.read_box = [&](const SampleBox& box) { return read_box(options, *input, box); };
-  build.writes = remember;
-  build.errors = checkpoint->get();
-  build.pages = checkpoint->get();
+  build->writes = remember;
+  build->errors = checkpoint->get();
+  build->pages = checkpoint->get();
   if (*checkpoint && ((*checkpoint)->error_scales() > 0 || (*checkpoint)->pages() > 0))
     fmt::print(stderr, "intervale: going on from '{}' and those of the other ranks\n", printable((*checkpoint)->path().string()));
   if (ranks.rank() == 0) {
-    progress.emplace("building " + build.field.name);
-    build.progress = [&progress](double done) { progress->fraction(done); };
+    progress.emplace("building " + build->field.name);
+    build->progress = [&progress](double done) { progress->fraction(done); };
+    build->begins = [&progress](const std::string& channel) { progress.emplace("channel " + printable(channel)); };
   }
-  const auto built = build_on_ranks(ranks, build);
+  const auto built = build_on_ranks(ranks, *build);
   progress.reset();
   if (!built) return tl::unexpected(built.error());
   if (*checkpoint) (*checkpoint)->remove();

@@ -83,12 +83,6 @@ Result<void> choose_part(VolumeHeader& header, const std::optional<std::string>&
   return {};
 }
 
-// Of the volume in a file or a folder.
-std::string name_of(const std::filesystem::path& path) {
-  const auto whole = path.lexically_normal();
-  return whole.has_filename() ? whole.stem().string() : whole.parent_path().filename().string();  // a folder's may end with '/'
-}
-
 // first: of the samples that were read, in the file.
 std::string position_of(std::size_t index, const Grid& grid, const std::array<std::int64_t, 3>& first) {
   const auto x = static_cast<std::size_t>(grid.dims[0]), y = static_cast<std::size_t>(grid.dims[1]);
@@ -170,12 +164,17 @@ Result<std::unique_ptr<VolumeReader>> open_volume(const std::filesystem::path& p
   return open_samples(*file, found, time_point);
 }
 
+std::string volume_name(const std::filesystem::path& path) {
+  const auto whole = path.lexically_normal();
+  return whole.has_filename() ? whole.stem().string() : whole.parent_path().filename().string();  // a folder's may end with '/'
+}
+
 Result<Volume> read_volume(const std::filesystem::path& path, const std::optional<RawLayout>& layout, std::optional<std::uint64_t> time_point,
                            const std::optional<std::string>& part, const std::optional<SampleBox>& crop) {
   const auto reader = open_volume(path, layout, time_point, part);
   if (!reader) return tl::unexpected<Error>(reader.error());
   auto volume = read_samples(**reader, crop);
-  if (volume) volume->name = name_of(path);
+  if (volume) volume->name = volume_name(path);
   return volume;
 }
 

@@ -46,6 +46,9 @@ INTERVALE_EXPORT Result<Volume> read_volume(const std::filesystem::path& path, c
                                             std::optional<std::uint64_t> time_point = {}, const std::optional<std::string>& part = {},
                                             const std::optional<SampleBox>& crop = {});
 
+// What a volume in a file or a folder is called: its name, without folders and extension.
+[[nodiscard]] std::string volume_name(const std::filesystem::path& path);
+
 // The samples of one component of a volume, as a volume: component < volume.components.
 [[nodiscard]] INTERVALE_EXPORT Volume component_of(const Volume& volume, unsigned component);
 

@@ -38,19 +38,6 @@ std::optional<SampleType> integer_type(SampleType type, double least, double gre
   return {};
 }
 
-// Of those that are no NaN; zeros if all are.
-template <class T>
-std::pair<T, T> least_and_greatest(std::span<const T> samples) {
-  const auto is_number = [](T sample) { return sample == sample; };
-  const auto first = std::find_if(samples.begin(), samples.end(), is_number);
-  std::pair<T, T> found = first == samples.end() ? std::pair(T(0), T(0)) : std::pair(*first, *first);
-  for (const T sample : samples) {
-    if (sample < found.first) found.first = sample;
-    if (sample > found.second) found.second = sample;
-  }
-  return found;
-}
-
 // Whether f32 keeps values apart that are a stored step apart, by a sixteenth of it. Of stored floats: as they are.
 template <class T>
 bool is_f32_enough(double slope, double intercept, double most) {
@@ -61,20 +48,40 @@ bool is_f32_enough(double slope, double intercept, double most) {
 
 }  // namespace
 
+void StoredRange::add(const Volume& volume) {
+  visit_samples(volume, [this]<class T>(std::span<const T> samples) {
+    for (const T sample : samples) {
+      if (double(sample) < least) least = double(sample);
+      if (double(sample) > greatest) greatest = double(sample);
+    }
+  });
+}
+
+SampleType rescaled_type(SampleType stored, const StoredRange& range, double slope, double intercept) {
+  if (slope == 1 && intercept == 0) return stored;
+  const bool is_any = range.least <= range.greatest;  // not so if all are NaN
+  const auto [low, high] = std::minmax({slope * (is_any ? range.least : 0) + intercept, slope * (is_any ? range.greatest : 0) + intercept});
+  if (!is_float(stored) && is_whole(slope) && is_whole(intercept)) {
+    if (const auto type = integer_type(stored, low, high)) return *type;
+  }
+  const double most = std::max(std::abs(low), std::abs(high));
+  const bool is_enough = visit_samples(stored, {}, [&]<class T>(std::span<const T>) { return is_f32_enough<T>(slope, intercept, most); });
+  return is_enough ? SampleType::f32 : SampleType::f64;
+}
+
+void rescale(Volume& volume, double slope, double intercept, SampleType to) {
+  if (slope == 1 && intercept == 0) return;
+  volume.bytes = visit_samples(volume, [&](auto samples) {
+    return visit_samples(to, {}, [&]<class To>(std::span<const To>) { return converted<To>(samples, slope, intercept); });
+  });
+  volume.type = to;
+}
+
 void rescale(Volume& volume, double slope, double intercept) {
   if (slope == 1 && intercept == 0) return;
-  visit_samples(volume, [&]<class T>(std::span<const T> samples) {
-    if (samples.empty()) return;
-    const auto [least, greatest] = least_and_greatest(samples);
-    const auto [low, high] = std::minmax({slope * double(least) + intercept, slope * double(greatest) + intercept});
-    std::optional<SampleType> type;
-    if (std::is_integral_v<T> && is_whole(slope) && is_whole(intercept)) type = integer_type(volume.type, low, high);
-    if (!type) type = is_f32_enough<T>(slope, intercept, std::max(std::abs(low), std::abs(high))) ? SampleType::f32 : SampleType::f64;
-    const Volume shape{{}, {}, *type, {}};
-    auto bytes = visit_samples(shape, [&]<class To>(std::span<const To>) { return converted<To>(samples, slope, intercept); });
-    volume.type = *type;
-    volume.bytes = std::move(bytes);
-  });
+  StoredRange range;
+  range.add(volume);
+  rescale(volume, slope, intercept, rescaled_type(volume.type, range, slope, intercept));
 }
 
 }  // namespace intervale

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,8 +57,17 @@ struct VolumeHeader {
 // The time point to read: without a choice the only one. To choose none of several, or one that is not there, is misuse.
 [[nodiscard]] Result<std::uint64_t> check_time_point(const VolumeHeader& header, std::optional<std::uint64_t> time_point, const std::string& where);
 
-// Makes values of stored numbers: whole ones if slope and intercept are whole and all fit one of the integer types,
-// else f32 if that keeps apart what the stored numbers do, else f64. A slope of 1 and an intercept of 0 change nothing.
+// The least and the greatest of stored numbers. NaN is neither.
+struct StoredRange {
+  double least = std::numeric_limits<double>::infinity(), greatest = -std::numeric_limits<double>::infinity();  // of none
+  void add(const Volume& volume);
+};
+// The type of the values of stored numbers: of integers if slope and intercept are whole and one holds them all, else f32 if
+// that keeps apart what the stored numbers do, else f64. A slope of 1 and an intercept of 0 change nothing.
+[[nodiscard]] SampleType rescaled_type(SampleType stored, const StoredRange& range, double slope, double intercept);
+// Makes values of stored numbers. to: their type, as it is for these numbers and others.
+void rescale(Volume& volume, double slope, double intercept, SampleType to);
+// The same, of numbers that are all there are.
 void rescale(Volume& volume, double slope, double intercept);
 
 }  // namespace intervale

@@ -16,7 +16,7 @@ constexpr std::uint64_t kChunk = 1 << 16;
 class Appender {
  public:
   Appender(VolumeReader& reader, std::vector<std::byte>& to, std::uint64_t needed) : reader_(reader), to_(to) {
-    to.reserve(reader.is_long_enough() ? needed : std::min(needed, kFirstBytes));
+    to.reserve(to.size() + (reader.is_long_enough() ? needed : std::min(needed, kFirstBytes)));
   }
   Result<void> append(std::uint64_t bytes) {
     while (bytes > 0) {
@@ -33,23 +33,6 @@ class Appender {
   VolumeReader& reader_;
   std::vector<std::byte>& to_;
 };
-
-Result<Grid> grid_of(const Grid& whole, const SampleBox& box) {
-  std::array<std::int64_t, 3> dims{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::int64_t first = box.first[axis], last = box.last[axis], most = whole.dims[axis] - 1;
-    const auto place = std::string(" on ") + "xyz"[axis];
-    if (first < 0 || last > most)
-      return misuse("the samples" + place + " go from 0 to " + std::to_string(most) + ", and " + std::to_string(first) + " to " +
-                    std::to_string(last) + " were chosen");
-    if (last <= first) return misuse("two samples" + place + " at least must be chosen, the first before the last");
-    dims[axis] = last - first + 1;
-  }
-  Affine affine = whole.affine;
-  const Vec3 origin = affine.point({double(box.first[0]), double(box.first[1]), double(box.first[2])});
-  for (std::size_t row = 0; row < 3; ++row) affine.rows[4 * row + 3] = origin[row];
-  return make_grid(dims, affine, "the chosen samples");
-}
 
 // A row along x, from which `component` is kept of each of its samples first to last.
 class RowPicker {
@@ -99,36 +82,58 @@ Result<void> VolumeReader::skip_next(std::uint64_t bytes) {
   return {};
 }
 
+Result<Grid> cropped(const Grid& whole, const SampleBox& box) {
+  std::array<std::int64_t, 3> dims{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int64_t first = box.first[axis], last = box.last[axis], most = whole.dims[axis] - 1;
+    const auto place = std::string(" on ") + "xyz"[axis];
+    if (first < 0 || last > most)
+      return misuse("the samples" + place + " go from 0 to " + std::to_string(most) + ", and " + std::to_string(first) + " to " +
+                    std::to_string(last) + " were chosen");
+    if (last <= first) return misuse("two samples" + place + " at least must be chosen, the first before the last");
+    dims[axis] = last - first + 1;
+  }
+  Affine affine = whole.affine;
+  const Vec3 origin = affine.point({double(box.first[0]), double(box.first[1]), double(box.first[2])});
+  for (std::size_t row = 0; row < 3; ++row) affine.rows[4 * row + 3] = origin[row];
+  return make_grid(dims, affine, "the chosen samples");
+}
+
+Result<void> BoxReader::read(const SampleBox& box, std::vector<std::byte>& to) {
+  const VolumeHeader& header = reader_.header();
+  const auto [nx, ny, nz] = header.grid.dims;
+  const std::uint64_t row = std::uint64_t(nx) * header.components * size_of(header.type), slice = row * std::uint64_t(ny);
+  const std::uint64_t before = std::uint64_t(box.first[1]) * row, after = std::uint64_t(ny - 1 - box.last[1]) * row;
+  const bool has_whole_rows = box.first[0] == 0 && box.last[0] == nx - 1 && (header.components == 1 || !header.component);
+  std::uint64_t needed = size_of(header.type) * (header.component ? 1 : header.components);
+  for (std::size_t axis = 0; axis < 3; ++axis) needed *= std::uint64_t(box.last[axis] - box.first[axis] + 1);
+  if (auto done = reader_.skip(std::uint64_t(box.first[2] - next_z_) * slice); !done) return done;
+  next_z_ = box.last[2] + 1;
+  Appender appender(reader_, to, needed);
+  if (has_whole_rows && before + after == 0) return appender.append(needed);
+  RowPicker picker(header, box.first[0], box.last[0]);
+  for (std::int64_t z = box.first[2]; z <= box.last[2]; ++z) {
+    if (auto done = reader_.skip(before); !done) return done;
+    for (std::int64_t y = box.first[1]; y <= box.last[1]; ++y) {
+      if (auto done = has_whole_rows ? appender.append(row) : picker.pick(reader_, to); !done) return done;
+    }
+    if (auto done = reader_.skip(after); !done) return done;
+  }
+  return {};
+}
+
 Result<Volume> read_samples(VolumeReader& reader, const std::optional<SampleBox>& box) {
   const VolumeHeader& header = reader.header();
-  const Grid& whole = header.grid;
-  Volume volume{{}, whole, header.type, {}, header.labels, header.component ? 1 : header.components};
+  Volume volume{{}, header.grid, header.type, {}, header.labels, header.component ? 1 : header.components};
   SampleBox kept;
-  for (std::size_t axis = 0; axis < 3; ++axis) kept.last[axis] = whole.dims[axis] - 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) kept.last[axis] = header.grid.dims[axis] - 1;
   if (box) {
-    const auto grid = grid_of(whole, *box);
+    const auto grid = cropped(header.grid, *box);
     if (!grid) return tl::unexpected<Error>(grid.error());
     volume.grid = *grid;
     kept = *box;
   }
-  const std::uint64_t row = std::uint64_t(whole.dims[0]) * header.components * size_of(header.type), slice = row * std::uint64_t(whole.dims[1]);
-  const std::uint64_t needed = volume.grid.sample_count() * volume.components * size_of(header.type);
-  const bool has_whole_rows = volume.grid.dims[0] == whole.dims[0] && volume.components == header.components;
-  const std::uint64_t before = std::uint64_t(kept.first[1]) * row, after = std::uint64_t(whole.dims[1] - 1 - kept.last[1]) * row;
-  Appender appender(reader, volume.bytes, needed);
-  if (auto done = reader.skip(std::uint64_t(kept.first[2]) * slice); !done) return tl::unexpected<Error>(done.error());
-  if (has_whole_rows && before + after == 0) {
-    if (auto done = appender.append(needed); !done) return tl::unexpected<Error>(done.error());
-  } else {
-    RowPicker picker(header, kept.first[0], kept.last[0]);
-    for (std::int64_t z = kept.first[2]; z <= kept.last[2]; ++z) {
-      if (auto done = reader.skip(before); !done) return tl::unexpected<Error>(done.error());
-      for (std::int64_t y = kept.first[1]; y <= kept.last[1]; ++y) {
-        if (auto done = has_whole_rows ? appender.append(row) : picker.pick(reader, volume.bytes); !done) return tl::unexpected<Error>(done.error());
-      }
-      if (auto done = reader.skip(after); !done) return tl::unexpected<Error>(done.error());
-    }
-  }
+  if (auto done = BoxReader(reader).read(kept, volume.bytes); !done) return tl::unexpected<Error>(done.error());
   rescale(volume, header.slope, header.intercept);
   return volume;
 }

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "common/patch/volume.h"
 #include "common/util/result.h"
@@ -56,8 +57,24 @@ struct RawLayout;
 // Of a file of exactly skip_bytes + samples. An invalid layout is misuse; a file of another size fails with both sizes.
 [[nodiscard]] Result<std::unique_ptr<VolumeReader>> open_raw(const std::filesystem::path& path, const RawLayout& layout);
 
+// The grid of the samples in a box. To choose what is not there, or too little for a volume, is misuse.
+[[nodiscard]] Result<Grid> cropped(const Grid& whole, const SampleBox& box);
+
+// Reads boxes of a volume one after the other, with all components of a sample, or the chosen one.
+class BoxReader {
+ public:
+  // reader: at its beginning; must outlive this.
+  explicit BoxReader(VolumeReader& reader) : reader_(reader) {}
+  // Appends the stored numbers of a box that lies in the volume, and on z behind all boxes before it.
+  [[nodiscard]] Result<void> read(const SampleBox& box, std::vector<std::byte>& to);
+
+ private:
+  VolumeReader& reader_;
+  std::int64_t next_z_ = 0;
+};
+
 // The samples of a reader at its beginning that lie in the box; none: all. Of vectors the component, if one is chosen,
-// else all. Slope and intercept are applied. To choose what is not there, or too little for a volume, is misuse.
+// else all. Slope and intercept are applied. Fails as cropped().
 [[nodiscard]] Result<Volume> read_samples(VolumeReader& reader, const std::optional<SampleBox>& box = {});
 
 }  // namespace intervale

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -15,10 +16,13 @@
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "tests/support/library_files.h"
 #include "tests/support/programs.h"
 #include "tests/support/temp_dir.h"
+#include "tests/support/volume_files.h"
 
 namespace intervale {
 namespace {
@@ -52,14 +56,14 @@ struct ClusterBuild : ::testing::Test {
     return Arguments{program("intervale"), "build"} + input + Arguments{"-o", to, "--threads", "1"} + more;
   }
   [[nodiscard]] std::string sample(const std::string& field, const std::string& size) const {
-    const std::string volume = folder / (field + size + ".nrrd");
+    std::string volume = folder / (field + size + ".nrrd");
     EXPECT_EQ(run({program("intervale"), "sample", field, "--size", size, "--type", "u16", "-o", volume}).status, 0);
     return volume;
   }
-  void expect_same_file(const Arguments& input, const Arguments& more = {}) const {
+  void expect_same_file(const Arguments& input, const Arguments& more = {}, const std::vector<int>& sizes = {1, 2, 4, 8}) const {
     const auto plain = run(build(input, expected, more));
     ASSERT_EQ(plain.status, 0) << plain.err;
-    for (const int ranks : {1, 2, 4, 8}) {
+    for (const int ranks : sizes) {
       std::filesystem::remove(out);
       const auto made = run(on_ranks(ranks, build(input, out, more)));
       ASSERT_EQ(made.status, 0) << made.err;
@@ -73,10 +77,10 @@ struct ClusterBuild : ::testing::Test {
   }
 };
 
-// Raw samples that fill all of their type, in a wave with some noise.
+// Samples from `least` to `greatest`, in a wave with some noise.
 template <class T>
-Arguments raw_volume(const TempDir& folder, const std::array<int, 3>& dims, const char* type, double least, double greatest) {
-  std::mt19937 random(7);
+std::string wave(const std::array<int, 3>& dims, double least, double greatest, unsigned seed = 7) {
+  std::mt19937 random(seed);
   std::string bytes;
   for (int z = 0; z < dims[2]; ++z) {
     for (int y = 0; y < dims[1]; ++y) {
@@ -87,7 +91,19 @@ Arguments raw_volume(const TempDir& folder, const std::array<int, 3>& dims, cons
       }
     }
   }
-  return {folder.file("raw", bytes).string(), "--dims", std::to_string(dims[0]), std::to_string(dims[1]), std::to_string(dims[2]), "--type", type};
+  return bytes;
+}
+
+// Raw ones, that fill all of their type.
+template <class T>
+Arguments raw_volume(const TempDir& folder, const std::array<int, 3>& dims, const char* type, double least, double greatest) {
+  return {folder.file("raw", wave<T>(dims, least, greatest)).string(),
+          "--dims",
+          std::to_string(dims[0]),
+          std::to_string(dims[1]),
+          std::to_string(dims[2]),
+          "--type",
+          type};
 }
 
 TEST_F(ClusterBuild, OfFewBytesIsTheSameFile) { expect_same_file(raw_volume<std::uint8_t>(folder, {37, 65, 20}, "u8", 0, 255)); }
@@ -98,6 +114,90 @@ TEST_F(ClusterBuild, OfFloatsWithAStepIsTheSameFile) { expect_same_file(raw_volu
 TEST_F(ClusterBuild, OfExactFloatsIsTheSameFile) { expect_same_file(raw_volume<float>(folder, {66, 65, 64}, "f32", -1, 2), {"--step", "0"}); }
 TEST_F(ClusterBuild, OfAThinBoxIsTheSameFile) { expect_same_file(raw_volume<std::uint16_t>(folder, {150, 3, 150}, "u16", 0, 65535)); }
 TEST_F(ClusterBuild, OfACubeIsTheSameFile) { expect_same_file({sample("marschner-lobb", "129")}); }
+
+TEST_F(ClusterBuild, OfATableIsTheSameFile) {
+  expect_same_file(raw_volume<double>(folder, {65, 20, 66}, "f64", -1, 2), {"--step", "0"}, {3});
+  expect_same_file(raw_volume<std::int32_t>(folder, {65, 20, 66}, "i32", -0x1p31, 0x1p31 - 1), {}, {3});
+}
+
+constexpr std::array<int, 3> kWaveDims{70, 66, 68};
+
+// One number a sample, or a vector of three.
+std::string nrrd(const std::string& type, const std::string& samples, bool is_vector = false, bool is_compressed = false) {
+  std::string sizes;
+  for (const int n : kWaveDims) sizes += " " + std::to_string(n);
+  return "NRRD0004\ntype: " + type + "\nendian: little\nencoding: " + (is_compressed ? "gzip" : "raw") + "\n" +
+         (is_vector ? "dimension: 4\nkinds: vector domain domain domain\nsizes: 3" : "dimension: 3\nsizes:") + sizes + "\n\n" +
+         (is_compressed ? testing::deflated(samples, testing::Wrapping::gzip) : samples);
+}
+
+// Of numbers that mean slope * number + intercept.
+std::string nifti(const std::string& samples, float slope, float intercept) {
+  std::string header(352, '\0');
+  const auto put = [&header](std::size_t at, auto number) { std::memcpy(&header[at], &number, sizeof number); };
+  put(0, std::int32_t(348));
+  put(40, std::int16_t(3));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    put(42 + 2 * axis, std::int16_t(kWaveDims[axis]));
+    put(80 + 4 * axis, 1.0F);
+  }
+  put(70, std::int16_t(4));  // i16
+  put(72, std::int16_t(16));
+  put(108, 352.0F);
+  put(112, slope);
+  put(116, intercept);
+  header.replace(344, 3, "n+1");
+  return header + samples;
+}
+
+TEST_F(ClusterBuild, OfCompressedSamplesIsTheSameFile) {
+  const std::string file = folder.file("wave.nrrd", nrrd("short", wave<std::int16_t>(kWaveDims, -900, 3000), false, true)).string();
+  expect_same_file({file}, {}, {2, 5});
+  expect_same_file({file}, {"--crop", "1", "69", "3", "60", "2", "66"}, {2, 5});
+}
+
+TEST_F(ClusterBuild, OfRescaledSamplesIsTheSameFile) {
+  const std::string samples = wave<std::int16_t>(kWaveDims, -900, 3000);
+  for (const auto& [slope, intercept] : std::vector<std::pair<float, float>>{{1.0F, -1024.0F}, {1000.0F, 0.0F}, {0.25F, 7.0F}})
+    expect_same_file({folder.file("wave.nii", nifti(samples, slope, intercept)).string()}, {}, {3});
+}
+
+TEST_F(ClusterBuild, OfFilesThatALibraryReadsIsTheSameFile) {
+  std::vector<std::vector<std::uint16_t>> pages(20, std::vector<std::uint16_t>(70 * 66));
+  const std::string samples = wave<std::uint16_t>({70, 66, 20}, 0, 65535);
+  for (std::size_t z = 0; z < pages.size(); ++z) std::memcpy(pages[z].data(), &samples[z * 70 * 66 * 2], 70 * 66 * 2);
+  expect_same_file({folder.file("wave.tif", testing::tiff_file(70, 66, pages)).string()}, {}, {2});
+}
+
+TEST_F(ClusterBuild, WithChannelsIsTheSameFile) {
+  const std::array<int, 3> three{3 * kWaveDims[0], kWaveDims[1], kWaveDims[2]};
+  const std::string field = folder.file("field.nrrd", nrrd("float", wave<float>(kWaveDims, -1, 2))).string();
+  const std::string heat = folder.file("heat.nrrd", nrrd("short", wave<std::int16_t>(kWaveDims, 0, 900, 8), false, true)).string();
+  const std::string wind = folder.file("wind.nrrd", nrrd("float", wave<float>(three, -5, 9, 9), true)).string();
+  const Arguments both{"--channel", "heat=" + heat, "--channel", "wind=" + wind, "--channel-step", "wind=0.125"};
+  expect_same_file({field}, both);
+  expect_same_file({field}, both + Arguments{"--crop", "4", "69", "0", "60", "2", "66"}, {3});
+  expect_same_file({wind, "--part", "1"}, {"--channel", "heat=" + heat}, {3});
+
+  const auto made = run(on_ranks(2, build({field}, out, both + Arguments{"--json"})));
+  EXPECT_EQ(nlohmann::json::parse(made.out)["channels"][1]["name"], "wind");
+  const auto other = run(on_ranks(2, build({field}, out, {"--channel", "heat=" + sample("gyroid", "33")})));
+  EXPECT_EQ(other.status, 1);
+  EXPECT_THAT(other.err, HasSubstr("intervale: channel 'heat' has 33 x 33 x 33 samples, the field has 70 x 66 x 68\n"));
+}
+
+TEST_F(ClusterBuild, SamplesThatAreNoNumbersAreRefusedOrReplaced) {
+  std::string samples = wave<float>(kWaveDims, -1, 2);
+  const float nan = std::nanf("");
+  std::memcpy(&samples[4 * std::size_t((60 * kWaveDims[1] + 5) * kWaveDims[0] + 6)], &nan, sizeof nan);
+  const std::string volume = folder.file("hole.nrrd", nrrd("float", samples)).string();
+  expect_same_file({volume}, {"--nan", "0"}, {3});
+  std::filesystem::remove(out);
+  const auto made = run(on_ranks(3, build({volume}, out)));
+  EXPECT_EQ(made.status, 1);
+  EXPECT_THAT(made.err, HasSubstr("intervale: sample (6, 5, 60) of 'hole' is NaN; give such samples a value with --nan VALUE\n"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
 
 TEST_F(ClusterBuild, ARankNeedsLessMemoryTheMoreThereAre) {
   if (!kIsResidentKnownOfRanks) GTEST_SKIP() << "a sanitizer has memory of its own";
@@ -138,8 +238,9 @@ int process_of_a_rank(int mpirun) {
 
 TEST_F(ClusterBuild, GoesOnAfterARankWasKilled) {
   const std::string volume = sample("gyroid", kSizeOnRanks);
-  ASSERT_EQ(run(build({volume}, expected)).status, 0);
-  const Arguments resumed = on_ranks(2, build({volume}, out, {"--resume"}));
+  const Arguments channel{"--channel", "same=" + volume};
+  ASSERT_EQ(run(build({volume}, expected, channel)).status, 0);
+  const Arguments resumed = on_ranks(2, build({volume}, out, channel + Arguments{"--resume"}));
   std::mt19937 random(std::random_device{}());
   int kills = 0;
   for (int tries = 0; tries < 20 && kills < 3; ++tries) {
@@ -149,7 +250,7 @@ TEST_F(ClusterBuild, GoesOnAfterARankWasKilled) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       rank = process_of_a_rank(job.id());
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 1500));
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 2500));
     const bool is_killed = process_of_a_rank(job.id()) == rank && ::kill(rank, SIGKILL) == 0;
     const auto ended = job.wait();
     if (!is_killed || ended.status == 0) continue;

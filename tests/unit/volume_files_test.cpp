@@ -11,6 +11,7 @@
 #include "common/patch/description.h"
 #include "server/volume/read_volume.h"
 #include "server/volume/volume_header.h"
+#include "server/volume/volume_reader.h"
 #include "tests/support/temp_dir.h"
 
 namespace intervale {
@@ -44,6 +45,25 @@ void expect_sound(const Result<Volume>& volume) {
   }
   EXPECT_EQ(volume->bytes.size(), volume->grid.sample_count() * volume->components * size_of(volume->type));
   EXPECT_TRUE(check_grid(volume->grid));
+}
+
+// Two boxes with slices between them that nobody reads.
+TEST_P(VolumeFiles, AreReadInBoxes) {
+  const auto reader = open_volume(folder_.file(file().name, file().bytes), {}, file().time_point);
+  ASSERT_TRUE(reader) << reader.error().message;
+  BoxReader boxes(**reader);
+  for (const SampleBox& box : {SampleBox{{1, 0, 0}, {2, 1, 0}}, SampleBox{{0, 1, 2}, {2, 1, 3}}}) {
+    Volume part{"", {}, (*reader)->header().type, {}};
+    const auto read = boxes.read(box, part.bytes);
+    ASSERT_TRUE(read) << read.error().message;
+    rescale(part, (*reader)->header().slope, (*reader)->header().intercept);
+    std::vector<double> expected, found;
+    for (std::int64_t z = box.first[2]; z <= box.last[2]; ++z)
+      for (std::int64_t y = box.first[1]; y <= box.last[1]; ++y)
+        for (std::int64_t x = box.first[0]; x <= box.last[0]; ++x) expected.push_back(testing::sample_in_file(std::size_t((z * 2 + y) * 3 + x)));
+    visit_samples(part, [&](auto samples) { found.assign(samples.begin(), samples.end()); });
+    EXPECT_EQ(found, expected);
+  }
 }
 
 TEST_P(VolumeFiles, AreReadAsTheyWereMade) {
