@@ -168,7 +168,8 @@ class RelevantUpdates {
   // Nothing, too, where nothing was kept since nothing is relevant.
   [[nodiscard]] BrickNeeds own_needs(BrickIndex brick) const {
     const BrickPart* const found = found_->bricks.find(brick);
-    return found == nullptr && bounds_[brick].updates == 0 ? BrickNeeds() : BrickNeeds(own_brick(brick));
+    if (found != nullptr) return BrickNeeds(*found);
+    return bounds_[brick].updates == 0 ? BrickNeeds() : BrickNeeds(found_->find_now(brick));
   }
 
   ShownRanges shown_;

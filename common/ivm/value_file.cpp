@@ -96,14 +96,6 @@ Result<void> read_volumes(std::span<const std::byte> bytes, FieldDescription& d)
   return {};
 }
 
-// For each sample its key, its bounds and its error level; and what makes the set, whose supercubes span four samples on
-// each axis.
-std::uint64_t memory_to_decode(const FieldDescription& d) {
-  std::uint64_t supercubes = 2;
-  for (const std::int32_t samples : d.grid.dims) supercubes *= std::uint64_t(samples) / 4 + 2;
-  return d.grid.sample_count() * (3 * ValueKeys(0, d.format.last).width() + 2) + supercubes * 72;
-}
-
 // No more than the diamonds of these scales: those at samples whose coordinates are multiples of 2^finest.
 std::uint64_t least_values(const Grid& grid, int finest) {
   std::uint64_t values = 1;
@@ -112,6 +104,16 @@ std::uint64_t least_values(const Grid& grid, int finest) {
 }
 
 }  // namespace
+
+std::uint64_t memory_to_decode(const Grid& grid, ValueKey last, int finest) {
+  std::uint64_t supercubes = 2, samples = 1;
+  for (const std::int32_t side : grid.dims) {
+    const std::uint64_t at_scale = (std::uint64_t(side - 1) >> finest) + 1;
+    samples *= at_scale;
+    supercubes *= at_scale / 4 + 2;
+  }
+  return samples * (3 * ValueKeys(0, last).width() + 2) + supercubes * 72;
+}
 
 bool is_value_file(const std::filesystem::path& path) { return scope_of(path) == FileScope::every_range; }
 
@@ -149,7 +151,7 @@ Result<ValueVolume::Parts> read_description(const Container& file, std::uint64_t
   // Sizes before contents.
   if (d.grid.sample_count() > kMostSamples) return fail("more samples than this program can read");
   if (least_values(d.grid, finest) > most_coded_bits(pages_bytes) + kRootVertices) return fail("the file claims more values than it can hold");
-  file.claim(memory_to_decode(d));
+  file.claim(memory_to_decode(d.grid, d.format.last, finest));
   if (auto ok = read_weights(file, Domain(d.grid.dims).levels(), parts.weights); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_histogram(file[StreamType::histogram], d); !ok) return tl::unexpected(ok.error());
   if (auto ok = read_volumes(file[StreamType::volumes], d); !ok) return tl::unexpected(ok.error());

@@ -121,6 +121,10 @@ std::shared_ptr<const RelevantUpdates> PartFinder::find_measured(const RangePart
     if (of_brick.closed.empty()) return {};
     std::vector<BrickPart::Supercube> needs(of_brick.closed.size());
     BrickPart::Surface of_updates;
+    std::size_t updates = 0;
+    for (const std::uint64_t slots : of_brick.counting) updates += std::size_t(std::popcount(slots));
+    of_updates.slopes.reserve(updates);
+    of_updates.distances.reserve(updates);
     std::size_t supercube = of_brick.first_supercube;
     UpdateIndex first = of_brick.first;
     for (std::size_t n = 0; n < needs.size(); ++n) {

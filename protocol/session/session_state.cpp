@@ -289,7 +289,8 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
 protocol::Batch SessionState::message_of(Batch batch) {
   if (!is_ahead()) view_ = ViewState::streaming;
   StreamPlan::Remaining remaining = is_ahead() ? left_of_view_ : plan_->remaining();
-  if (measurement_) remaining.pixels = std::max(remaining.pixels, lod_.camera->pixel_error);  // what is not measured may move as far
+  // What is not measured, or not there yet, may move as far.
+  if (lod_.camera && (measurement_ || !volume_->is_whole())) remaining.pixels = std::max(remaining.pixels, lod_.camera->pixel_error);
   protocol::Batch message{
       epoch_, sequence_++, batch.updates, remaining.error, remaining.pixels, remaining.updates, std::move(batch.payload), std::move(batch.channels)};
   credit_ -= protocol::cost_of(message);

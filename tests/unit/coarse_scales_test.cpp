@@ -197,6 +197,21 @@ TEST(CoarseScales, AreFewOfTheBytes) {
   EXPECT_TRUE(scales_of(file_of({9, 7, 5}, 0)).empty()) << "a single page";
 }
 
+TEST(CoarseScales, TellHowMuchMemoryTheyTake) {
+  const Bytes file = file_of({134, 130, 129}, 3);
+  const auto decode = [&](std::uint64_t room) { return decode_volume(file, "made", serial, room); };
+  const Description d = whole(file)->description();
+  const std::uint64_t all = memory_to_decode(d.grid, d.format.last);
+  EXPECT_TRUE(decode(all));
+  EXPECT_THROW((void)decode(all - 1), NoRoom);
+  EXPECT_GE(all, whole(file)->memory_bytes());
+  for (const CoarseScales& scales : scales_of(file)) {
+    const std::uint64_t some = memory_to_decode(d.grid, d.format.last, scales.finest);
+    EXPECT_GE(some, coarse(file, scales)->memory_bytes());
+    EXPECT_LT(some, all / 6);
+  }
+}
+
 TEST(CoarseScales, NeedTheIndexOfThePages) {
   const auto scales = scales_of(large());
   const auto index = place_of(StreamType::page_index, large(), large().size(), FileScope::every_range).value();

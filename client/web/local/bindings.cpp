@@ -14,6 +14,7 @@
 
 #include "common/ivm/coarse_scales.h"
 #include "common/ivm/load_volume.h"
+#include "common/ivm/value_file.h"
 #include "protocol/codec.h"
 #include "protocol/session/data_set_json.h"
 #include "protocol/session/local_worker.h"
@@ -68,15 +69,28 @@ class LocalDataSet {
   }
   // Reads all of the file from the inbox, and frees that.
   std::string load() {
-    auto read = decode_volume(std::as_bytes(std::span(inbox_.bytes())), name_);
-    inbox_.free();
-    return take(std::move(read));
+    try {
+      auto read = decode_volume(std::as_bytes(std::span(inbox_.bytes())), name_, serial, kMostMemory);
+      inbox_.free();
+      return take(std::move(read));
+    } catch (const NoRoom&) {
+      inbox_.free();
+      return kTooLarge;
+    }
+  }
+  // Whether there is memory for the i-th of the coarse scales, or after those for all of the file, once others are loaded.
+  [[nodiscard]] std::string check_room(std::size_t i) const {
+    if (!volume_) return {};
+    const Description& d = volume_->description();
+    return memory_to_decode(d.grid, d.format.last, i < coarse_.size() ? coarse_[i].finest : 0) > kMostMemory ? kTooLarge : "";
   }
   // What a server's /api/datasets/NAME tells.
   [[nodiscard]] std::string describe() const { return data_set_json(*volume_); }
   [[nodiscard]] const std::shared_ptr<const IntervalVolume>& volume() const { return volume_; }
 
  private:
+  static constexpr std::uint64_t kMostMemory = std::uint64_t(7) << 29;  // bytes, of 4 GiB
+  static constexpr const char* kTooLarge = "all of it takes more memory than a page has, 4 GB: have it served by intervale serve";
   std::string take(Result<IntervalVolume> read) {
     if (!read) return read.error().message;
     if (auto fits = protocol::check_sendable(read->description()); !fits) return fits.error().message;
@@ -146,6 +160,7 @@ EMSCRIPTEN_BINDINGS(intervale_local) {
       .function("lastBytes", &LocalDataSet::last_bytes)
       .function("loadCoarse", &LocalDataSet::load_coarse)
       .function("load", &LocalDataSet::load)
+      .function("checkRoom", &LocalDataSet::check_room)
       .function("describe", &LocalDataSet::describe);
   emscripten::class_<LocalSession>("LocalSession")
       .constructor<const LocalDataSet&>()

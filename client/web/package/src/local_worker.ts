@@ -61,11 +61,13 @@ async function loadFrom(source: FileSource, name: string, made: LocalDataSet, lo
   const last = count > 0 ? source.read(source.size - made.lastBytes(0), source.size) : Promise.resolve(new Uint8Array());
   last.catch(() => undefined); // it is awaited below
   for (let i = 0; i < count; ++i) {
+    check(made.checkRoom(i));
     const bytes = await first.until(made.firstBytes(i));
     put(made, [bytes, await last]);
     check(made.loadCoarse(i));
     loaded();
   }
+  check(made.checkRoom(count));
   const end = await last;
   const bytes = await first.until(source.size - end.length);
   put(made, [bytes, end]);
