@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <new>
 
 #include "server/cluster/shares.h"
 #include "server/volume/read_volume.h"
@@ -21,13 +22,28 @@ void use_small_pages(std::byte* bytes, std::size_t count) {
   if (begin < end) (void)::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_NOHUGEPAGE);
 }
 
+// The system refuses to promise more memory than it has, unless it is told that it need not.
+std::unique_ptr<std::byte[], FreeSamples> allocate(std::size_t count) {
+  if (auto* const bytes = new (std::nothrow) std::byte[count]) return {bytes, FreeSamples()};
+  void* const mapped = ::mmap(nullptr, count, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (mapped == MAP_FAILED) throw std::bad_alloc();
+  return {static_cast<std::byte*>(mapped), FreeSamples{count}};
+}
+
 }  // namespace
+
+void FreeSamples::operator()(std::byte* bytes) const {
+  if (mapped == 0)
+    delete[] bytes;
+  else
+    ::munmap(bytes, mapped);
+}
 
 RankSamples::RankSamples(const Domain& domain, SampleType type)
     : last_(domain.last()),
       type_(type),
       count_(std::size_t(last_.x + 1) * std::size_t(last_.y + 1) * std::size_t(last_.z + 1)),
-      bytes_(new std::byte[count_ * size_of(type)]) {
+      bytes_(allocate(count_ * size_of(type))) {
   use_small_pages(bytes_.get(), count_ * size_of(type));
 }
 

@@ -1,7 +1,8 @@
 // The samples that one rank has of a volume: those of some cells, in an array for all.
 //
-// The array takes addresses for the whole volume, and memory for the pages in which something was written. So all that
-// computes with a volume computes with it, as long as it reads no other samples.
+// The array takes addresses for the whole volume, also for one that is larger than the machine's memory, and memory for
+// the pages in which something was written. So all that computes with a volume computes with it, as long as it reads no
+// other samples.
 #pragma once
 
 #include <array>
@@ -30,6 +31,12 @@ struct RankInput {
   std::optional<double> nan = {};                               // as of check_finite()
 };
 
+// Frees an array; one that was mapped, if `mapped` bytes are not 0.
+struct FreeSamples {
+  std::size_t mapped = 0;
+  void operator()(std::byte* bytes) const;
+};
+
 class RankSamples {
  public:
   RankSamples(const Domain& domain, SampleType type);
@@ -49,7 +56,7 @@ class RankSamples {
   Vertex last_;
   SampleType type_;
   std::size_t count_;
-  std::unique_ptr<std::byte[]> bytes_;
+  std::unique_ptr<std::byte[], FreeSamples> bytes_;
 };
 
 // What its file says. Fails on all ranks if on one, as all that follows.

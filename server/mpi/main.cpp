@@ -17,6 +17,7 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -225,7 +226,7 @@ int run_program(int argc, char** argv) {
     try {
       return run(*options, ranks);
     } catch (const std::exception& failure) {  // of this rank alone: the others wait for it
-      errors.print(failure.what());
+      errors.print(dynamic_cast<const std::bad_alloc*>(&failure) != nullptr ? "out of memory" : failure.what());
       if (temporary_file[0] != 0) ::unlink(temporary_file.data());
       MpiRanks::abort(kExitFailed);
     }
