@@ -162,7 +162,7 @@ bool SessionState::begin_view() {
   if (!has_needed && lod_.camera && measure()) {
     is_new_ = true;
   } else {
-    const bool is_estimate = measurement_ || !volume_->is_whole();
+    const bool is_estimate = measurement_ || (!volume_->is_whole() && !is_grown_);
     const bool needs_measured = is_estimate && (!is_early_ || lod_.max_updates || (measurement_ && measurement_->is_soon()));
     if (needs_measured || (!is_planned && !estimate())) return false;
   }

@@ -333,5 +333,21 @@ TEST(CoarseScales, ASessionThatBeginsWithThemEndsWithTheMeshOfTheWholeFile) {
   }
 }
 
+TEST(CoarseScales, AViewIsDoneWithThemIfNothingMoreComes) {
+  const Bytes file = file_of({70, 67, 66}, 1);
+  for (const bool is_early : {true, false}) {
+    GrowingSession session(coarse(file, scales_of(file)[0]));
+    ViewRequest view = view_of({1.25, kInf}, 1);
+    view.early = is_early;
+    ASSERT_TRUE(session.client.look(view));
+    session.run();
+    EXPECT_NE(session.client.state(), ClientSession::State::idle);
+    session.server.end_growth();
+    session.run();
+    EXPECT_EQ(session.client.state(), ClientSession::State::idle);
+    EXPECT_GT(session.client.mesh()->updates(), 0U);
+  }
+}
+
 }  // namespace
 }  // namespace intervale::coarse_scaless

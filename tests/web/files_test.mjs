@@ -166,7 +166,10 @@ test('a file that is lost on its way is told of, and what has arrived stays', as
   const mine = await serve(folder, 0, '--connect-origin', address);
   const { page, errors, close } = await open(browser, `${mine.url}?file=${address}/large.ivm#data=large&range=100,180`, kSmall);
   assert.match(await bannerOf(page, 'its server responded with status 404'), /^Only coarse scales are shown: large\.ivm: /);
-  await page.waitForFunction(() => window.intervale.live.progress?.triangles > 100);
+  await settled(page);
+  assert.ok((await progressOf(page)).triangles > 100);
+  await set(page, { region: kWhole });
+  await settled(page);
   assert.deepEqual(errors.filter((error) => !/404/.test(error)), []);
   await close();
   await mine.kill();

@@ -119,6 +119,7 @@ class LocalSession {
     const auto message = protocol::decode_client_message(inbox_.bytes());
     is_stuck_ = false;
     fault_ = message ? state_.receive(*message) : protocol::Fault{protocol::CloseCode::malformed, message.error().message};
+    if (is_grown_) state_.end_growth();
     is_fault_sent_ = false;
   }
   // Works for a while: the next message, or null if there is none yet. See is_idle().
@@ -130,6 +131,12 @@ class LocalSession {
   }
   // More of the data set was loaded.
   void grow() { is_stuck_ = false; }
+  // Nothing more of it will be: views are done with what is there.
+  void end_growth() {
+    is_grown_ = true;
+    is_stuck_ = false;
+    state_.end_growth();
+  }
   // Nothing is left to do before the next message, or before the data set grows.
   [[nodiscard]] bool is_idle() const { return fault_ ? is_fault_sent_ : !state_.has_work() && (!state_.waits() || is_stuck_); }
 
@@ -142,6 +149,7 @@ class LocalSession {
   Inbox inbox_;
   LocalWorker worker_;
   SessionState state_;
+  bool is_grown_ = false;                 // end_growth()
   bool is_stuck_ = false;                 // it waits, and the worker has nothing to do: the data set has to grow
   std::optional<protocol::Fault> fault_;  // why the session ended
   bool is_fault_sent_ = false;
@@ -168,6 +176,7 @@ EMSCRIPTEN_BINDINGS(intervale_local) {
       .function("receive", &LocalSession::receive)
       .function("step", &LocalSession::step)
       .function("grow", &LocalSession::grow)
+      .function("endGrowth", &LocalSession::end_growth)
       .function("isIdle", &LocalSession::is_idle);
 }
 

@@ -2,7 +2,7 @@
 // that connect to it by ports. It works in short steps, so that a new view does not wait for what an old one wants.
 //
 // A data set of every range is shown as soon as the file's beginning is there, with its coarse scales. Sessions get the
-// finer ones as these arrive; if they do not, what is there stays.
+// finer ones as these arrive; if they do not, what is there stays, and views are done with it.
 import createLocal, { type Local, type LocalDataSet, type LocalSession } from './core/local.js';
 
 import { type FileSource, openSource } from './file_source.js';
@@ -13,6 +13,7 @@ const reply = (message: LocalReply) => scope.postMessage(message);
 
 let local: Local | null = null; // while there is a data set
 let set: LocalDataSet | null = null;
+let isGrown = false; // nothing more of it will be loaded
 const sessions = new Set<Served>();
 
 // Joins what is read of a file to what was read before.
@@ -98,14 +99,16 @@ class Served {
 
   constructor({ LocalSession }: Local, from: LocalDataSet, private readonly port: MessagePort) {
     this.session = new LocalSession(from);
+    if (isGrown) this.session.endGrowth();
     sessions.add(this);
     this.turn.port1.onmessage = () => this.guard(() => this.step());
     port.onmessage = ({ data }: MessageEvent<ArrayBuffer | null>) => this.guard(() => (data ? this.receive(data) : this.end()));
   }
 
-  // More of the file was loaded.
+  // More of the file was loaded, or nothing more will be.
   grow(): void {
     this.guard(() => {
+      if (isGrown) this.session.endGrowth();
       this.session.grow();
       this.schedule();
     });
@@ -157,5 +160,9 @@ scope.onmessage = ({ data }: MessageEvent<LocalRequest>) => {
     new Served(local, set, data.port);
     return;
   }
-  load(data).catch((error: unknown) => reply({ type: 'error', text: error instanceof Error ? error.message : String(error) }));
+  load(data).catch((error: unknown) => {
+    reply({ type: 'error', text: error instanceof Error ? error.message : String(error) });
+    isGrown = true;
+    sessions.forEach((session) => session.grow());
+  });
 };

@@ -20,6 +20,7 @@ export interface LocalSession {
   receive(): void; // handles the message in the inbox
   step(): ArrayBuffer | null; // works for a while, and returns a message if there is one
   grow(): void; // more of the data set was loaded
+  endGrowth(): void; // nothing more of it will be: views are done with what is there
   isIdle(): boolean; // nothing is left to do before the next message, or before the data set grows
   delete(): void;
 }
