@@ -86,12 +86,12 @@ struct FileEnds {
   std::uint64_t file_bytes = 0;
 };
 
-// What is known of streams that are elsewhere.
+// The streams of pages that are written elsewhere: their sizes in bytes.
 struct PagesElsewhere {
   std::uint64_t pages_bytes = 0, channel_pages_bytes = 0;
   std::uint64_t channel_pages_checksum = 0;  // XXH3-64
 };
-// What is around those of a file: the streams of pages are left out.
+// A file without its streams of pages.
 struct ContainerFrame {
   struct Piece {
     std::uint64_t offset = 0;  // in the file

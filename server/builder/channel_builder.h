@@ -22,7 +22,7 @@ struct BuiltChannel {
 // calls for a table of values. Uses all cores that oneTBB may.
 [[nodiscard]] Result<BuiltChannel> build_channel(const Volume& volume, std::string name, std::optional<double> step, const SupercubeSet& set);
 
-// Of a channel what choose_value_format() has chosen; misuse if that has a table.
+// Passes on a format that was chosen for a channel; misuse if it has a table.
 [[nodiscard]] Result<ValueFormat> channel_format(Result<ValueFormat> chosen, const std::string& name);
 // Fails if a channel does not have as many samples as the field.
 [[nodiscard]] Result<void> check_channel_grid(const std::string& name, const Grid& grid, const Grid& field);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <string>
 
-#include "common/util/printable.h"
 #include "server/builder/channel_builder.h"
 #include "server/volume/read_volume.h"
 #include "server/volume/volume_header.h"

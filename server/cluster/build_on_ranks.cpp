@@ -16,24 +16,9 @@
 #include "server/cluster/rank_errors.h"
 #include "server/cluster/rank_values.h"
 #include "server/cluster/shared_file.h"
-#include "server/volume/volume_reader.h"
 
 namespace intervale {
 namespace {
-
-// The values of all ranks, ascending.
-std::vector<double> joined_in_order(Ranks& ranks, std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::uint64_t own = values.size();
-  const std::vector<std::uint64_t> sizes = joined<std::uint64_t>(ranks, std::span(&own, 1));
-  values = joined<double>(ranks, values);
-  auto middle = values.begin();
-  for (const std::uint64_t size : sizes) {
-    std::inplace_merge(values.begin(), middle, middle + std::ptrdiff_t(size));
-    middle += std::ptrdiff_t(size);
-  }
-  return values;
-}
 
 // One rank's part of a build, step by step.
 class Part {
@@ -56,9 +41,7 @@ class Part {
  private:
   // All but the weights.
   Result<void> make_field() {
-    const auto header = read_header_on_ranks(part_.ranks, build_.input);
-    if (!header) return tl::unexpected(header.error());
-    auto read = read_on_ranks(part_.ranks, build_.input, *header, part_.domain, part_.known);
+    auto read = read_on_ranks(part_.ranks, build_.input, part_.domain, part_.known);
     if (!read) return tl::unexpected(read.error());
     RankSamples samples = std::move(read->front());
     FieldDescription& d = parts_.description;
@@ -74,7 +57,10 @@ class Part {
     count(samples);
     const auto is_own = [this](Vertex first) { return part_.shares.rank_of_sample(first) == part_.ranks.rank(); };
     d.statistics.volumes = make_volume_table({part_.view_of(samples), range.least, range.greatest, is_own,
-                                              [this](std::vector<double>& values) { values = joined_in_order(part_.ranks, std::move(values)); },
+                                              [this](std::vector<double>& values) {
+                                                std::sort(values.begin(), values.end());
+                                                values = joined_in_order(part_.ranks, values);
+                                              },
                                               [this](std::span<std::uint64_t> sums) { part_.ranks.sum(sums); }});
     parts_.set = known_diamonds(part_);
     RankKeys keys = find_keys(part_, samples, d.format, parts_.set);
@@ -126,14 +112,9 @@ class Part {
 
   // The components of a channel, one after the other.
   Result<void> add_channel(const RankChannel& from, const OwnPages& own, std::vector<RankPages>& coded) {
-    const auto header = read_header_on_ranks(part_.ranks, from.input);
-    if (!header) return tl::unexpected(header.error());
-    const auto grid = from.input.crop ? cropped(header->grid, *from.input.crop) : Result<Grid>(header->grid);
-    if (!grid) return tl::unexpected(grid.error());
-    if (auto same = check_channel_grid(from.name, *grid, build_.field.grid); !same) return same;
-    auto samples = read_on_ranks(part_.ranks, from.input, *header, part_.domain, part_.known);
+    auto samples = read_on_ranks(part_.ranks, from.input, part_.domain, part_.known);
     if (!samples) return tl::unexpected(samples.error());
-    Channel& channel = parts_.description.channels.emplace_back(Channel{from.name, header->labels.field_unit, {}});
+    Channel& channel = parts_.description.channels.emplace_back(Channel{from.name, from.input.header.labels.field_unit, {}});
     for (RankSamples& one : *samples) {
       const auto format = channel_format(choose_value_format(part_, one, sample_range(part_, one), from.step), from.name);
       if (!format) return of_channel(from.name, format.error());

@@ -74,12 +74,13 @@ namespace {
 // One rank's reading of some cells.
 class RankReading {
  public:
-  RankReading(Ranks& ranks, const RankInput& input, const VolumeHeader& header, const Domain& domain, const std::vector<bool>& cells)
-      : ranks_(ranks), input_(input), header_(header), domain_(domain), cells_(cells) {
+  RankReading(Ranks& ranks, const RankInput& input, const Domain& domain, const std::vector<bool>& cells)
+      : ranks_(ranks), input_(input), header_(input.header), domain_(domain), cells_(cells) {
     if (input.crop) origin_ = input.crop->first;
   }
 
   Result<std::vector<RankSamples>> run() {
+    if (auto ok = agree(ranks_, check_same()); !ok) return tl::unexpected(ok.error());
     SampleType type = header_.type;
     if (header_.slope != 1 || header_.intercept != 0) {
       StoredRange stored;
@@ -107,6 +108,25 @@ class RankReading {
  private:
   using VisitBox = std::function<Result<void>(Volume& layer, const SampleBox& box)>;
 
+  [[nodiscard]] Result<void> changed() const { return fail("'" + input_.name + "' was changed while it was read"); }
+  // All ranks have seen the same file.
+  Result<void> check_same() const {
+    const auto [nx, ny, nz] = header_.grid.dims;
+    const std::array<double, 9> own{double(nx),
+                                    double(ny),
+                                    double(nz),
+                                    double(header_.type),
+                                    double(components()),
+                                    double(header_.components),
+                                    double(header_.component.value_or(0)),
+                                    header_.slope,
+                                    header_.intercept};
+    const std::vector<double> all = joined<double>(ranks_, own);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (all[i] != own[i % own.size()]) return changed();
+    }
+    return {};
+  }
   [[nodiscard]] unsigned components() const { return header_.component ? 1 : header_.components; }
   [[nodiscard]] SampleBox in_file(SampleBox box) const {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -120,6 +140,7 @@ class RankReading {
   Result<void> for_each_box(const VisitBox& visit) const {
     const auto reader = input_.open();
     if (!reader) return tl::unexpected(reader.error());
+    if (!(*reader)->header().is_alike(header_)) return changed();
     BoxReader boxes(**reader);
     const Vertex last = domain_.last();
     for (std::int32_t first_z = 0; first_z <= last.z; first_z += Shares::kCellSide) {
@@ -158,15 +179,8 @@ class RankReading {
 
 }  // namespace
 
-Result<VolumeHeader> read_header_on_ranks(Ranks& ranks, const RankInput& input) {
-  const auto reader = input.open();
-  if (auto ok = agree(ranks, reader ? Result<void>() : Result<void>(tl::unexpected(reader.error()))); !ok) return tl::unexpected(ok.error());
-  return (*reader)->header();
-}
-
-Result<std::vector<RankSamples>> read_on_ranks(Ranks& ranks, const RankInput& input, const VolumeHeader& header, const Domain& domain,
-                                               const std::vector<bool>& cells) {
-  return RankReading(ranks, input, header, domain, cells).run();
+Result<std::vector<RankSamples>> read_on_ranks(Ranks& ranks, const RankInput& input, const Domain& domain, const std::vector<bool>& cells) {
+  return RankReading(ranks, input, domain, cells).run();
 }
 
 }  // namespace intervale

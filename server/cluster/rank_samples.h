@@ -25,8 +25,9 @@ namespace intervale {
 
 // A volume that all ranks read.
 struct RankInput {
-  std::string name;                                             // in complaints
-  std::function<Result<std::unique_ptr<VolumeReader>>()> open;  // from its beginning
+  std::string name;  // in complaints
+  VolumeHeader header;
+  std::function<Result<std::unique_ptr<VolumeReader>>()> open;  // from its beginning; a header that is not alike is a failure
   std::optional<SampleBox> crop = {};                           // what is kept of it; nothing: all
   std::optional<double> nan = {};                               // as of check_finite()
 };
@@ -59,13 +60,10 @@ class RankSamples {
   std::unique_ptr<std::byte[], FreeSamples> bytes_;
 };
 
-// What its file says. Fails on all ranks if on one, as all that follows.
-[[nodiscard]] Result<VolumeHeader> read_header_on_ranks(Ranks& ranks, const RankInput& input);
-
 // Reads these cells of a volume, which has the domain's dims once it is cropped: an array for each component. Slope and
-// intercept are applied, and samples that are not finite replaced. Reads a layer of cells after the other, in one pass; in
-// two with slope or intercept, since the type of the values depends on all of them.
-[[nodiscard]] Result<std::vector<RankSamples>> read_on_ranks(Ranks& ranks, const RankInput& input, const VolumeHeader& header, const Domain& domain,
+// intercept are applied, and samples that are not finite replaced. Fails on all ranks if on one. Reads a layer of cells after
+// the other, in one pass; in two with slope or intercept, since the type of the values depends on all of them.
+[[nodiscard]] Result<std::vector<RankSamples>> read_on_ranks(Ranks& ranks, const RankInput& input, const Domain& domain,
                                                              const std::vector<bool>& cells);
 
 }  // namespace intervale

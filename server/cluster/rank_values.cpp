@@ -1,7 +1,6 @@
 #include "server/cluster/rank_values.h"
 
 #include <algorithm>
-#include <iterator>
 #include <limits>
 #include <map>
 
@@ -14,32 +13,37 @@
 namespace intervale {
 namespace {
 
-// Distinct numbers, ascending; none once they are more than `most`.
+// Distinct numbers; none once they are more than `most`.
 class Distinct {
  public:
   explicit Distinct(std::size_t most) : most_(most) {}
-  // values: ascending, distinct; of none there are too many.
+  // values: distinct; of none there are too many.
   void add(const std::vector<double>& values) {
     if (values.empty()) too_many_ = true;
     if (too_many_) return;
-    std::vector<double> both;
-    both.reserve(all_.size() + values.size());
-    std::set_union(all_.begin(), all_.end(), values.begin(), values.end(), std::back_inserter(both));
-    all_ = std::move(both);
-    if (all_.size() > most_) too_many_ = true;
+    all_.insert(all_.end(), values.begin(), values.end());
+    if (all_.size() > 2 * distinct_) drop_repeated();
   }
-  [[nodiscard]] std::vector<double> joined_with(Ranks& ranks) const {
+  // Ascending.
+  [[nodiscard]] std::vector<double> joined_with(Ranks& ranks) {
+    drop_repeated();
     std::array<std::uint64_t, 1> too_many{too_many_ ? 1U : 0U};
     ranks.sum(too_many);
-    std::vector<double> values = too_many[0] != 0 ? std::vector<double>() : joined<double>(ranks, all_);
-    std::sort(values.begin(), values.end());
+    if (too_many[0] != 0) return {};
+    std::vector<double> values = joined_in_order(ranks, all_);
     values.erase(std::unique(values.begin(), values.end()), values.end());
     if (values.size() > most_) values.clear();
     return values;
   }
 
  private:
-  std::size_t most_;
+  void drop_repeated() {
+    std::sort(all_.begin(), all_.end());
+    all_.erase(std::unique(all_.begin(), all_.end()), all_.end());
+    distinct_ = all_.size();
+    if (distinct_ > most_) too_many_ = true;
+  }
+  std::size_t most_, distinct_ = 0;  // distinct_: when they were counted
   std::vector<double> all_;
   bool too_many_ = false;
 };

@@ -47,6 +47,9 @@ template <class T>
   return all;
 }
 
+// The same of numbers that ascend on each rank: all of them ascend.
+[[nodiscard]] std::vector<double> joined_in_order(Ranks& ranks, std::span<const double> values);
+
 // The failure of the first rank that has one, for all of them.
 [[nodiscard]] Result<void> agree(Ranks& ranks, const Result<void>& result);
 

@@ -31,6 +31,7 @@
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
 #include "common/util/printable.h"
+#include "server/builder/channel_builder.h"
 #include "server/cli/build_input.h"
 #include "server/cli/build_options.h"
 #include "server/cli/describe_volume.h"
@@ -100,25 +101,31 @@ Result<RankBuild> open_inputs(const BuildCommand& options, const std::vector<Cha
   if (!layout) return tl::unexpected(layout.error());
   if (auto ok = check_paths(options, channels); !ok) return tl::unexpected(ok.error());
   RankBuild build;
-  const auto input_of = [&](const std::string& file, const std::optional<std::string>& part) {
-    return RankInput{volume_name(named_volume(file, part).path), {}, crop_of(options), options.nan};
+  const auto crop = crop_of(options);
+  const auto open = [&](const std::string& file, const std::optional<std::string>& part, const auto& opener) -> Result<RankInput> {
+    const auto reader = opener();
+    if (!reader) return tl::unexpected(reader.error());
+    return RankInput{volume_name(named_volume(file, part).path), (*reader)->header(), opener, crop, options.nan};
   };
-  build.input = input_of(options.input, options.part);
-  build.input.open = [&options, layout = *layout] { return open_field(options, layout); };
-  const auto whole = channels.empty() ? std::nullopt : whole_grid(options);
-  for (const ChannelInput& channel : channels) {
-    RankChannel& to = build.channels.emplace_back(RankChannel{channel.name, input_of(channel.file.string(), {}), channel.step});
-    to.input.open = [&options, channel, whole] { return open_channel(options, channel, whole); };
-  }
-  const auto reader = build.input.open();
-  if (!reader) return tl::unexpected(reader.error());
-  const VolumeHeader& header = (*reader)->header();
-  const auto grid = build.input.crop ? cropped(header.grid, *build.input.crop) : Result<Grid>(header.grid);
+  const auto grid_of = [&](const RankInput& input) { return crop ? cropped(input.header.grid, *crop) : Result<Grid>(input.header.grid); };
+  auto field = open(options.input, options.part, [&options, layout = *layout] { return open_field(options, layout); });
+  if (!field) return tl::unexpected(field.error());
+  const auto grid = grid_of(*field);
   if (!grid) return tl::unexpected(grid.error());
   if (auto ok = check_grid(*grid); !ok) return tl::unexpected(ok.error());
+  build.field.labels = field->header.labels;
+  build.input = std::move(*field);
+  const auto whole = channels.empty() ? std::nullopt : whole_grid(options);
+  for (const ChannelInput& channel : channels) {
+    auto input = open(channel.file.string(), {}, [&options, channel, whole] { return open_channel(options, channel, whole); });
+    if (!input) return tl::unexpected(input.error());
+    const auto of_channel = grid_of(*input);
+    if (!of_channel) return tl::unexpected(of_channel.error());
+    if (auto same = check_channel_grid(channel.name, *of_channel, *grid); !same) return tl::unexpected(same.error());
+    build.channels.push_back({channel.name, std::move(*input), channel.step});
+  }
   build.field.name = std::filesystem::path(options.output).stem().string();
   build.field.grid = *grid;
-  build.field.labels = header.labels;
   if (auto set = set_labels(options, build.field.labels); !set) return tl::unexpected(set.error());
   build.step = options.step;
   build.output = options.output;
@@ -128,13 +135,16 @@ Result<RankBuild> open_inputs(const BuildCommand& options, const std::vector<Cha
 // What a job of as many ranks before this one has finished, if it is to be kept: a journal for each rank.
 Result<std::unique_ptr<BuildCheckpoint>> open_checkpoint(const BuildCommand& options, const std::vector<ChannelInput>& channels, const Ranks& ranks) {
   if (!options.resume) return nullptr;
-  std::filesystem::path journal = options.output + fmt::format(".{}-of-{}.resume", ranks.rank(), ranks.size());
-  if (options.scratch) {
+  const auto journal_of = [&](int rank) -> std::filesystem::path {
+    std::filesystem::path beside = options.output + fmt::format(".{}-of-{}.resume", rank, ranks.size());
+    if (!options.scratch) return beside;
     Fingerprint folder;
     folder.add(std::filesystem::absolute(options.output).lexically_normal().string());
-    journal = std::filesystem::path(*options.scratch) / fmt::format("{:016x}-{}", folder.value(), journal.filename().string());
-  }
-  const std::array<std::filesystem::path, 2> ours{options.output, journal};
+    return std::filesystem::path(*options.scratch) / fmt::format("{:016x}-{}", folder.value(), beside.filename().string());
+  };
+  const std::filesystem::path journal = journal_of(ranks.rank());
+  std::vector<std::filesystem::path> ours{options.output};
+  for (int rank = 0; rank < ranks.size(); ++rank) ours.push_back(journal_of(rank));
   auto fingerprint = fingerprint_of(options, channels, ours);
   if (!fingerprint) return tl::unexpected(fingerprint.error());
   fingerprint->add(ranks.size());
@@ -224,7 +234,9 @@ int run_program(int argc, char** argv) {
   const auto options = std::make_shared<BuildCommand>();
   CLI::App& command = program.add_command("build", "Build an interval volume of every range from a volume", [&] {
     try {
-      return run(*options, ranks);
+      auto result = run(*options, ranks);
+      std::signal(SIGTERM, SIG_IGN);  // all ranks end now, and mpirun ends those that are slower
+      return result;
     } catch (const std::exception& failure) {  // of this rank alone: the others wait for it
       errors.print(dynamic_cast<const std::bad_alloc*>(&failure) != nullptr ? "out of memory" : failure.what());
       if (temporary_file[0] != 0) ::unlink(temporary_file.data());

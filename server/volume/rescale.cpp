@@ -5,7 +5,6 @@
 #include <limits>
 #include <optional>
 #include <type_traits>
-#include <utility>
 
 #include "common/patch/visit_samples.h"
 #include "server/volume/volume_header.h"

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "common/patch/volume.h"
@@ -46,6 +47,11 @@ struct VolumeHeader {
   std::int64_t byte_skip = 0;              // bytes to skip, of the decoded data; -1 - n: the data ends n bytes before the end
 
   [[nodiscard]] std::uint64_t data_bytes() const { return grid.sample_count() * components * size_of(type); }  // of one time point
+  // Whether samples are as many, and as they are stored, as another header says.
+  [[nodiscard]] bool is_alike(const VolumeHeader& other) const {
+    const auto facts = [](const VolumeHeader& h) { return std::tie(h.grid.dims, h.type, h.components, h.component, h.slope, h.intercept); };
+    return facts(*this) == facts(other);
+  }
 };
 
 // Fails if there is no time point, or if the bytes of all have no number. The message begins with `where`.

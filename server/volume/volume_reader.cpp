@@ -74,9 +74,10 @@ Result<void> VolumeReader::skip(std::uint64_t bytes) {
 
 Result<void> VolumeReader::skip_next(std::uint64_t bytes) {
   std::vector<std::byte> chunk(std::min(bytes, kChunk));
+  left_ += bytes;  // each chunk is counted when it is read
   while (bytes > 0) {
     const std::uint64_t step = std::min(bytes, kChunk);
-    if (auto done = read_next(std::span(chunk).first(step)); !done) return done;
+    if (auto done = read(std::span(chunk).first(step)); !done) return done;
     bytes -= step;
   }
   return {};

@@ -120,6 +120,19 @@ TEST_P(VolumeFiles, CanHoldAnyBytes) {
   }
 }
 
+// Some chunks of a decoder lie behind the box.
+TEST(CodedVolumes, MayEndWithSamplesThatNobodyReads) {
+  const TempDir folder;
+  const std::string samples(std::size_t(300) * 300 * 2, 'x');
+  const std::string header = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 300 300 2\nencoding: ";
+  for (const std::string& file :
+       {header + "gzip\n\n" + testing::deflated(samples, testing::Wrapping::gzip), header + "bzip2\n\n" + testing::bzip2(samples)}) {
+    const auto volume = read_volume(folder.file("a.nrrd", file), {}, {}, {}, SampleBox{{0, 3, 0}, {9, 9, 1}});
+    ASSERT_TRUE(volume) << volume.error().message;
+    EXPECT_EQ(volume->bytes, std::vector<std::byte>(10 * 7 * 2, std::byte('x')));
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, VolumeFiles, ::testing::Range<std::size_t>(0, testing::volume_files().size()), [](const auto& file) {
   std::string name = testing::volume_files()[file.param].name;
   std::replace(name.begin(), name.end(), '.', '_');

@@ -5,6 +5,7 @@
 #include <emscripten/bind.h>
 #include <emscripten/val.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -70,7 +71,7 @@ class LocalDataSet {
   // Reads all of the file from the inbox, and frees that.
   std::string load() {
     try {
-      auto read = decode_volume(std::as_bytes(std::span(inbox_.bytes())), name_, serial, kMostMemory);
+      auto read = decode_volume(std::as_bytes(std::span(inbox_.bytes())), name_, serial, room());
       inbox_.free();
       return take(std::move(read));
     } catch (const NoRoom&) {
@@ -82,7 +83,7 @@ class LocalDataSet {
   [[nodiscard]] std::string check_room(std::size_t i) const {
     if (!volume_) return {};
     const Description& d = volume_->description();
-    return memory_to_decode(d.grid, d.format.last, i < coarse_.size() ? coarse_[i].finest : 0) > kMostMemory ? kTooLarge : "";
+    return memory_to_decode(d.grid, d.format.last, i < coarse_.size() ? coarse_[i].finest : 0) > room() ? kTooLarge : "";
   }
   // What a server's /api/datasets/NAME tells.
   [[nodiscard]] std::string describe() const { return data_set_json(*volume_); }
@@ -91,6 +92,11 @@ class LocalDataSet {
  private:
   static constexpr std::uint64_t kMostMemory = std::uint64_t(7) << 29;  // bytes, of 4 GiB
   static constexpr const char* kTooLarge = "all of it takes more memory than a page has, 4 GB: have it served by intervale serve";
+  // Besides the file, and what was loaded of it.
+  [[nodiscard]] std::uint64_t room() const {
+    const std::uint64_t taken = file_bytes_ + (volume_ ? volume_->memory_bytes() : 0);
+    return kMostMemory - std::min(taken, kMostMemory);
+  }
   std::string take(Result<IntervalVolume> read) {
     if (!read) return read.error().message;
     if (auto fits = protocol::check_sendable(read->description()); !fits) return fits.error().message;
