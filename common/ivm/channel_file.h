@@ -22,8 +22,8 @@ namespace intervale {
 void append_channels(Streams& streams, const Grid& grid, const SupercubeSet& set, const std::vector<Channel>& channels,
                      const std::vector<ChannelKeys>& keys, const ParallelFor& parallel, KeptPages* kept);
 
-// The stream of channels, if there are any, whose pages are elsewhere. index: called for each component of each channel, in
-// order; appends a record for each of its pages (value_streams.h).
+// The stream of channels, if there are any, whose pages are elsewhere. index: called for each component of each
+// channel, in order; appends a record for each of its pages (value_streams.h).
 using AppendIndex = std::function<void(std::vector<std::byte>& to, std::size_t channel, std::size_t component)>;
 void append_channels(Streams& streams, const Grid& grid, const std::vector<Channel>& channels, const AppendIndex& index);
 

@@ -39,8 +39,8 @@ void append_bounds(Streams& streams, std::span<const PageBounds> bounds);
 [[nodiscard]] Result<ValueVolume> decode_values(std::span<const std::byte> bytes, std::string name, const ParallelFor& parallel = serial,
                                                 std::uint64_t room = kAnyRoom, PageFaults* faults = nullptr);
 
-// The most memory that decoding takes besides the file's bytes, with what of_every_range() makes of it, in bytes: of the
-// scales from `finest` on, or all. grid: of at most kMostSamples. last: of the format.
+// The most memory, in bytes, that decoding takes besides the file's bytes, with what of_every_range() makes of it: of
+// the scales from `finest` on, or all. grid: of at most kMostSamples. last: of the format.
 [[nodiscard]] std::uint64_t memory_to_decode(const Grid& grid, ValueKey last, int finest = 0);
 
 // What is told of a data set without its values. memory_bytes: as ValueVolume's. file_bytes: of its file; 0: not known.

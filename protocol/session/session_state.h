@@ -36,8 +36,8 @@ class SessionState {
   // takes to code the batch, or a millisecond that finds nothing.
   [[nodiscard]] std::optional<protocol::ServerMessage> next(std::size_t max_payload = protocol::kMaxBatchPayload);
 
-  // Nothing that is still to come of the data set is wanted by the last view (wants_finer()), or nothing more comes: the
-  // view is done with what is there. With a camera, how far surfaces move is estimated.
+  // Nothing that is still to come of the data set is wanted by the last view (wants_finer()), or nothing more comes:
+  // the view is done with what is there. With a camera, how far surfaces move is estimated.
   void end_growth() {
     is_grown_ = true;
     waits_ = false;

@@ -22,7 +22,8 @@ namespace intervale {
 // With one number a sample; misuse for vectors.
 [[nodiscard]] Result<std::unique_ptr<VolumeReader>> open_field(const BuildCommand& options, const std::optional<RawLayout>& layout);
 
-// The dims of the field before it is cropped, which are those of the channels' files; nothing if they need not be known.
+// The dims of the field before it is cropped, which are those of the channels' files; nothing if they need not be
+// known.
 [[nodiscard]] std::optional<Grid> whole_grid(const BuildCommand& options);
 // Fails if the file says that it has other dims than `whole`.
 [[nodiscard]] Result<std::unique_ptr<VolumeReader>> open_channel(const BuildCommand& options, const ChannelInput& input,

@@ -23,11 +23,11 @@
 
 namespace intervale {
 
-// A volume that all ranks read.
+// A volume that all ranks read. It is opened for each pass; then its header must be like the first one (is_alike()).
 struct RankInput {
   std::string name;  // in complaints
   VolumeHeader header;
-  std::function<Result<std::unique_ptr<VolumeReader>>()> open;  // from its beginning; a header that is not alike is a failure
+  std::function<Result<std::unique_ptr<VolumeReader>>()> open;  // from its beginning
   std::optional<SampleBox> crop = {};                           // what is kept of it; nothing: all
   std::optional<double> nan = {};                               // as of check_finite()
 };
@@ -61,8 +61,8 @@ class RankSamples {
 };
 
 // Reads these cells of a volume, which has the domain's dims once it is cropped: an array for each component. Slope and
-// intercept are applied, and samples that are not finite replaced. Fails on all ranks if on one. Reads a layer of cells after
-// the other, in one pass; in two with slope or intercept, since the type of the values depends on all of them.
+// intercept are applied, and samples that are not finite replaced. Fails on all ranks if on one. Reads a layer of cells
+// after the other, in one pass; in two with slope or intercept, since the type of the values depends on all of them.
 [[nodiscard]] Result<std::vector<RankSamples>> read_on_ranks(Ranks& ranks, const RankInput& input, const Domain& domain,
                                                              const std::vector<bool>& cells);
 

@@ -44,8 +44,8 @@ struct RankPart {
 // The least and the greatest sample of all ranks.
 [[nodiscard]] SampleRange sample_range(const RankPart& part, RankSamples& samples);
 
-// As choose_value_format() does of a volume. Where a table is needed, each rank has the different values of all ranks, 8 bytes
-// each, and while they are put together some times as much.
+// As choose_value_format() does of a volume. Where a table is needed, each rank has the different values of all ranks,
+// 8 bytes each, and while they are put together some times as much.
 [[nodiscard]] Result<ValueFormat> choose_value_format(const RankPart& part, RankSamples& samples, const SampleRange& range,
                                                       std::optional<double> step);
 // Whether every sample of all ranks is the value of its key.

@@ -21,9 +21,9 @@ struct SharedPiece {
 // What rank 0 writes last, when all other pieces lie in the temporary file.
 using LastPieces = std::function<Result<std::vector<SharedPiece>>(const std::filesystem::path& temporary)>;
 
-// Writes all pieces of all ranks to a temporary file beside the path, which rank 0 makes, and renames once they are there.
-// The folder is one that all ranks see. Fails on all ranks, and leaves nothing behind, if it does on one. writes: called with
-// the temporary file as long as there is one, then with an empty path.
+// Writes all pieces of all ranks to a temporary file beside the path, which rank 0 makes, and renames once they are
+// there. The folder is one that all ranks see. Fails on all ranks, and leaves nothing behind, if it does on one.
+// writes: called with the temporary file as long as there is one, then with an empty path.
 [[nodiscard]] Result<void> write_shared_file(Ranks& ranks, const std::filesystem::path& path, std::span<const SharedPiece> pieces,
                                              const LastPieces& last, const std::function<void(const std::filesystem::path&)>& writes);
 

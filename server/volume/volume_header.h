@@ -68,8 +68,8 @@ struct StoredRange {
   double least = std::numeric_limits<double>::infinity(), greatest = -std::numeric_limits<double>::infinity();  // of none
   void add(const Volume& volume);
 };
-// The type of the values of stored numbers: of integers if slope and intercept are whole and one holds them all, else f32 if
-// that keeps apart what the stored numbers do, else f64. A slope of 1 and an intercept of 0 change nothing.
+// The type of the values of stored numbers: of integers if slope and intercept are whole and one holds them all, else
+// f32 if that keeps apart what the stored numbers do, else f64. A slope of 1 and an intercept of 0 change nothing.
 [[nodiscard]] SampleType rescaled_type(SampleType stored, const StoredRange& range, double slope, double intercept);
 // Makes values of stored numbers. to: their type, as it is for these numbers and others.
 void rescale(Volume& volume, double slope, double intercept, SampleType to);

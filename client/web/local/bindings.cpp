@@ -79,7 +79,8 @@ class LocalDataSet {
       return kTooLarge;
     }
   }
-  // Whether there is memory for the i-th of the coarse scales, or after those for all of the file, once others are loaded.
+  // Whether there is memory for the i-th of the coarse scales, or after those for all of the file, once others are
+  // loaded: empty, or what to tell.
   [[nodiscard]] std::string check_room(std::size_t i) const {
     if (!volume_) return {};
     const Description& d = volume_->description();

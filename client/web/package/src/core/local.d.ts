@@ -11,7 +11,7 @@ export interface LocalDataSet {
   lastBytes(i: number): number; // and at its end; the same for all i
   loadCoarse(i: number): string; // reads these from the inbox, the first ones first
   load(): string; // reads all of the file from the inbox
-  checkRoom(i: number): string; // whether there is memory for the i-th of coarseCount(), or after those for all of the file
+  checkRoom(i: number): string; // an error if there is no memory for the i-th of coarseCount(), or after those for all
   describe(): string; // JSON, as a server's /api/datasets/NAME
   delete(): void;
 }
