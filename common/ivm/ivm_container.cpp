@@ -160,7 +160,7 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& path, std
 
 namespace {
 
-// The header and the table. checksum: of a stream.
+// The header and the table. checksum: of a stream; 0 of pages, each of which has its own.
 struct StreamSize {
   std::uint64_t bytes = 0, checksum = 0;
 };
@@ -181,8 +181,7 @@ std::pair<std::vector<std::byte>, std::vector<Entry>> make_head(FileScope scope,
   entries.reserve(header.streams);
   for (const int type : set_bits(types)) {
     const StreamSize& size = sizes[std::size_t(type)];
-    entries.push_back({std::uint32_t(type), (kNotNeeded >> type & 1) != 0 ? kOptional : 0, header.file_bytes, size.bytes,
-                       StreamType(type) == StreamType::pages ? 0 : size.checksum});
+    entries.push_back({std::uint32_t(type), (kNotNeeded >> type & 1) != 0 ? kOptional : 0, header.file_bytes, size.bytes, size.checksum});
     header.file_bytes += size.bytes;
   }
   header.content_hash = hash_of_contents(entries);
@@ -218,7 +217,9 @@ ContainerFrame make_frame(FileScope scope, const Streams& streams, const PagesEl
 }
 
 std::vector<std::byte> make_container(FileScope scope, const Streams& streams) {
-  auto [file, entries] = make_head(scope, [&](StreamType type) { return size_of(streams[type]); });
+  auto [file, entries] = make_head(scope, [&](StreamType type) {
+    return type == StreamType::pages ? StreamSize{streams[type].size(), 0} : size_of(streams[type]);
+  });
   file.reserve(std::size_t(entries.back().offset + entries.back().bytes));
   for (const Entry& e : entries) append<std::byte>(file, streams[StreamType(e.type)]);
   return file;
