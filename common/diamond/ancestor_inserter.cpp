@@ -63,7 +63,7 @@ std::span<const SlotGroup> AncestorInserter::insert(const SlotGroup& group) {
 }
 
 void AncestorInserter::take_back() {
-  for (const SlotGroup& g : inserted_) split_.erase(set_.first(g.brick, g.supercube), set_.occupancy()[g.supercube], g.slots);
+  for (const SlotGroup& g : inserted_) split_.erase(g.brick, g.key, g.slots);
   inserted_.clear();
 }
 
@@ -72,7 +72,7 @@ void AncestorInserter::add(const SetFinder::Found& here, std::uint64_t slots) {
   const Vertex position = position_of_key(here.key);
   const Parents& table = parents_of(position);
   // Most parents are split by now, so those of the diamonds are looked at only if there is one that is not.
-  const std::uint64_t unsplit = here.occupancy & ~split_.slots(here.first, here.occupancy);
+  const std::uint64_t unsplit = here.occupancy & ~split_.slots(here.brick, here.key);
   if ((unsplit & ~slots & ~kSlotsOfClass[2]) != 0) {
     for (const std::size_t cls : {2, 1}) {
       for (const Slot slot : set_bits<Slot>(slots & kSlotsOfClass[cls])) slots |= table.here[slot] & unsplit;
@@ -88,14 +88,14 @@ void AncestorInserter::add(const SetFinder::Found& here, std::uint64_t slots) {
     finder.move_to(scale, position);  // a neighbour's ancestors may have moved it
     const SetFinder::Found found = finder.find(n.where, place);
     if ((found.occupancy & n.any_parent) == 0) continue;
-    const std::uint64_t candidates = found.occupancy & n.any_parent & ~split_.slots(found.first, found.occupancy);
+    const std::uint64_t candidates = found.occupancy & n.any_parent & ~split_.slots(found.brick, found.key);
     if (candidates == 0) continue;
     std::uint64_t parents = 0;
     for (const Slot slot : set_bits<Slot>(children)) parents |= n.parents[std::size_t(count_below(n.children, slot))];
     parents &= candidates;
     if (parents != 0) add(found, parents);
   }
-  split_.insert(here.first, here.occupancy, slots);
+  split_.insert(here.brick, here.key, slots);
   inserted_.push_back({here.brick, here.supercube, here.key, slots});
 }
 

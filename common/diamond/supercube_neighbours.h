@@ -122,6 +122,8 @@ class SupercubeNeighbours {
   struct Diamond {
     const Found& supercube;
     Slot slot;
+    [[nodiscard]] auto index() const { return supercube.index(slot); }
+    [[nodiscard]] Place place() const { return supercube.place(slot); }
   };
   [[nodiscard]] Diamond at(Link link) {
     const Found& found = at(int(link.where));
@@ -205,15 +207,15 @@ class SetFinder {
 };
 using SetNeighbours = SupercubeNeighbours<SetFinder>;
 
-// Calls visit(number) for those parents of a diamond that are in the set; `around` moves to its supercube. Fastest along
-// ascending keys.
+// Calls visit(parent), a SetNeighbours::Diamond, for those parents of a diamond that are in the set; `around` moves to
+// its supercube. Fastest along ascending keys.
 template <class Visit>
 void for_each_parent(SetNeighbours& around, SupercubeKey key, Slot slot, Visit&& visit) {
   around.move_to(key);
   const Links& links = around.links(slot);
   for (int k = 0; k < diamond_type(kTypeOfSlot[slot]).parents; ++k) {
     const auto parent = around.at(links.vertex[links.parent[k]]);
-    if (parent.supercube.has(parent.slot)) visit(parent.supercube.index(parent.slot));
+    if (parent.supercube.has(parent.slot)) visit(parent);
   }
 }
 

@@ -23,14 +23,13 @@ class BatchEncoder {
  public:
   BatchEncoder(const IntervalVolume& volume, const ShownRanges& shown, const SplitSet& split, std::span<const SlotGroup> groups)
       : volume_(volume), ranges_(volume.description().format, shown), groups_(groups) {
-    const SupercubeSet& set = volume.set();
     SplitLattice lattice(volume, split);
     ready_.reserve(groups.size());
     first_.reserve(groups.size());
     candidates_.reserve(16 * groups.size());  // about as many as there are
     for (const SlotGroup& g : groups) {
       lattice.move_to(g);
-      ready_.push_back(lattice.splittable(kAllSlots & (~split.slots(set.first(g.brick, g.supercube), set.occupancy()[g.supercube]) | g.slots)));
+      ready_.push_back(lattice.splittable(kAllSlots & (~split.slots(g.brick, g.key) | g.slots)));
       first_.push_back(candidates_.size());
       add<0>(lattice, g);
       add<1>(lattice, g);

@@ -4,7 +4,7 @@
 #include <bit>
 #include <utility>
 
-#include "common/diamond/split_set.h"
+#include "common/util/bits.h"
 
 namespace intervale {
 namespace {
@@ -77,7 +77,7 @@ std::uint8_t BrickNeeds::farthest(std::size_t supercube, std::uint64_t relevant,
   for (const BrickPart* const part : parts()) {
     if (part->distances_.empty() || part->highest_[supercube].distance <= most) continue;
     const std::uint8_t* const distances = part->distances_.data() + part->first_[supercube];
-    for (const std::size_t i : set_bits<std::size_t>(SplitSet::extract(slots, part->slots(supercube, relevant)))) most = std::max(most, distances[i]);
+    for (const std::size_t i : set_bits<std::size_t>(extract_bits(slots, part->slots(supercube, relevant)))) most = std::max(most, distances[i]);
   }
   return most;
 }

@@ -20,7 +20,7 @@ BudgetSearch::BudgetSearch(std::shared_ptr<const IntervalVolume> volume, std::sh
       around_(volume_.set()),
       budget_(lod.max_updates.value_or(0)),
       page_(volume_.size() / kPage + 1),
-      result_(volume_.size()),
+      result_(volume_.set()),
       slices_(search()) {}
 
 bool BudgetSearch::go_on() noexcept {
@@ -104,18 +104,20 @@ void BudgetSearch::raise_parents(BrickIndex brick, std::uint64_t of_class) {
 // Puts the updates of a class that are within the budget into the result; from coarse to fine.
 void BudgetSearch::take(BrickIndex brick, std::uint64_t of_class) {
   const SupercubeSet& set = volume_.set();
-  set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey) {
+  set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
     ++visited_;
     const std::uint64_t occupancy = set.occupancy()[s];
     const UpdateIndex first = set.first(brick, s);
+    std::uint64_t taken = 0;
     for (const Slot slot : set_bits<Slot>(occupancy & of_class)) {
       ++visited_;
       const UpdateIndex i = first + count_below(occupancy, slot);
       const Rank rank = rank_of(i);
       if (rank == 0 || rank < last_ || (rank == last_ && budget_ == 0)) continue;
       if (rank == last_) --budget_;
-      result_.insert(i);
+      taken |= std::uint64_t(1) << slot;
     }
+    result_.insert(brick, key, taken);
   });
 }
 

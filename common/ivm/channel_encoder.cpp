@@ -18,9 +18,8 @@ class Encoding {
   bool at_vertex(Link link, ComponentKeys& keys) {
     const auto vertex = around_.at(link);
     if (!vertex.supercube.has(vertex.slot)) return false;
-    const UpdateIndex i = vertex.supercube.index(vertex.slot);
-    if (!held_.contains(i)) return false;
-    get(i, keys);
+    if ((held_.slots(vertex.supercube.brick, vertex.supercube.key) >> vertex.slot & 1) == 0) return false;
+    get(vertex.index(), keys);
     return true;
   }
   void code(Slot slot, ComponentKeys& keys) { get(around_.at(kHere).index(slot), keys); }

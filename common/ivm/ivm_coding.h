@@ -37,7 +37,8 @@ bool code_error_steps(Coder& coder, const SupercubeSet& set, std::span<std::uint
     } else {
       step = std::uint8_t(from - 1 + above_children[cls][finest].code(coder, (step - from + 1) & 255u));
     }
-    for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) { least[parent] = std::max(least[parent], std::uint16_t(step + 1)); });
+    for_each_parent(around, p.key, p.slot,
+                    [&](const SetNeighbours::Diamond& parent) { least[parent.index()] = std::max(least[parent.index()], std::uint16_t(step + 1)); });
   };
   for (int scale = 0; scale < kMaxLevels; ++scale) {
     const auto [begin, end] = set.of_scale(scale);
@@ -71,8 +72,8 @@ bool code_update_slopes(Coder& coder, const SupercubeSet& set, std::span<std::ui
         unsigned before = 0;
         set.for_each_in_brick(brick, kSlotsOfClass[std::size_t(cls)], [&](const Place& p) {
           unsigned sum = 0, parents = 0;
-          for_each_parent(around, p.key, p.slot, [&](UpdateIndex parent) {
-            sum += slopes[parent];
+          for_each_parent(around, p.key, p.slot, [&](const SetNeighbours::Diamond& parent) {
+            sum += slopes[parent.index()];
             ++parents;
           });
           const unsigned mean = parents == 0 ? kMaxSlope : sum / parents;

@@ -87,7 +87,7 @@ std::uint64_t SplitLattice::load_neighbour(SetFinder& finder, const SupercubePla
 // Loads the keys of those of a supercube's split diamonds whose slots are used, and returns the slots of those. first: the
 // point of its own corner.
 std::uint64_t SplitLattice::load_slots(const SetFinder::Found& found, std::uint64_t used, ValueKey* first) const {
-  const std::uint64_t slots = (split_ == nullptr ? found.occupancy : split_->slots(found.first, found.occupancy)) & used;
+  const std::uint64_t slots = (split_ == nullptr ? found.occupancy : split_->slots(found.brick, found.key)) & used;
   switch (volume_.keys().width()) {
     case 1:
       load_keys<1>(found, slots, first);

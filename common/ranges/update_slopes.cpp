@@ -58,7 +58,7 @@ std::vector<std::uint8_t> update_slopes(const SupercubeSet& set, std::span<const
     }
     slopes[i] = std::uint8_t(scale > top_scale ? kMaxSlope : slope_of(own.slope));
     int parents = 0;
-    for_each_parent(around, key, slot, [&parents](UpdateIndex) { ++parents; });
+    for_each_parent(around, key, slot, [&parents](const SetNeighbours::Diamond&) { ++parents; });
     const auto shares = float(std::max(parents, 1));
     part[i] = {own.removed / shares, own.updates / shares};
   };

@@ -16,6 +16,7 @@ namespace {
 constexpr std::uint32_t kFindVisits = 1 << 12;  // finding what a brick needs takes as long as so many visits
 constexpr std::uint32_t kBrickVisits = 128;     // and looking at a brick's bounds, as so many
 constexpr std::uint32_t kInVain = 3;            // times as many visits as a batch may have, if they find nothing
+constexpr std::size_t kUnsettled = 128;         // supercubes that a batch may leave as they are in what was sent
 
 }  // namespace
 
@@ -56,13 +57,14 @@ struct StreamPlan::BatchBuilder {
 };
 
 StreamPlan::StreamPlan(std::shared_ptr<const IntervalVolume> volume)
-    : volume_(std::move(volume)), sent_(volume_->size()), sent_in_(volume_->set().bricks().size()), channels_(volume_->channel_keys().size()) {
+    : volume_(std::move(volume)), sent_(volume_->set()), channels_(volume_->channel_keys().size()) {
   set_relevant(std::shared_ptr<const RelevantUpdates>(volume_, &volume_->relevant()));
 }
 
 void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, ShownRanges shown) {
   search_.reset();
   searched_.reset();
+  rests_ = false;
   const std::shared_ptr<const RelevantUpdates> before = std::exchange(relevant_, std::move(relevant));
   shown_ = std::move(shown);
   const RelevantUpdates::PartMask new_parts = find_new_parts(before.get());
@@ -71,9 +73,9 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
   viewed_runs_.clear();
   wanted_count_ = pending_bricks_ = 0;
   for (std::size_t begin = 0; begin < viewed_.size(); begin += 64) {
-    for (const std::size_t k : set_bits<std::size_t>(sent_in_.used(begin) | pending_.used(begin))) {
+    for (const std::size_t k : set_bits<std::size_t>(sent_.bricks(begin) | pending_.used(begin))) {
       const BrickIndex b{std::uint32_t(begin + k)};
-      const unsigned sent = sent_in_.get(b);
+      const unsigned sent = sent_.count(b);
       const auto found = pending_.find(b);
       const RelevantUpdates::Bound all = relevant_->bound(b);
       Pending pending = found ? bits_as<Pending>(*found) : first_pending(all);
@@ -95,10 +97,7 @@ void StreamPlan::set_relevant(std::shared_ptr<const RelevantUpdates> relevant, S
 RelevantUpdates::PartMask StreamPlan::find_new_parts(const RelevantUpdates* before) {
   const auto shared = before != nullptr && time_ < UINT8_MAX ? relevant_->shared_with(*before) : std::nullopt;
   if (!shared) {
-    time_ = 0;
-    part_since_ = {};
-    pending_ = SparseArray<std::uint64_t>(volume_->set().bricks().size());
-    supercube_bounds_ = SupercubeBounds(volume_->set().bricks().size());
+    drop_bounds();
     return RelevantUpdates::kAllParts;
   }
   ++time_;
@@ -112,7 +111,26 @@ RelevantUpdates::PartMask StreamPlan::find_new_parts(const RelevantUpdates* befo
   return added;
 }
 
+void StreamPlan::drop_bounds() {
+  time_ = 0;
+  part_since_ = {};
+  pending_ = SparseArray<std::uint64_t>(volume_->set().bricks().size());
+  supercube_bounds_ = SupercubeBounds(volume_->set().bricks().size());
+}
+
+void StreamPlan::rest() {
+  drop_bounds();
+  viewed_.release_all();
+  viewed_runs_ = std::vector<ViewedRun>();
+  ranking_.reset();
+  searched_.reset();
+  budget_.reset();
+  wanted_count_ = pending_bricks_ = next_brick_ = 0;
+  rests_ = true;
+}
+
 void StreamPlan::set_lod(const Lod& lod, const DepthMap* hidden, const Camera* ahead) {
+  if (rests_) set_relevant(relevant_, shown_);
   if (searched_ != lod) {
     searched_ = lod;
     budget_.reset();
@@ -132,19 +150,20 @@ bool StreamPlan::add_with_ancestors(const Place& place, SetNeighbours& around, B
     const Link link = links.vertex[links.parent[k]];
     around.move_to(place.key);  // an ancestor of the same scale may have moved it
     const SetFinder::Found& found = around.at(link.where);
-    if (!found.has(link.slot) || sent_.contains(found.index(link.slot))) continue;
+    if (!found.has(link.slot)) continue;
     const Place parent = found.place(link.slot);
+    if (sent_.contains(parent)) continue;
     SetNeighbours& above = builder.above[std::size_t(scale_of_key(parent.key))];
     above.move_to(parent.key);
     if (!add_with_ancestors(parent, above, builder)) return false;
   }
-  return sent_.contains(place.index) || add(place, builder);
+  return sent_.contains(place) || add(place, builder);
 }
 
 bool StreamPlan::add(const Place& place, BatchBuilder& builder) {
   const SlotGroup update{place.brick, place.supercube, place.key, std::uint64_t(1) << place.slot};
   if (builder.bytes + builder.bytes_of(update, 1) > builder.max_bytes || !has_room(builder, 1)) return false;
-  sent_.insert(place.index);
+  sent_.insert(place);
   put(update, builder);
   return true;
 }
@@ -171,7 +190,6 @@ bool StreamPlan::add_all(const SlotGroup& group, BatchBuilder& builder) {
 void StreamPlan::put(const SlotGroup& updates, BatchBuilder& builder) {
   const auto count = unsigned(std::popcount(updates.slots));
   builder.put(updates, count);
-  count_sent(updates.brick, int(count));
   sent_count_ += count;
   if (!relevant_->is_found(updates.brick)) return;  // bounds stay as they are: these are ancestors
   Pending w = pending(updates.brick);
@@ -225,10 +243,9 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
       return;
     }
     builder.visited += 4;
-    const UpdateIndex first = set.first(brick, s);
-    const std::uint64_t unsent = ~sent_.some(first, unsigned(std::popcount(occupancy))) & SplitSet::extract(relevant, occupancy);
+    const std::uint64_t unsent = relevant & ~sent_.slots(brick, key);
     if (unsent == 0) return;
-    const auto here = visit_supercube(ranking, in, {key, brick, s, {}, first}, unsent, all, builder);
+    const auto here = visit_supercube(ranking, in, {key, brick, s, {}, set.first(brick, s)}, unsent, all, builder);
     full = !here;
     if (full) return;
     bounds.set(in.number, here->highest);
@@ -249,21 +266,20 @@ bool StreamPlan::visit_brick(BrickIndex brick, BatchBuilder& builder) {
 // Lowers bounds of a supercube's unsent updates to how far those can move.
 void StreamPlan::lower(const InBrick& in, std::uint64_t occupancy, std::uint64_t unsent, Highest& highest) const {
   if (!relevant_->has_distances()) return;
-  highest.distance =
-      std::min(highest.distance, in.needs.farthest(in.number, in.needs.slots(in.number, occupancy), SplitSet::deposit(unsent, occupancy)));
+  highest.distance = std::min(highest.distance, in.needs.farthest(in.number, in.needs.slots(in.number, occupancy), unsent));
   if (relevant_->distance(highest.distance) > in.limit) return;
   highest.slope_below = std::max(highest.slope, highest.slope_below);
   highest.slope = 0;
 }
 
-// Adds the updates of a supercube that belong to the band, if it may have any. first: its first update. unsent: a bit
-// for each of its updates, in their order. highest: of those. nullopt if the batch is full first.
+// Adds the updates of a supercube that belong to the band, if it may have any. first: its first update. unsent: slots.
+// highest: of those. nullopt if the batch is full first.
 std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Brick& brick, const InBrick& in, const Place& first,
                                                               std::uint64_t unsent, const Highest& highest, BatchBuilder& builder) {
   const SupercubeIndex s = first.supercube;
   const std::uint64_t occupancy = volume_->set().occupancy()[s];
   const auto count = unsigned(std::popcount(occupancy));
-  const std::uint64_t candidates = budget_ ? unsent & budget_->some(first.index, count) : unsent;
+  const std::uint64_t candidates = budget_ ? unsent & budget_->slots(first.brick, first.key) : unsent;
   Unsent rest{.highest = highest};
   if (candidates == 0) return rest;
   Ranking::Supercube ranking = brick.rough(in.needs, s, first.key);
@@ -285,8 +301,8 @@ std::optional<StreamPlan::Unsent> StreamPlan::visit_supercube(const Ranking::Bri
   const std::uint64_t others = unsent & ~candidates;
   if (others == 0) return rest;
   const auto known = in.needs.of_supercube(in.number, in.needs.slots(in.number, occupancy));
-  auto number = set_bits(others).begin();
-  for (const Slot slot : set_bits<Slot>(SplitSet::deposit(others, occupancy))) {
+  auto number = set_bits(extract_bits(others, occupancy)).begin();
+  for (const Slot slot : set_bits<Slot>(others)) {
     rest.highest.raise(of_update(in, first.index + *number, known, slot));
     ++number;
   }
@@ -304,9 +320,9 @@ bool StreamPlan::add_band(const Ranking::Supercube& ranking, const InBrick& in, 
   Highest highest;  // in registers, like all that this loop changes
   unsigned wanted = 0;
   float greatest = 0;
-  auto number = set_bits(candidates).begin();
+  auto number = set_bits(extract_bits(candidates, occupancy)).begin();
   // Without branches on what is in the band: that is hard to foresee.
-  for (const Slot slot : set_bits<Slot>(SplitSet::deposit(candidates, occupancy))) {
+  for (const Slot slot : set_bits<Slot>(candidates)) {
     const Highest own = of_update(in, first + *number, known, slot);
     ++number;
     float importance = ranking.importance(own.error_step, own.distance, std::max(own.slope, own.slope_below));
@@ -363,10 +379,14 @@ std::optional<Batch> StreamPlan::next(std::size_t max_bytes, std::uint32_t max_v
     --next_brick_;
     if (builder.visited >= (builder.updates == 0 ? kInVain * std::uint64_t(max_visits) : max_visits)) break;
   }
-  if (builder.updates == 0) return {};
+  if (builder.updates == 0) {
+    sent_.settle(done() ? 0 : kUnsettled);
+    return {};
+  }
   std::vector<SlotGroup>& groups = builder.groups;
   std::sort(groups.begin(), groups.end(), [](const SlotGroup& a, const SlotGroup& b) { return a.supercube < b.supercube; });
   Batch batch{encode_batch(*volume_, shown_, sent_, groups), builder.updates, {}};
+  sent_.settle(done() ? 0 : kUnsettled);
   if (!wanted_channels_.empty()) batch.channels = send_values(groups, {});
   return batch;
 }

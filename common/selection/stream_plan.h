@@ -26,7 +26,6 @@
 #include "common/ivm/budget_search.h"
 #include "common/ivm/interval_volume.h"
 #include "common/ivm/ranking.h"
-#include "common/selection/packed_splits.h"
 #include "common/selection/supercube_bounds.h"
 #include "common/util/bits.h"
 #include "common/util/paged_array.h"
@@ -54,10 +53,10 @@ inline constexpr std::size_t kFirstPayloadOfRange = 128 << 10;
 }
 
 // The stream of one session over one data set. One thread at a time. Memory besides the data set: a byte for each two
-// bricks; six bytes for each of 64 bricks of which one was ranked and has something that is wanted and not sent; ten
-// for each brick that something was sent of; for each 32 updates of which one was sent four bytes and a little more
-// (eight with max_updates, four more for each channel); for each supercube whose unsent updates matter less than all of
-// it two bytes, or three if distances are known.
+// bricks; six bytes for each of 64 bricks of which one was ranked and has something that is wanted and not sent; twenty
+// for each brick that something was sent of; two for each supercube that something was sent of (twelve with
+// max_updates, two more for each channel); and for each supercube whose unsent updates matter less than all of it two
+// bytes, or three if distances are known.
 class StreamPlan {
  public:
   static constexpr std::uint32_t kMostVisits = 1 << 19;
@@ -65,28 +64,12 @@ class StreamPlan {
   // At first everything that the range of the data set needs is relevant.
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
-  // What is kept of a plan while its client rests, until the next view: what the client holds, and what is relevant to
-  // the ranges that it looks at.
-  struct Resting {
-    struct Held {
-      PackedSplits updates;
-      std::uint64_t count = 0;
-    };
-    Held sent;
-    std::vector<Held> channels;  // of the data set: at which updates the client has their values
-    std::shared_ptr<const RelevantUpdates> relevant;
-    ShownRanges shown;
-    [[nodiscard]] std::size_t memory_bytes() const;  // besides what is relevant
-  };
-  [[nodiscard]] Resting rest() const;
-  // The plan again, without room, channels and level of detail, as at first. resting: of a plan of this volume. A
-  // millisecond for some 50,000 updates.
-  StreamPlan(std::shared_ptr<const IntervalVolume> volume, const Resting& resting);
-
   // Marks the updates that a resuming client has as sent: slots of a supercube. False if the data set has no such
   // updates. Before the first set_lod(). If ancestors are missing, the client cannot use the updates; the server is
   // not affected.
   bool resume(SupercubeKey key, std::uint64_t slots);
+  // After some of that, and of the same for channels: what is kept of it takes less memory.
+  void settle();
   // The same for all updates that another plan has sent: one of this data set, or of coarser scales of it.
   void resume(const StreamPlan& other);
 
@@ -94,6 +77,11 @@ class StreamPlan {
   // without any change, if the data set has no such updates. groups: keys strictly ascending. Before the set_lod() of
   // the same view.
   bool forget(std::span<const SlotGroup> groups);
+
+  // Drops what is known of the updates that were not sent, until the next set_lod(), which finds it again: for a client
+  // that has all it wants, and may not ask for more. Until then there is nothing to send.
+  void rest();
+  [[nodiscard]] bool rests() const { return rests_; }
 
   // The most updates that the client holds.
   void set_room(std::uint64_t updates) { room_ = updates; }
@@ -134,6 +122,7 @@ class StreamPlan {
   [[nodiscard]] bool is_full() const { return pending_bricks_ != 0 && sent_count_ >= room_; }
 
   [[nodiscard]] std::uint64_t sent() const { return sent_count_; }  // updates that the client holds
+  [[nodiscard]] const SplitSet& held() const { return sent_; }      // which they are
   // Upper bounds over the updates that are wanted (not only as ancestors) and not sent; 0 when everything is sent.
   struct Remaining {
     std::uint64_t updates = 0;
@@ -197,9 +186,6 @@ class StreamPlan {
   }
   [[nodiscard]] static Pending first_pending(const RelevantUpdates::Bound& bound);
   void keep(BrickIndex brick, const Pending& pending);
-  void count_sent(BrickIndex brick, int more) {
-    sent_in_.update(brick, [more](std::uint16_t had) { return std::uint16_t(had + more); });
-  }
   [[nodiscard]] Ranking::Left left(const Pending& pending) const {
     return {pending.error_step, float(pending.object_error), pending.slope, relevant_->distance(pending.limit), pending.slope_below};
   }
@@ -241,6 +227,7 @@ class StreamPlan {
   };
   [[nodiscard]] Bounds bounds_of(BrickIndex brick, const BrickNeeds& needs) const;
   RelevantUpdates::PartMask find_new_parts(const RelevantUpdates* before);
+  void drop_bounds();
   void keep(BrickIndex brick, const Bounds& bounds);
   void move_limit(const Ranking::Brick& ranking, Pending& pending, Bounds& bounds) const;
   void rank_runs();
@@ -276,7 +263,6 @@ class StreamPlan {
   std::shared_ptr<const RelevantUpdates> relevant_;  // not null
   ShownRanges shown_;                                // that batches are coded for
   SplitSet sent_;
-  SparseArray<std::uint16_t> sent_in_;  // how many of each brick, which has at most 64 * kSlots
   std::vector<ViewedRun> viewed_runs_;
   PagedArray<Viewed, RelevantUpdates::kRun> viewed_;  // by brick; those whose rank is 0 may be as at first
   SparseArray<std::uint64_t> pending_;                // by brick, the bits of Pending
@@ -298,6 +284,7 @@ class StreamPlan {
   int band_width_ = 1;                                // see Ranking::band_below()
   std::uint64_t band_visits_ = 0, band_updates_ = 0;  // what was looked at for it, and found
   std::uint32_t next_brick_ = 0;                      // bricks below this one are left of the band
+  bool rests_ = false;                                // since the last view
 };
 
 }  // namespace intervale

@@ -33,7 +33,7 @@ StreamPlan::Bounds StreamPlan::bounds_of(BrickIndex brick, const BrickNeeds& nee
     const BrickNeeds::Highest all = needs.highest(n);
     bounds.highest[n] = {all.error_step, all.distance, all.slope, 0};
   }
-  supercube_bounds_.read(brick, count, bounds);
+  supercube_bounds_.read(brick, bounds);
   const std::uint8_t then = std::exchange(bounds.time, time_);
   if (bounds.kept == 0 || then == time_) return bounds;
   RelevantUpdates::PartMask added = 0;
@@ -48,7 +48,7 @@ StreamPlan::Bounds StreamPlan::bounds_of(BrickIndex brick, const BrickNeeds& nee
 
 void StreamPlan::keep(BrickIndex brick, const Bounds& bounds) {
   // Those that were all dropped may stay: they are never too low.
-  if (bounds.has_changed && bounds.kept != 0) supercube_bounds_.write(brick, std::size_t(std::popcount(volume_->set().bricks()[brick].mask)), bounds);
+  if (bounds.has_changed && bounds.kept != 0) supercube_bounds_.write(brick, bounds);
 }
 
 void StreamPlan::Bounds::set(std::size_t number, const Highest& to) {

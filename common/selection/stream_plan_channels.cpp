@@ -18,20 +18,18 @@ bool StreamPlan::resume(std::size_t channel, SupercubeKey key, std::uint64_t slo
   const SupercubeSet& set = volume_->set();
   const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
   if (!found) return false;
-  const std::uint64_t occupancy = set.occupancy()[found->supercube];
-  const UpdateIndex first = set.first(found->brick, found->supercube);
-  if ((slots & ~sent_.slots(first, occupancy)) != 0) return false;
+  if ((slots & ~sent_.slots(found->brick, found->key)) != 0) return false;
   SentChannel& sent = channels_[channel];
-  if (sent.count == 0) sent.held = SplitSet(volume_->size());
-  sent.count += std::uint64_t(std::popcount(slots & ~sent.held.slots(first, occupancy)));
-  sent.held.insert(first, occupancy, slots);
+  if (sent.count == 0) sent.held = SplitSet(set);
+  sent.count += std::uint64_t(std::popcount(slots & ~sent.held.slots(found->brick, found->key)));
+  sent.held.insert(found->brick, found->key, slots);
   return true;
 }
 
 void StreamPlan::set_channels(std::span<const std::size_t> numbers) {
   wanted_channels_.assign(numbers.begin(), numbers.end());
   for (const std::size_t number : numbers) {
-    if (channels_[number].count == 0) channels_[number].held = SplitSet(volume_->size());
+    if (channels_[number].count == 0) channels_[number].held = SplitSet(volume_->set());
   }
   next_lacking_ = 0;
 }
@@ -42,19 +40,17 @@ bool StreamPlan::lacks_values() const {
 
 // Gives the values that the client lacks at these updates, which it has. Keys ascend. names: what comes first.
 std::vector<std::uint8_t> StreamPlan::send_values(std::span<const SlotGroup> groups, std::vector<std::uint8_t> names) {
-  const SupercubeSet& set = volume_->set();
   std::vector<intervale::SentChannel> sent;
   std::vector<std::vector<SlotGroup>> to_send;
   for (const std::size_t number : wanted_channels_) {
     SentChannel& channel = channels_[number];
     std::vector<SlotGroup>& lacking = to_send.emplace_back(groups.begin(), groups.end());
     for (SlotGroup& g : lacking) {
-      const UpdateIndex first = set.first(g.brick, g.supercube);
-      const std::uint64_t occupancy = set.occupancy()[g.supercube];
-      g.slots &= ~channel.held.slots(first, occupancy);
-      channel.held.insert(first, occupancy, g.slots);
+      g.slots &= ~channel.held.slots(g.brick, g.key);
+      channel.held.insert(g.brick, g.key, g.slots);
       channel.count += std::uint64_t(std::popcount(g.slots));
     }
+    channel.held.settle();
     sent.push_back({number, &channel.held});
   }
   append_channel_values(names, *volume_, sent, to_send);
@@ -75,10 +71,9 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
     const std::size_t before = groups.size();
     bytes += kBrickBytes;
     set.for_each_supercube(brick, [&](SupercubeIndex s, SupercubeKey key) {
-      const UpdateIndex first = set.first(brick, s);
-      const std::uint64_t occupancy = set.occupancy()[s], sent = sent_.slots(first, occupancy);
+      const std::uint64_t sent = sent_.slots(brick, key);
       SlotGroup lacking{brick, s, key, 0};
-      for (const std::size_t number : wanted_channels_) lacking.slots |= sent & ~channels_[number].held.slots(first, occupancy);
+      for (const std::size_t number : wanted_channels_) lacking.slots |= sent & ~channels_[number].held.slots(brick, key);
       if (lacking.slots == 0 || is_full) return;
       const std::size_t left = max_bytes - std::min(max_bytes, bytes + kSupercubeBytes);
       while (std::size_t(std::popcount(lacking.slots)) * update_bytes > left) {
@@ -100,8 +95,7 @@ std::optional<Batch> StreamPlan::next_values(std::size_t max_bytes) {
 
 std::size_t StreamPlan::memory_bytes() const {
   std::size_t bytes = sizeof *this + sent_.memory_bytes() + (budget_ ? budget_->memory_bytes() : 0);
-  bytes += sent_in_.memory_bytes() + viewed_.memory_bytes() + viewed_runs_.capacity() * sizeof(ViewedRun) + pending_.memory_bytes() +
-           supercube_bounds_.memory_bytes();
+  bytes += viewed_.memory_bytes() + viewed_runs_.capacity() * sizeof(ViewedRun) + pending_.memory_bytes() + supercube_bounds_.memory_bytes();
   if (ranking_) bytes += ranking_->memory_bytes();
   for (const SentChannel& channel : channels_) bytes += sizeof channel + channel.held.memory_bytes();
   return bytes;

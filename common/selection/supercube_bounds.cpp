@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kHereBytes = 4;                                        // bytes of a bit for each brick
 constexpr std::size_t kPast = 4;                                             // bytes that a load may read past the last record
 constexpr std::size_t kAllocator = 8;                                        // what an allocator takes for a block; their sum is a multiple of 16
-constexpr std::size_t kMostBytes = 1 + 8 + 5 + SupercubeBounds::kBrick * 3;  // of a record
+constexpr std::size_t kMostBytes = 1 + 9 + 5 + SupercubeBounds::kBrick * 3;  // of a record
 
 // Bytes of a block whose parts take so many.
 std::size_t capacity(std::size_t bytes) { return (bytes + kPast + kAllocator + 15) / 16 * 16 - kAllocator; }
@@ -72,13 +72,29 @@ Head load_head(const std::uint8_t* from) {
           bits >> 23 & 7};
 }
 
-std::size_t mask_bytes(std::size_t count) { return (count + 7) / 8; }
+// Which supercubes, a bit each: which of its bytes are not 0, a bit each; those bytes.
+std::uint8_t* store_mask(std::uint8_t* to, std::uint64_t mask) {
+  std::uint8_t& which = *to++ = 0;
+  for (unsigned i = 0; i < 8; ++i) {
+    const auto byte = std::uint8_t(mask >> (8 * i));
+    which = std::uint8_t(which | unsigned(byte != 0) << i);
+    *to = byte;
+    to += byte != 0 ? 1 : 0;
+  }
+  return to;
+}
+
+const std::uint8_t* load_mask(const std::uint8_t* from, std::uint64_t& mask) {
+  mask = 0;
+  for (const int i : set_bits(*from++)) mask |= std::uint64_t(*from++) << (8 * i);
+  return from;
+}
 
 // Returns its bytes.
-std::size_t encode(std::size_t count, const SupercubeBounds::OfBrick& bounds, std::uint8_t* to) {
+std::size_t encode(const SupercubeBounds::OfBrick& bounds, std::uint8_t* to) {
   const std::uint8_t* const begin = to;
   *to++ = bounds.time;
-  for (std::size_t i = 0; i < mask_bytes(count); ++i) *to++ = std::uint8_t(bounds.kept >> (8 * i));
+  to = store_mask(to, bounds.kept);
   const Head head = head_of(bounds);
   store(to, head);
   to += head.bytes();
@@ -97,10 +113,9 @@ std::size_t encode(std::size_t count, const SupercubeBounds::OfBrick& bounds, st
   return std::size_t(to - begin);
 }
 
-void decode(std::size_t count, const std::uint8_t* from, SupercubeBounds::OfBrick& to) {
+void decode(const std::uint8_t* from, SupercubeBounds::OfBrick& to) {
   to.time = *from++;
-  to.kept = 0;
-  for (std::size_t i = 0; i < mask_bytes(count); ++i) to.kept |= std::uint64_t(*from++) << (8 * i);
+  from = load_mask(from, to.kept);
   const Head head = load_head(from);
   from += head.bytes();
   const auto below = [](unsigned bits) { return (std::uint32_t(1) << bits) - 1; };
@@ -145,16 +160,16 @@ SupercubeBounds::Place SupercubeBounds::place(const Block& block, BrickIndex bri
   return p;
 }
 
-void SupercubeBounds::read(BrickIndex brick, std::size_t count, OfBrick& to) const {
+void SupercubeBounds::read(BrickIndex brick, OfBrick& to) const {
   const Block& block = pages_[brick / kPage];
   const Place p = place(block, brick);
   to.kept = 0;
-  if (p.is_here) decode(count, block.get() + Place::first(p.records) + p.begin, to);
+  if (p.is_here) decode(block.get() + Place::first(p.records) + p.begin, to);
 }
 
-void SupercubeBounds::write(BrickIndex brick, std::size_t count, const OfBrick& bounds) {
+void SupercubeBounds::write(BrickIndex brick, const OfBrick& bounds) {
   std::array<std::uint8_t, kMostBytes> record;
-  const std::size_t bytes = encode(count, bounds, record.data());
+  const std::size_t bytes = encode(bounds, record.data());
   Block& block = pages_[brick / kPage];
   const Place p = place(block, brick);
   const std::size_t had = block ? capacity(Place::first(p.records) + p.all) : 0;

@@ -26,9 +26,9 @@ struct Highest {
   friend bool operator==(const Highest&, const Highest&) = default;
 };
 
-// Bounds of some supercubes, which are counted within their brick. Memory: for each brick that has any, about eight
-// bytes and a bit for each of its supercubes, and for each bound as many bits as the differences within the brick take,
-// at most 24; for each 32 bricks 8 bytes, and some 20 if any of them has bounds.
+// Bounds of some supercubes, which are counted within their brick. Memory: for each brick that has any, about nine
+// bytes, one more for each eight supercubes of which one has, and for each bound as many bits as the differences within
+// the brick take, at most 24; for each 32 bricks 8 bytes, and some 20 if any of them has bounds.
 class SupercubeBounds {
  public:
   static constexpr std::size_t kBrick = 64;  // most supercubes of one
@@ -41,10 +41,10 @@ class SupercubeBounds {
   };
 
   explicit SupercubeBounds(std::size_t bricks = 0) : pages_((bricks + kPage - 1) / kPage) {}
-  // Overwrites the bounds of a brick that are kept, and tells which. count: of the brick's supercubes, here and below.
-  void read(BrickIndex brick, std::size_t count, OfBrick& to) const;
-  // Replaces those of a brick. Moves up to 7 kB. bounds.kept: not 0, bits below `count`.
-  void write(BrickIndex brick, std::size_t count, const OfBrick& bounds);
+  // Overwrites the bounds of a brick that are kept, and tells which.
+  void read(BrickIndex brick, OfBrick& to) const;
+  // Replaces those of a brick. Moves up to 7 kB. bounds.kept: not 0.
+  void write(BrickIndex brick, const OfBrick& bounds);
   [[nodiscard]] std::size_t memory_bytes() const { return pages_.capacity() * sizeof pages_[0] + block_bytes_; }  // with the allocator's
 
  private:

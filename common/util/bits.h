@@ -4,6 +4,7 @@
 #include <bit>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <iterator>
 #include <type_traits>
@@ -52,6 +53,9 @@ template <class Position = int, std::unsigned_integral Word>
 [[nodiscard]] constexpr SetBits<Word, Position> set_bits(Word word) {
   return SetBits<Word, Position>(word);
 }
+
+// Moves the bits at the ones of `mask` to the lowest positions, in their order.
+[[nodiscard]] std::uint64_t extract_bits(std::uint64_t bits, std::uint64_t mask);
 
 // How many bits below position i are set. i: less than the width of the word.
 template <std::unsigned_integral Word>

@@ -1,4 +1,4 @@
-// An array that takes memory only for the elements that were used.
+// An array that takes memory only for the elements that were set.
 #pragma once
 
 #include <algorithm>
@@ -14,80 +14,25 @@
 
 namespace intervale {
 
-// Elements are used or not; an unused one reads as 0. Memory: eight bytes for each page of 1024 elements; for each page
+// Elements are used, once they were set, or not. Memory: eight bytes for each page of 1024 elements; for each page
 // with a used one some 190 bytes besides, and its used elements. Use of another element moves up to a page.
 template <std::unsigned_integral T>
 class SparseArray {
  public:
   explicit SparseArray(std::size_t size = 0) : pages_((size + kPage - 1) / kPage) {}
-  SparseArray(const SparseArray& other) : pages_(other.pages_.size()), block_bytes_(other.block_bytes_) {
-    for (std::size_t i = 0; i < pages_.size(); ++i) {
-      if (other.pages_[i]) pages_[i] = copy_of(other.pages_[i], capacity(count(other.pages_[i])), count(other.pages_[i]));
-    }
-  }
-  SparseArray& operator=(const SparseArray& other) { return *this = SparseArray(other); }
-  SparseArray(SparseArray&&) noexcept = default;
-  SparseArray& operator=(SparseArray&&) noexcept = default;
-  ~SparseArray() = default;
-
-  [[nodiscard]] std::size_t size() const { return pages_.size() * kPage; }  // as it was made, and up to a page more
   // nullopt: not used.
   [[nodiscard]] std::optional<T> find(std::size_t i) const {
     const Block& block = pages_[i / kPage];
     if (!block || !is_used(block, i)) return {};
     return load<T>(block.get() + offset(block, i));
   }
-  // 64 bits of the elements from i on, lowest first, without the first `shift`, which is less than 32.
-  [[nodiscard]] std::uint64_t bits(std::size_t i, unsigned shift) const requires(sizeof(T) == 4) {
-    if (i % 64 > 61) return (get(i) | std::uint64_t(get(i + 1)) << 32) >> shift | std::uint64_t(get(i + 2)) << 1 << (63 - shift);
-    const std::byte* const block = pages_[i / kPage].get();
-    if (block == nullptr) return 0;
-    const std::size_t word = i % kPage / 64;
-    const auto all = load<std::uint64_t>(block + word * 8);
-    const std::uint64_t used = all >> (i % 64);
-    if ((used & 7) == 0) return 0;
-    // Without a branch on which are used: that is hard to foresee.
-    const std::size_t before = used_before(block, word) + std::size_t(std::popcount(all & ((std::uint64_t(1) << (i % 64)) - 1)));
-    const std::byte* at = block + kHead + before * sizeof(T);
-    const std::uint64_t first = load<T>(at) & (0 - (used & 1));
-    at += (used & 1) * sizeof(T);
-    const std::uint64_t second = load<T>(at) & (0 - (used >> 1 & 1));
-    at += (used >> 1 & 1) * sizeof(T);
-    const std::uint64_t third = load<T>(at) & (0 - (used >> 2 & 1));
-    return (first | second << 32) >> shift | third << 1 << (63 - shift);
-  }
   // Which of 64 elements from i on, a multiple of 64, are used; a bit each.
   [[nodiscard]] std::uint64_t used(std::size_t i) const {
     const Block& block = pages_[i / kPage];
     return block ? load<std::uint64_t>(block.get() + i % kPage / 64 * 8) : 0;
   }
-  // Whether an element in [begin, end) is used.
-  [[nodiscard]] bool uses_any(std::size_t begin, std::size_t end) const {
-    for (std::size_t i = begin; i < end; i = (i / 64 + 1) * 64) {
-      const Block& block = pages_[i / kPage];
-      if (!block) continue;
-      const std::size_t many = std::min(end - i, 64 - i % 64);
-      if ((load<std::uint64_t>(block.get() + i % kPage / 64 * 8) >> (i % 64) & (~std::uint64_t(0) >> (64 - many))) != 0) return true;
-    }
-    return false;
-  }
-  [[nodiscard]] T get(std::size_t i) const { return find(i).value_or(T(0)); }
   // Uses an element from now on.
   void set(std::size_t i, T value) { store(use(i) + offset(pages_[i / kPage], i), value); }
-  // Calls change(value), which returns what the element is from now on.
-  template <class Change>
-  void update(std::size_t i, Change&& change) {
-    std::byte* const at = use(i) + offset(pages_[i / kPage], i);
-    store(at, T(change(load<T>(at))));
-  }
-  // Calls visit(value) for all that are used, in order.
-  template <class Visit>
-  void for_each(Visit&& visit) const {
-    for (const Block& block : pages_) {
-      if (!block) continue;
-      for (std::size_t i = 0, n = count(block); i < n; ++i) visit(load<T>(block.get() + kHead + i * sizeof(T)));
-    }
-  }
   [[nodiscard]] std::size_t memory_bytes() const { return pages_.capacity() * sizeof pages_[0] + block_bytes_; }  // with the allocator's
 
  private:
@@ -95,7 +40,6 @@ class SparseArray {
   // many elements are used before, in two bytes; the used elements. nullptr: there are none.
   using Block = std::unique_ptr<std::byte[]>;
   static constexpr std::size_t kPage = 1024, kWords = kPage / 64, kHead = kWords * 10;
-  static constexpr std::size_t kPast = 12;      // bytes that bits() may read past the elements
   static constexpr std::size_t kAllocator = 8;  // what an allocator takes for a block; their sum is a multiple of 16
   template <class U>
   [[nodiscard]] static U load(const std::byte* from) {
@@ -124,9 +68,7 @@ class SparseArray {
     return used_before(block.get(), kWords - 1) + std::size_t(std::popcount(load<std::uint64_t>(block.get() + (kWords - 1) * 8)));
   }
   // Of a block with so many elements.
-  [[nodiscard]] static std::size_t capacity(std::size_t elements) {
-    return (kHead + elements * sizeof(T) + kPast + kAllocator + 15) / 16 * 16 - kAllocator;
-  }
+  [[nodiscard]] static std::size_t capacity(std::size_t elements) { return (kHead + elements * sizeof(T) + kAllocator + 15) / 16 * 16 - kAllocator; }
   [[nodiscard]] static Block copy_of(const Block& block, std::size_t bytes, std::size_t elements) {
     Block copy(new std::byte[bytes]);  // the browser's library lacks std::make_unique_for_overwrite
     if (block)

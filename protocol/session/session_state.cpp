@@ -71,16 +71,9 @@ tl::expected<bool, Fault> SessionState::grow() {
 
 void SessionState::rest() {
   if (!may_rest()) return;
-  resting_ = plan_->rest();
-  plan_.reset();
+  plan_->rest();
   search_.reset();
   depth_.reset();
-}
-
-void SessionState::wake() {
-  if (!resting_) return;
-  plan_.emplace(volume_, *resting_);
-  resting_.reset();
 }
 
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
@@ -96,6 +89,7 @@ std::optional<Fault> SessionState::on(const protocol::Have& have) {
     if (have.channel ? !plan_->resume(*have.channel, g.key, g.slots) : !plan_->resume(g.key, g.slots))
       return Fault{CloseCode::malformed, "Have names updates that the data set does not contain"};
   }
+  plan_->settle();
   return {};
 }
 
@@ -107,7 +101,6 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   if (auto held = check_held(volume_->description(), shown); !held) return Fault{CloseCode::no_such_range, held.error().message};
   const auto channels = find_channels(volume_->description().channels, view.channels);
   if (!channels) return Fault{CloseCode::no_such_range, channels.error().message.substr(0, protocol::kMaxText)};
-  wake();
   if (!plan_->forget(view.forget)) return Fault{CloseCode::malformed, "View forgets updates that the data set does not contain"};
   if (!view.forget.empty()) ahead_percent_.reset();
   room_ = view.room.value_or(UINT64_MAX);

@@ -43,11 +43,10 @@ class SessionState {
     waits_ = false;
   }
 
-  // Keeps what the client holds in few bytes until the next view, if the last one's answer is complete (may_rest()). Takes a
-  // millisecond for some 50,000 updates; the next view twice as long.
+  // Keeps little but what the client holds until the next view, if the last one's answer is complete (may_rest()). That
+  // view takes some time more.
   void rest();
-  [[nodiscard]] bool rests() const { return resting_.has_value(); }
-  [[nodiscard]] bool may_rest() const { return view_ == ViewState::done && plan_ && plan_->sent() <= kMostAtRest && volume_->is_whole(); }
+  [[nodiscard]] bool may_rest() const { return view_ == ViewState::done && !plan_->rests(); }
 
   // There may be a batch to select and encode.
   [[nodiscard]] bool has_work() const { return opened_was_sent_ && is_streaming() && !needs_credit() && !waits(); }
@@ -63,17 +62,14 @@ class SessionState {
   [[nodiscard]] bool needs_credit() const { return is_streaming() && credit_ < protocol::kMinCredit; }
   [[nodiscard]] const std::string& dataset() const { return dataset_; }
   // Besides what is shared.
-  [[nodiscard]] std::uint64_t memory_bytes() const { return resting_ ? resting_->memory_bytes() : plan_ ? plan_->memory_bytes() : 0; }
-  [[nodiscard]] std::uint64_t updates_sent() const { return resting_ ? resting_->sent.count : plan_ ? plan_->sent() : 0; }
+  [[nodiscard]] std::uint64_t memory_bytes() const { return plan_ ? plan_->memory_bytes() : 0; }
+  [[nodiscard]] std::uint64_t updates_sent() const { return plan_ ? plan_->sent() : 0; }
 
  private:
   // Of the last view: there is none yet; nothing, or something, was sent for it; all that it wants at kCoarsePixels was, and
   // the coarsest updates of every range go before the rest of it; Done was sent, and coarse updates of every range follow;
   // nothing more follows.
   enum class ViewState { none, unanswered, streaming, ahead_of_rest, ahead, done };
-
-  // Sets of more updates are nearly whole and gain little, and packing them takes long.
-  static constexpr std::uint64_t kMostAtRest = 1 << 18;
 
   [[nodiscard]] bool is_streaming() const { return view_ != ViewState::none && view_ != ViewState::done; }
   std::optional<protocol::Fault> on(const protocol::Open& open);
@@ -82,7 +78,6 @@ class SessionState {
   std::optional<protocol::Fault> on(const protocol::Have& have);
   std::optional<protocol::Fault> grant(std::uint64_t bytes);
   tl::expected<bool, protocol::Fault> grow();
-  void wake();
   bool begin_view();
   [[nodiscard]] bool is_searching();
   bool estimate();
@@ -100,8 +95,7 @@ class SessionState {
   SessionWorker& worker_;
   Volume volume_;
   std::string dataset_;
-  std::optional<StreamPlan> plan_;                             // none before Open, and while the session rests
-  std::optional<StreamPlan::Resting> resting_;                 // while it rests
+  std::optional<StreamPlan> plan_;                             // none before Open
   Lod lod_;                                                    // of the last view
   std::optional<DepthMap> depth_;                              // likewise
   std::optional<Camera> ahead_;                                // likewise

@@ -16,7 +16,7 @@ Result<BuiltChannel> build_channel(const Volume& volume, std::string name, std::
   BuiltChannel built{{std::move(name), volume.labels.field_unit, {}}, {}};
   for (unsigned c = 0; c < volume.components; ++c) {
     const Volume samples = component_of(volume, c);
-    const auto format = channel_format(choose_value_format(samples, step), built.channel.name);
+    const auto format = channel_format(choose_value_format(samples, step));
     if (!format) return tl::unexpected(format.error());
     ChannelComponent component{*format, has_exact_values(samples, *format), corner_keys(samples, *format), {}};
     ValueKeys& keys = built.keys.emplace_back(set.size(), format->last);
@@ -27,8 +27,8 @@ Result<BuiltChannel> build_channel(const Volume& volume, std::string name, std::
   return built;
 }
 
-Result<ValueFormat> channel_format(Result<ValueFormat> chosen, const std::string& name) {
-  if (chosen && chosen->table) return misuse("the values of channel '" + name + "' have no exact step: give another one with --channel-step");
+Result<ValueFormat> channel_format(Result<ValueFormat> chosen) {
+  if (chosen && chosen->table) return misuse("its values have no exact step: give another one with --channel-step");
   return chosen;
 }
 

@@ -23,7 +23,7 @@ struct BuiltChannel {
 [[nodiscard]] Result<BuiltChannel> build_channel(const Volume& volume, std::string name, std::optional<double> step, const SupercubeSet& set);
 
 // Passes on a format that was chosen for a channel; misuse if it has a table.
-[[nodiscard]] Result<ValueFormat> channel_format(Result<ValueFormat> chosen, const std::string& name);
+[[nodiscard]] Result<ValueFormat> channel_format(Result<ValueFormat> chosen);
 // Fails if a channel does not have as many samples as the field.
 [[nodiscard]] Result<void> check_channel_grid(const std::string& name, const Grid& grid, const Grid& field);
 // An error that says of which channel it is.

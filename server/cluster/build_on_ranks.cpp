@@ -116,7 +116,7 @@ class Part {
     if (!samples) return tl::unexpected(samples.error());
     Channel& channel = parts_.description.channels.emplace_back(Channel{from.name, from.input.header.labels.field_unit, {}});
     for (RankSamples& one : *samples) {
-      const auto format = channel_format(choose_value_format(part_, one, sample_range(part_, one), from.step), from.name);
+      const auto format = channel_format(choose_value_format(part_, one, sample_range(part_, one), from.step));
       if (!format) return of_channel(from.name, format.error());
       const RankKeys keys = find_keys(part_, one, *format, parts_.set);
       channel.components.push_back({*format, has_exact_values(part_, one, *format), keys.corners, {}});

@@ -212,10 +212,10 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     return protocol::decode_client_message(bytes);
   }
 
-  // Opening, resuming and forgetting take up to a millisecond, and the first view after a rest some.
+  // Opening, resuming and forgetting take up to a millisecond.
   [[nodiscard]] bool takes_long(const protocol::ClientMessage& message) const {
     const auto* const view = std::get_if<protocol::View>(&message);
-    return view != nullptr ? !view->forget.empty() || state_.rests()
+    return view != nullptr ? !view->forget.empty()
                            : std::holds_alternative<protocol::Open>(message) || std::holds_alternative<protocol::Have>(message);
   }
 
@@ -347,8 +347,6 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     const auto [error] = co_await writer_wakeup_.async_wait(kAwait);
     if (error || Clock::now() < deadline) co_return;
     if (may_rest) {
-      const auto lane = co_await context_.scheduler.async_acquire(flow_, FairScheduler::Priority::bulk, asio::use_awaitable);
-      const ScheduledWork work{context_.scheduler, flow_, lane, FairScheduler::Priority::bulk};
       state_.rest();  // unless a message has arrived meanwhile
       memory_.resize(state_.memory_bytes());
     } else {

@@ -28,12 +28,12 @@ struct Fixture {
   std::shared_ptr<const IntervalVolume> sigma = std::make_shared<const IntervalVolume>(*hierarchy.compact(c.format));
   std::vector<Place> places;                        // of all updates, coarse to fine
   std::vector<std::vector<std::uint8_t>> payloads;  // of the whole stream
-  SplitSet all{sigma->size()};
+  SplitSet all{sigma->set()};
 
   Fixture() {
     sigma->set().for_each_down([this](const Place& p) {
       places.push_back(p);
-      all.insert(p.index);
+      all.insert(p);
     });
     StreamPlan plan(sigma);
     plan.set_lod(Lod{});

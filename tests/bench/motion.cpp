@@ -234,10 +234,10 @@ class Run {
     for (const SlotGroup& g : mesh.resume()) {
       const auto found = *sigma_->set().find_supercube(scale_of_key(g.key), position_of_key(g.key));
       for (const Slot slot : set_bits<Slot>(g.slots)) {
-        const UpdateIndex i = sigma_->set().place_in(found.brick, found.supercube, g.key, slot).index;
-        if (held_.contains(i)) continue;
-        held_.insert(i);
-        arrival.updates.push_back(i);
+        const Place place = sigma_->set().place_in(found.brick, found.supercube, g.key, slot);
+        if (held_.contains(place)) continue;
+        held_.insert(place);
+        arrival.updates.push_back(place.index);
       }
     }
     arrivals_.push_back(std::move(arrival));
@@ -251,9 +251,9 @@ class Run {
       Lod lod;
       lod.camera = camera(now);
       const SplitSet wanted = select(*sigma_, lod);
-      for (UpdateIndex i{0}; i < sigma_->size(); ++i) {
-        if (wanted.contains(i)) last[i] = std::max(now, options_.rest);
-      }
+      sigma_->set().for_each_down([&](const Place& p) {
+        if (wanted.contains(p)) last[p.index] = std::max(now, options_.rest);
+      });
     }
     for (const Arrival& a : arrivals_) {
       figures.bytes += a.bytes;

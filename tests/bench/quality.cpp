@@ -150,7 +150,7 @@ struct Picture {
 // curve.
 std::size_t bytes_of(const IntervalVolume& volume, const SplitSet& updates) {
   const SupercubeSet& set = volume.set();
-  SplitSet sent(volume.size());
+  SplitSet sent(set);
   std::size_t bytes = 0;
   std::vector<SlotGroup> groups;
   std::uint64_t count = 0;
@@ -164,9 +164,7 @@ std::size_t bytes_of(const IntervalVolume& volume, const SplitSet& updates) {
     if (count + more > kBatchUpdatesMost) flush();
     count += more;
     groups.push_back(g);
-    for (std::uint64_t left = g.slots; left != 0; left &= left - 1) {
-      sent.insert(set.place_in(g.brick, g.supercube, g.key, Slot(std::countr_zero(left))).index);
-    }
+    sent.insert(g.brick, g.key, g.slots);
   }
   flush();
   return bytes;
@@ -268,15 +266,16 @@ Curve follow_afresh(const Sigma& every, const Picture& picture, const Lod& lod, 
 // for, not what it took.
 Curve follow_list(const Sigma& sigma, const Picture& picture, const std::vector<UpdateIndex>& order, bool at_least) {
   const SupercubeSet& set = sigma->set();
-  SplitSet sent(sigma->size());
+  SplitSet sent(set);
   std::size_t at = 0;
   const auto next = [&](const StreamClient&) -> std::optional<std::vector<std::uint8_t>> {
     const std::size_t end = std::min({order.size(), at + std::max<std::size_t>(500, at / 8), at + kBatchUpdatesMost});
     if (at == end) return {};
-    SplitSet some(sigma->size());
+    SplitSet some(set);
     for (; at < end; ++at) {
-      some.insert(order[at]);
-      sent.insert(order[at]);
+      const Place place = set.place(order[at]);
+      some.insert(place);
+      sent.insert(place);
     }
     return encode_batch(*sigma, {sigma->description().whole()}, sent, some.groups(set));
   };

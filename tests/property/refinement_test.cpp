@@ -125,7 +125,7 @@ TEST_P(Property, EveryLevelOfDetailIsRight) {
     const auto is_in = [&sigma](const SplitSet& some) {
       return [&sigma, &some](Vertex c) {
         const auto place = sigma->set().find(c);
-        return place && some.contains(place->index);
+        return place && some.contains(*place);
       };
     };
     const auto naive = testing::naive_sum(trial.volume, trial.options.range, is_in(split));

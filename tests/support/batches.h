@@ -14,9 +14,9 @@ namespace intervale::testing {
 // The batch of these updates, in any order; each once; for a client that has `before` already.
 inline std::vector<std::uint8_t> batch_of(const IntervalVolume& volume, std::span<const UpdateIndex> updates,
                                           std::span<const UpdateIndex> before = {}) {
-  SplitSet split(volume.size());
-  for (UpdateIndex i : before) split.insert(i);
-  for (UpdateIndex i : updates) split.insert(i);
+  SplitSet split(volume.set());
+  for (UpdateIndex i : before) split.insert(volume.set().place(i));
+  for (UpdateIndex i : updates) split.insert(volume.set().place(i));
   std::vector<UpdateIndex> sorted(updates.begin(), updates.end());
   std::sort(sorted.begin(), sorted.end());
   std::vector<SlotGroup> groups;

@@ -8,8 +8,8 @@
 namespace intervale::testing {
 
 inline SplitSet all_of(const SupercubeSet& set) {
-  SplitSet all(set.size());
-  for (UpdateIndex i{0}; i < set.size(); ++i) all.insert(i);
+  SplitSet all(set);
+  set.for_each_down([&all](const Place& p) { all.insert(p); });
   return all;
 }
 
@@ -25,12 +25,12 @@ inline SplitSet shown_of(const FieldHierarchy& delta, Refine refine, const Split
     const bool is_inside = sides == 1u << unsigned(Side::inside);
     return (sides & (sides - 1)) != 0 || (refine == Refine::uniform && is_inside);
   };
-  SplitSet shown(delta.set().size());
+  SplitSet shown(delta.set());
   delta.set().for_each_up([&](const Place& p) {
-    if (!splits.contains(p.index)) return;
-    if (!shown.contains(p.index) && !counts(Diamond(SupercubeSet::centre(p)))) return;
-    shown.insert(p.index);
-    for_each_parent(delta.set(), p, [&](UpdateIndex parent) { shown.insert(parent); });
+    if (!splits.contains(p)) return;
+    if (!shown.contains(p) && !counts(Diamond(SupercubeSet::centre(p)))) return;
+    shown.insert(p);
+    for_each_parent(delta.set(), p, [&](UpdateIndex parent) { shown.insert(delta.set().place(parent)); });
   });
   return shown;
 }

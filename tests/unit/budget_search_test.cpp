@@ -28,8 +28,8 @@ TEST_P(BudgetSearches, HoldTheFirstUpdatesInOrder) {
     BudgetSearch search(shared, {shared, &volume.relevant()}, lod);
     while (search.go_on()) {
     }
-    SplitSet expected(volume.size());
-    for (std::size_t k = 0; k < std::min<std::size_t>(order.size(), *lod.max_updates); ++k) expected.insert(order[k]);
+    SplitSet expected(volume.set());
+    for (std::size_t k = 0; k < std::min<std::size_t>(order.size(), *lod.max_updates); ++k) expected.insert(volume.set().place(order[k]));
     EXPECT_TRUE(std::move(search).result() == expected) << "trial " << i << ": " << *lod.max_updates << " of " << order.size();
   }
 }

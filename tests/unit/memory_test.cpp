@@ -95,7 +95,7 @@ TEST(Memory, OfASessionGrowsWithWhatWasSent) {
     EXPECT_LE(plan.memory_bytes(), (16u << 10) + 5 * volume->set().bricks().size() + plan.sent() / 2) << plan.sent();
   }
   EXPECT_EQ(plan.sent(), volume->size());
-  EXPECT_GE(plan.memory_bytes() - before, volume->size() / 8) << "a bit for each update";
+  EXPECT_GE(plan.memory_bytes() - before, 2 * volume->set().supercubes());
 }
 
 TEST(Memory, OfTheProcessIsKnown) {

@@ -323,13 +323,13 @@ TEST_P(Ranks, SelectIsClosedUnderParentsAndMinimal) {
   for (int trial = 0; trial < 40; ++trial) {
     const Lod lod = testing::random_lod(volume_.description().grid, random_);
     const Ranking ranking(volume_, lod);
-    SplitSet expected(volume_.size());
+    SplitSet expected(volume_.set());
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) {
-      if (rank != 0) expected.insert(p.index);
+      if (rank != 0) expected.insert(p);
     });
     volume_.set().for_each_up([&](const Place& p) {
-      if (!expected.contains(p.index)) return;
-      testing::for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { expected.insert(parent); });
+      if (!expected.contains(p)) return;
+      testing::for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { expected.insert(volume_.set().place(parent)); });
     });
     const SplitSet chosen = select(volume_, lod);
     ASSERT_EQ(chosen, expected) << "trial " << trial << ": " << chosen.count() << " chosen, " << expected.count() << " expected";
@@ -340,15 +340,16 @@ TEST_P(Ranks, AFinerPictureChoosesNoLess) {
   for (int trial = 0; trial < 5; ++trial) {
     Lod lod;
     lod.camera = testing::random_camera(volume_.description().grid, random_);
-    SplitSet coarser(volume_.size());
+    SplitSet coarser(volume_.set());
     for (const double pixels : {1e6, 100.0, 10.0, 3.0, 1.0, 0.1, 1e-300}) {
       lod.camera->pixel_error = pixels;
       const SplitSet chosen = select(volume_, lod);
-      for (UpdateIndex i{0}; i < volume_.size(); ++i) ASSERT_TRUE(chosen.contains(i) || !coarser.contains(i)) << "trial " << trial << ", " << pixels;
+      volume_.set().for_each_down(
+          [&](const Place& p) { ASSERT_TRUE(chosen.contains(p) || !coarser.contains(p)) << "trial " << trial << ", " << pixels; });
       coarser = chosen;
     }
     // In the end all that moves anything, wherever it is.
-    volume_.set().for_each_down([&](const Place& p) { ASSERT_TRUE(coarser.contains(p.index) || object_error(volume_, p) == 0); });
+    volume_.set().for_each_down([&](const Place& p) { ASSERT_TRUE(coarser.contains(p) || object_error(volume_, p) == 0); });
   }
 }
 
@@ -362,18 +363,19 @@ TEST_P(Ranks, InOrderParentsComeFirstAndRanksDoNotAscend) {
     std::vector<Ranking::Rank> ranks(volume_.size());  // an ancestor's is that of what needs it
     for_each_rank(volume_, ranking, [&](const Place& p, Ranking::Rank rank) { ranks[p.index] = rank; });
     volume_.set().for_each_up([&](const Place& p) {
-      if (!chosen.contains(p.index)) return;
+      if (!chosen.contains(p)) return;
       testing::for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ranks[parent] = std::max(ranks[parent], ranks[p.index]); });
     });
-    SplitSet seen(volume_.size());
+    SplitSet seen(volume_.set());
     for (std::size_t i = 0; i < order.size(); ++i) {
       const Place p = volume_.set().place(order[i]);
-      ASSERT_TRUE(chosen.contains(p.index) && !seen.contains(p.index));
-      testing::for_each_parent(volume_.set(), p, [&](UpdateIndex parent) { ASSERT_TRUE(seen.contains(parent)) << "trial " << trial; });
+      ASSERT_TRUE(chosen.contains(p) && !seen.contains(p));
+      testing::for_each_parent(volume_.set(), p,
+                               [&](UpdateIndex parent) { ASSERT_TRUE(seen.contains(volume_.set().place(parent))) << "trial " << trial; });
       if (i > 0) {
         ASSERT_LE(ranks[order[i]], ranks[order[i - 1]]) << "trial " << trial;
       }
-      seen.insert(p.index);
+      seen.insert(p);
     }
   }
 }

@@ -92,7 +92,7 @@ TEST_P(SplitLattices, ReadyIsWhatAFrontCanSplit) {
     const SplitSet split = select(set, [&](const Place&) { return wanted(random_); });
     Front front = root_front(volume_->description());
     set.for_each_down([&](const Place& p) {
-      if (!split.contains(p.index)) return;
+      if (!split.contains(p)) return;
       const auto handle = front.find(SupercubeSet::centre(p));
       ASSERT_TRUE(handle);
       front.split(*handle, volume_->key(p.index));
@@ -101,7 +101,7 @@ TEST_P(SplitLattices, ReadyIsWhatAFrontCanSplit) {
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
         lattice.move_to(key);
-        const std::uint64_t ready = lattice.splittable(kAllSlots), is_split = split.slots(set.first(b, s), set.occupancy()[s]);
+        const std::uint64_t ready = lattice.splittable(kAllSlots), is_split = split.slots(b, key);
         ASSERT_EQ(is_split & ~ready, 0u) << "the ancestors of what is split are split";
         ASSERT_EQ(lattice.splittable(~is_split & kAllSlots), ready & ~is_split);
         lattice.move_to(SlotGroup{b, s, key, 0});

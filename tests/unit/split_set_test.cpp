@@ -5,7 +5,9 @@
 
 #include <bit>
 #include <cstdint>
+#include <map>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "common/diamond/ancestor_inserter.h"
@@ -38,9 +40,9 @@ TEST_P(SplitSets, SlotsAreThoseOfTheUpdatesInIt) {
   for (const double share : {0.0, 0.02, 0.5, 1.0}) {
     const SplitSet split = some_of(volume_, share, random_);
     std::vector<std::uint64_t> expected(set.supercubes());
-    set.for_each_down([&](const Place& p) { expected[p.supercube] |= std::uint64_t(split.contains(p.index)) << p.slot; });
+    set.for_each_down([&](const Place& p) { expected[p.supercube] |= std::uint64_t(split.contains(p)) << p.slot; });
     for (BrickIndex b{0}; b < set.bricks().size(); ++b) {
-      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey) { ASSERT_EQ(split.slots(set.first(b, s), set.occupancy()[s]), expected[s]); });
+      set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) { ASSERT_EQ(split.slots(b, key), expected[s]); });
     }
   }
 }
@@ -86,10 +88,10 @@ TEST_P(SplitSets, SlotsAreInsertedAndErasedTogether) {
       set.for_each_supercube(b, [&](SupercubeIndex s, SupercubeKey key) {
         const std::uint64_t slots = set.occupancy()[s] & (std::uint64_t(random_()) << 32 | random_());
         for (const Slot slot : set_bits<Slot>(slots)) {
-          const UpdateIndex i = set.place_in(b, s, key, slot).index;
-          inserts ? expected.insert(i) : expected.erase(i);
+          const Place place = set.place_in(b, s, key, slot);
+          inserts ? expected.insert(place) : expected.erase(place);
         }
-        inserts ? split.insert(set.first(b, s), set.occupancy()[s], slots) : split.erase(set.first(b, s), set.occupancy()[s], slots);
+        inserts ? split.insert(b, key, slots) : split.erase(b, key, slots);
       });
     }
     ASSERT_EQ(split, expected);
@@ -98,37 +100,126 @@ TEST_P(SplitSets, SlotsAreInsertedAndErasedTogether) {
 
 TEST_P(SplitSets, AncestorsAreInsertedBeforeTheirDescendants) {
   const SupercubeSet& set = volume_.set();
-  SplitSet split(set.size());
+  SplitSet split(set);
   AncestorInserter inserter(set, split);
   for (int trial = 0; trial < 200; ++trial) {
     const Place place = set.place(UpdateIndex(random_() % set.size()));
     const std::uint64_t occupancy = set.occupancy()[place.supercube];
-    const std::uint64_t slots = occupancy & random_() * 0x100000001u & ~split.slots(set.first(place.brick, place.supercube), occupancy);
+    const std::uint64_t slots = occupancy & random_() * 0x100000001u & ~split.slots(place.brick, place.key);
     if (slots == 0) continue;
-    const SplitSet before = split;
+    const auto before = split.groups(set);
     SplitSet expected = split;
     const SplitSet closed = select(set, [&](const Place& p) { return p.supercube == place.supercube && (slots >> p.slot & 1) != 0; });
-    for (UpdateIndex i{0}; i < set.size(); ++i) {
-      if (closed.contains(i)) expected.insert(i);
-    }
+    for (const SlotGroup& g : closed.groups(set)) expected.insert(g.brick, g.key, g.slots);
     SplitSet replayed = split;
     for (const SlotGroup& g : inserter.insert({place.brick, place.supercube, place.key, slots})) {
       for (const Slot slot : set_bits<Slot>(g.slots)) {
         const Place p = set.place_in(g.brick, g.supercube, g.key, slot);
-        testing::for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_TRUE(replayed.contains(parent)); });
-        ASSERT_FALSE(replayed.contains(p.index));
-        replayed.insert(p.index);
+        testing::for_each_parent(set, p, [&](UpdateIndex parent) { ASSERT_TRUE(replayed.contains(set.place(parent))); });
+        ASSERT_FALSE(replayed.contains(p));
+        replayed.insert(p);
       }
     }
     ASSERT_EQ(replayed, expected);
     ASSERT_EQ(split, expected);
     if (trial % 2 != 0) continue;
     inserter.take_back();
-    ASSERT_EQ(split, before);
+    ASSERT_EQ(split.groups(set), before);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Random, SplitSets, ::testing::Range(0u, 10u));
+
+// A word for each supercube of some bricks.
+using Words = std::map<std::pair<BrickIndex, SupercubeKey>, std::uint64_t>;
+
+void expect_words(const SplitSet& set, const Words& words, std::size_t bricks) {
+  std::uint64_t count = 0;
+  for (BrickIndex b{0}; b < bricks; ++b) {
+    unsigned of_brick = 0;
+    for (SupercubeKey place = 0; place < 64; ++place) {
+      const auto found = words.find({b, place});
+      const std::uint64_t word = found == words.end() ? 0 : found->second;
+      ASSERT_EQ(set.slots(b, 640 + place), word);
+      of_brick += unsigned(std::popcount(word));
+    }
+    ASSERT_EQ(set.count(b), of_brick);
+    ASSERT_TRUE(set.has_any(b) || of_brick == 0);
+    ASSERT_EQ((set.bricks(b / 64 * 64) >> (b % 64) & 1) != 0, set.has_any(b));
+    count += of_brick;
+  }
+  ASSERT_EQ(set.count(), count);
+}
+
+TEST(SplitSetLaws, HoldsWhatWasPutInAndNothingElse) {
+  constexpr std::size_t kBricks = 150;
+  std::mt19937_64 random(3);
+  SplitSet set(kBricks);
+  Words words;
+  for (const std::size_t below : {2u, 40u, unsigned(kBricks)}) {  // dense and sparse parts
+    for (int i = 0; i < 4000; ++i) {
+      const BrickIndex brick(random() % below);
+      const SupercubeKey place = random() % 64;
+      const std::uint64_t slots = random() % 2 == 0 ? std::uint64_t(1) << random() % kSlots : random() >> (64 - kSlots);
+      std::uint64_t& word = words[{brick, place}];
+      if (random() % 2 == 0) {
+        set.insert(brick, 640 + place, slots);
+        word |= slots;
+      } else {
+        set.erase(brick, 640 + place, slots);
+        word &= ~slots;
+      }
+      if (random() % 100 == 0) set.settle(random() % 100);
+    }
+    ASSERT_NO_FATAL_FAILURE(expect_words(set, words, kBricks));
+    SplitSet copy = set;
+    EXPECT_EQ(copy, set);
+    set.settle();
+    EXPECT_EQ(copy, set);
+    EXPECT_LE(set.memory_bytes(), copy.memory_bytes());
+    ASSERT_NO_FATAL_FAILURE(expect_words(set, words, kBricks));
+    for (BrickIndex b{0}; b < kBricks; ++b) ASSERT_EQ(set.has_any(b), set.count(b) != 0) << "settled";
+    copy.erase(BrickIndex(1), 3, ~std::uint64_t(0));
+    copy.insert(BrickIndex(1), 3, 1);
+    EXPECT_NE(copy, set);
+    EXPECT_NE(set, SplitSet(kBricks));
+  }
+  for (const auto& [where, word] : words) set.erase(where.first, where.second, word);
+  set.settle();
+  EXPECT_EQ(set, SplitSet(kBricks));
+  EXPECT_EQ(set.memory_bytes(), SplitSet(kBricks).memory_bytes());
+}
+
+// More different words than all sets keep once: the rest is in the set.
+TEST(SplitSetLaws, HoldsMoreDifferentWordsThanAreKept) {
+  constexpr std::size_t kBricks = 1500;
+  std::mt19937_64 random(4);
+  Words words;
+  const auto fill = [&](SplitSet& set) {
+    for (BrickIndex b{0}; b < kBricks; ++b) {
+      for (SupercubeKey place = 0; place < 64; ++place) set.insert(b, place, words[{b, place}] = 1 + (random() >> 9));
+    }
+    set.settle();
+  };
+  {
+    SplitSet set(kBricks);
+    fill(set);
+    ASSERT_NO_FATAL_FAILURE(expect_words(set, words, kBricks));
+    SplitSet copy = set;
+    EXPECT_GT(set.memory_bytes(), kBricks * 64 * 4);
+    set = SplitSet(kBricks);
+    ASSERT_NO_FATAL_FAILURE(expect_words(copy, words, kBricks));
+    for (const auto& [where, word] : words) copy.erase(where.first, where.second, word);
+    copy.settle();
+    EXPECT_EQ(copy.memory_bytes(), SplitSet(kBricks).memory_bytes());
+  }
+  SplitSet few(kBricks);  // those have gone
+  for (BrickIndex b{0}; b < kBricks; ++b) {
+    for (SupercubeKey place = 0; place < 64; ++place) few.insert(b, place, 1 + random() % 1000);
+  }
+  few.settle();
+  EXPECT_LT(few.memory_bytes(), kBricks * (10 + 64 * 2 + 2));
+}
 
 }  // namespace
 }  // namespace intervale

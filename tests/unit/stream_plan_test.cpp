@@ -64,13 +64,13 @@ class Receiver {
     wanted_ = in_order(*volume_, select(*volume_, lod), lod);
     if (lod.max_updates && wanted_.size() > *lod.max_updates) wanted_.resize(*lod.max_updates);
     // The last ones within the budget may be ancestors of what is not: those would change no mesh.
-    SplitSet needed(volume_->size());
+    std::vector<bool> needed(volume_->size());
     for (std::size_t k = wanted_.size(); k-- > 0;) {
       const Place p = volume_->set().place(wanted_[k]);
-      if (testing::is_relevant(volume_->relevant(), *volume_, p)) needed.insert(p.index);
-      if (needed.contains(p.index)) testing::for_each_parent(volume_->set(), p, [&](UpdateIndex parent) { needed.insert(parent); });
+      if (testing::is_relevant(volume_->relevant(), *volume_, p)) needed[p.index] = true;
+      if (needed[p.index]) testing::for_each_parent(volume_->set(), p, [&](UpdateIndex parent) { needed[parent] = true; });
     }
-    std::erase_if(wanted_, [&](UpdateIndex i) { return !needed.contains(i); });
+    std::erase_if(wanted_, [&](UpdateIndex i) { return !needed[i]; });
   }
   // Takes a batch; what was sent before, or before its parents, is refused.
   Result<std::uint64_t> take(const Batch& batch) {
