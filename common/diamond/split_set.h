@@ -60,8 +60,8 @@ class SplitSet {
   [[nodiscard]] std::uint64_t count() const;
   [[nodiscard]] std::vector<SlotGroup> groups(const SupercubeSet& set) const;  // all of it, in order
 
-  // Makes it small, unless fewer than `most` supercubes have words of their own since. O(the bricks of the pages that
-  // were changed).
+  // Replaces the words of the set's own by numbers, unless fewer than `most` came since the last time. O(the bricks of
+  // the pages that were changed).
   void settle(std::size_t most = 0);
   [[nodiscard]] std::size_t memory_bytes() const {  // with the allocator's
     return pages_.capacity() * sizeof pages_[0] + changed_.capacity() * sizeof changed_[0] + block_bytes_;
@@ -119,7 +119,7 @@ class SplitSet {
 
   std::vector<Block> pages_;
   std::vector<std::uint32_t> changed_;  // pages, since it was settled
-  std::size_t own_words_ = 0;           // of those
+  std::size_t own_words_ = 0;           // that came since
   std::size_t block_bytes_ = 0;
 };
 
