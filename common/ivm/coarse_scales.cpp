@@ -1,16 +1,19 @@
 #include "common/ivm/coarse_scales.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
 #include "common/codec/coding_rate.h"
 #include "common/diamond/domain.h"
 #include "common/diamond/grid.h"
+#include "common/ivm/distance_codes.h"
 #include "common/ivm/every_range.h"
 #include "common/ivm/value_file.h"
 #include "common/ivm/value_page.h"
 #include "common/ivm/value_streams.h"
+#include "common/view/screen_error.h"
 
 namespace intervale {
 namespace {
@@ -75,20 +78,24 @@ Result<IntervalVolume> decode_coarse(const FileEnds& file, const CoarseScales& s
   return of_every_range(std::move(*values).take(), parallel);
 }
 
-// Errors are saturated: an update's is no smaller than that of any child. The parents of a scale's first level are of the
-// last level of the scale before, and each of its other levels has its parents in the level before it. So where no update of
-// the finest scale's last level has an error above the threshold, none of a finer scale has. The levels before the last need
-// not be looked at: their errors may be above it, but they are held.
-//
 // With a camera, how far surfaces move is measured in the whole data set.
 bool wants_finer(const IntervalVolume& volume, const Lod& lod) {
   if (volume.is_whole()) return false;
   const double threshold = error_of(lod, volume.description().max_error);
-  if (threshold <= 0 || lod.camera) return true;
-  const SupercubeSet& set = volume.set();
-  bool is_wanted = false;
-  set.for_each(finest_scale(volume), 2, [&](const Place& p) { is_wanted = is_wanted || double(volume.error(p.index)) > threshold; });
-  return is_wanted;
+  return threshold <= 0 || lod.camera || double(volume.error_of_finer()) > threshold;
+}
+
+bool estimates_want_finer(const IntervalVolume& volume, const Lod& lod) {
+  if (volume.is_whole()) return false;
+  Lod others = lod;
+  others.camera.reset();
+  if (!wants_finer(volume, others)) return false;
+  if (!lod.camera) return true;
+  const Grid& grid = volume.description().grid;
+  ScreenError::Region box;
+  for (std::size_t axis = 0; axis < 3; ++axis) box.middle[axis] = box.reach[axis] = double(grid.dims[axis] - 1) / 2;
+  const double width = std::ldexp(diamond_width(grid), finest_scale(volume) - 1);
+  return width / 2 * ScreenError(*lod.camera, grid).pixels_per_unit(box) > lod.camera->pixel_error;
 }
 
 Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path, const IntervalVolume* held,

@@ -48,6 +48,11 @@ inline constexpr std::size_t kStartBytes = 64 << 10;
 // that is whole.
 [[nodiscard]] bool wants_finer(const IntervalVolume& volume, const Lod& lod);
 
+// The same where it need not be measured how far surfaces move: an update is taken to move them by half its diamond's
+// width at most (FORMAT.md, "From errors to distances": all but those that are far). So a camera wants no scale of
+// whose diamonds half the width is within its pixel error at the nearest point of the box.
+[[nodiscard]] bool estimates_want_finer(const IntervalVolume& volume, const Lod& lod);
+
 // The coarsest of these of a file that are finer than what is held of it, by its first and last bytes. held: nullptr for
 // nothing. nullptr: there are none, and the file is to be read whole. The name is the file's.
 [[nodiscard]] Result<std::shared_ptr<const IntervalVolume>> load_coarse_volume(const std::filesystem::path& path,

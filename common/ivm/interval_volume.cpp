@@ -57,6 +57,16 @@ std::vector<std::uint64_t> relevant_slots(const IntervalVolume& volume, const st
   return slots;
 }
 
+// Errors are saturated: an update's is no smaller than that of any child. The parents of a scale's first level are of
+// the last level of the scale before, and each of its other levels has its parents in the level before it. So no update
+// of a finer scale has a greater error than those of the last level of the finest scale that is there.
+float error_of_last_level(const IntervalVolume& volume) {
+  const SupercubeSet& set = volume.set();
+  unsigned step = 0;
+  set.for_each(scale_of_key(set.bricks().back().key), 2, [&](const Place& p) { step = std::max(step, volume.error_step(p.index)); });
+  return volume.error_steps()[step];
+}
+
 }  // namespace
 
 IntervalVolume::IntervalVolume(Parts parts, const BrickRegions& regions, const ParallelFor& parallel)
@@ -72,7 +82,9 @@ IntervalVolume::IntervalVolume(Parts parts, const BrickRegions& regions, const P
       brick_regions_(description_.grid, regions),
       run_regions_(description_.grid, regions_of_runs(regions)),
       bounds_(std::make_shared<LazyBounds>()),
-      statistics_(std::move(parts.statistics)) {}
+      statistics_(std::move(parts.statistics)) {
+  if (!is_whole() && size() != 0) error_of_finer_ = error_of_last_level(*this);
+}
 
 Result<IntervalVolume> IntervalVolume::assemble(Parts parts, const ParallelFor& parallel) {
   const Description& d = parts.description;

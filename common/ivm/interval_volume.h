@@ -55,6 +55,8 @@ class IntervalVolume {
   // Whether it has all updates of the data set. Otherwise finer scales are still to come (coarse_scales.h): the whole data
   // set gives its updates the same numbers, and has the same description.
   [[nodiscard]] bool is_whole() const { return description_.updates == set_.size(); }
+  // No update of those that are still to come has a greater error; 0 if it is whole.
+  [[nodiscard]] float error_of_finer() const { return error_of_finer_; }
 
   // Saturated error in the field's units, rounded up: no smaller than that of any child. Monotone in error_step.
   [[nodiscard]] float error(UpdateIndex i) const { return error_steps_[steps_[i]]; }
@@ -102,6 +104,7 @@ class IntervalVolume {
   std::shared_ptr<LazyBounds> bounds_;  // not null; of all copies
   std::shared_ptr<const FieldStatistics> statistics_;
   std::vector<ChannelKeys> channel_keys_;
+  float error_of_finer_ = 0;
 };
 
 }  // namespace intervale

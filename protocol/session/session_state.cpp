@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "common/ivm/coarse_scales.h"
+
 namespace intervale {
 
 using protocol::CloseCode;
@@ -17,6 +19,9 @@ Fault other_version(std::uint32_t payload) {
                                         std::to_string(protocol::kPayloadVersion) +
                                         (theirs < protocol::kPayloadVersion ? ": update the client" : ": update the server")};
 }
+
+// What a client that resumes may have is not there yet.
+Fault is_being_read() { return {CloseCode::going_away, "the data set is being read"}; }
 
 // Once a view is so exact, updates of every range with at least such errors go ahead of the rest of it: few, so that it is
 // not put off for long.
@@ -41,7 +46,7 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   planned_ = {volume_->description().whole()};
   may_have_ = volume_->size() * (1 + std::uint64_t(volume_->description().channels.size()));
   // Updates that the client has may be among those that are not there yet.
-  if (open.resume && !volume_->is_whole()) return Fault{CloseCode::going_away, "the data set is being read"};
+  if (open.resume && !volume_->is_whole() && growth_ == Growth::by_itself) return is_being_read();
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
 }
@@ -66,7 +71,13 @@ tl::expected<bool, Fault> SessionState::grow() {
   search_.reset();
   is_new_ = true;
   waits_ = false;
+  find_growth();
   return true;
+}
+
+// Whether the last view wants what is still to come.
+void SessionState::find_growth() {
+  if (growth_ == Growth::on_demand) is_grown_ = !estimates_want_finer(*volume_, lod_);
 }
 
 void SessionState::rest() {
@@ -79,15 +90,16 @@ void SessionState::rest() {
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
   if (!opened() || view_ != ViewState::none) return Fault{CloseCode::out_of_order, "Have is allowed between Open and the first View only"};
   if (!resumed_) return {};
+  const auto absent = [this](CloseCode code, const char* text) { return volume_->is_whole() ? Fault{code, text} : is_being_read(); };
   if (have.channel && *have.channel >= volume_->description().channels.size())
     return Fault{CloseCode::malformed, "Have names a channel that the data set does not contain"};
   for (const SlotGroup& g : have.splits) {
     // Each update is named once, and each value of a channel: naming them again would be work for nothing.
     const auto named = std::uint64_t(std::popcount(g.slots));
-    if (named > may_have_) return Fault{CloseCode::too_large, "Have names more updates than the data set contains"};
+    if (named > may_have_) return absent(CloseCode::too_large, "Have names more updates than the data set contains");
     may_have_ -= named;
     if (have.channel ? !plan_->resume(*have.channel, g.key, g.slots) : !plan_->resume(g.key, g.slots))
-      return Fault{CloseCode::malformed, "Have names updates that the data set does not contain"};
+      return absent(CloseCode::malformed, "Have names updates that the data set does not contain");
   }
   plan_->settle();
   return {};
@@ -118,6 +130,7 @@ std::optional<Fault> SessionState::on(const protocol::View& view) {
   shown_ = std::move(shown);
   is_early_ = view.early;
   is_grown_ = false;
+  find_growth();
   is_new_ = true;
   waits_ = false;
   if (is_other_view || view_ == ViewState::none) {

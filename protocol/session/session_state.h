@@ -24,8 +24,12 @@ class SessionState {
   // (IntervalVolume::is_whole()) is asked for again, until more of the same contents is found.
   using Find = std::function<tl::expected<Volume, protocol::Fault>(const std::string& name)>;
 
+  // Of a data set that is not whole: it grows by itself, and a view is complete once it is whole; or it grows where
+  // lacks_scales() says so, and a view is complete with the scales that it wants by estimates (estimates_want_finer()).
+  enum class Growth { by_itself, on_demand };
+
   // worker: must outlive the session. Where waits() says so, it must be called again when the worker has done something.
-  SessionState(Find find, SessionWorker& worker) : find_(std::move(find)), worker_(worker) {}
+  SessionState(Find find, SessionWorker& worker, Growth growth = Growth::by_itself) : find_(std::move(find)), worker_(worker), growth_(growth) {}
 
   // Handles a client's message. A fault ends the session: call nothing afterwards.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
@@ -57,7 +61,11 @@ class SessionState {
   }
   // Nothing was sent yet for the last view.
   [[nodiscard]] bool view_is_unanswered() const { return view_ == ViewState::unanswered; }
+  // The last view cannot be completed before the data set grows. Of Growth::on_demand.
+  [[nodiscard]] bool lacks_scales() const { return growth_ == Growth::on_demand && is_streaming() && !volume_->is_whole() && !is_grown_; }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
+  // Updates of the data set that are there. 0 before Open.
+  [[nodiscard]] std::uint64_t updates_there() const { return volume_ ? volume_->size() : 0; }
   // Sends nothing until the client grants more credit.
   [[nodiscard]] bool needs_credit() const { return is_streaming() && credit_ < protocol::kMinCredit; }
   [[nodiscard]] const std::string& dataset() const { return dataset_; }
@@ -91,8 +99,11 @@ class SessionState {
   protocol::Batch message_of(Batch batch);
   void set_relevant(const RangeAnswer::Relevant& relevant, bool is_measured);
 
+  void find_growth();
+
   Find find_;
   SessionWorker& worker_;
+  Growth growth_;
   Volume volume_;
   std::string dataset_;
   std::optional<StreamPlan> plan_;                             // none before Open
@@ -111,7 +122,7 @@ class SessionState {
   bool is_measured_ = true;                                    // how far surfaces move, of those
   std::shared_ptr<const RangeAnswer> estimate_, measurement_;  // of shown_; nullptr if there is no need
   std::shared_ptr<BudgetSearch> search_;                       // of the plan; nullptr: none is under way
-  bool is_grown_ = false;                                      // end_growth(), for the last view
+  bool is_grown_ = false;                                      // the last view waits for no more growth
   bool waits_ = false;                                         // nothing more can be sent before one of them is ready
   std::uint64_t epoch_ = 0;
   std::uint64_t credit_ = 0;  // outstanding

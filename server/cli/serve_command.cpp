@@ -56,6 +56,8 @@ Result<void> run(const ServeCommand& options) {
         std::pair("INTERVALE_TLS_KEY", options.serve.tls.has_value())}) {
     if (!given && is_empty_in_environment(name)) return misuse(std::string(name) + " is set but empty: set it to a file, or unset it");
   }
+  if (options.serve.on_demand && options.serve.max_memory && !options.data_memory)
+    return misuse("--on-demand with --max-memory needs --data-memory: files are read whole where memory is limited");
   std::vector<std::filesystem::path> paths;
   RemoteInputs remote;
   for (const std::string& input : options.inputs) {
@@ -259,8 +261,17 @@ void add_serve_command(Program& program) {
       .add_option("--viewer", options->serve.viewer,
                   "Folder of the browser viewer. Default: ../share/intervale/viewer, relative to the program's folder, if it exists")
       ->type_name("FOLDER");
-  command.add_flag("--tolerate-damage", options->serve.tolerates_damage,
-                   "Serve what is left of files with damaged pages: coarser where pages are missing. Without it they are refused");
+  const auto tolerate_damage = command.add_flag("--tolerate-damage", options->serve.tolerates_damage,
+                                                "Serve what is left of files with damaged pages: coarser where pages are missing. "
+                                                "Without it they are refused");
+  const auto on_demand =
+      command.add_flag("--on-demand", options->serve.on_demand,
+                       "Read the finer scales of files above 1 MiB only when a view wants them, and drop them when no session uses "
+                       "the data set any more. Without it they are read at the start");
+  on_demand->excludes(tolerate_damage);
+  add_milliseconds(command, "--keep-time", options->serve.keep_time, 0, "With --on-demand: how long unused scales are kept. Default: 600")
+      ->needs(on_demand)
+      ->group("OPTIONS");
   command.add_option("--threads", options->serve.threads, "Number of threads; 0: one for each core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

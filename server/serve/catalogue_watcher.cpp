@@ -47,7 +47,7 @@ auto catching(const std::string& before, const Function& function) -> decltype(f
 }
 
 // A file of a folder.
-struct Read {
+struct FileRead {
   bool is_unread = false;  // the file could not be read; its contents may be in order
   Result<IntervalVolume> contents;
 };
@@ -57,7 +57,8 @@ void log_faults(const fs::path& path, const PageFaults& faults, const IntervalVo
 }
 
 // Throws NoRoom if that takes more memory than `room`. faults: as of decode_volume().
-Read read(const fs::path& path, const std::string& name, const Memory& memory, std::uint64_t room, const ParallelFor& parallel, PageFaults* faults) {
+FileRead read(const fs::path& path, const std::string& name, const Memory& memory, std::uint64_t room, const ParallelFor& parallel,
+              PageFaults* faults) {
   spdlog::debug("reads {}", path.string());
   std::error_code ignored;
   if (const auto size = fs::file_size(path, ignored); !ignored && size > room) throw NoRoom();
@@ -82,9 +83,10 @@ Result<Catalogue> CatalogueWatcher::load(const ParallelFor& parallel) {
       if (auto loaded = load_folder(input, parallel); !loaded) return tl::unexpected(loaded.error());
       continue;
     }
-    auto& [path, volume] = files_.emplace_back(input, load_coarse(input, nullptr, parallel));
-    if (volume) continue;
-    if (auto loaded = load_file(path, volume, parallel); !loaded) return tl::unexpected(loaded.error());
+    const auto coarse = load_coarse(input, nullptr, parallel);
+    auto& [path, contents] = files_.emplace_back(input, Contents{coarse, coarse});
+    if (coarse) continue;
+    if (auto loaded = load_file(path, contents, parallel); !loaded) return tl::unexpected(loaded.error());
   }
   const ScratchMemory::Scope scope(memory_.data_memory());
   if (auto loaded = remote_.load(parallel); !loaded) return tl::unexpected(loaded.error());
@@ -92,7 +94,7 @@ Result<Catalogue> CatalogueWatcher::load(const ParallelFor& parallel) {
 }
 
 // All of a named file.
-Result<void> CatalogueWatcher::load_file(const fs::path& path, Catalogue::Volume& volume, const ParallelFor& parallel) {
+Result<void> CatalogueWatcher::load_file(const fs::path& path, Contents& contents, const ParallelFor& parallel) {
   spdlog::debug("reads {}", path.string());
   const ScratchMemory::Scope scope(memory_.data_memory());
   PageFaults faults;
@@ -103,7 +105,7 @@ Result<void> CatalogueWatcher::load_file(const fs::path& path, Catalogue::Volume
   });
   if (!loaded) return tl::unexpected(loaded.error());
   log_faults(path, faults, **loaded);
-  volume = counted(memory_, Memory::Holder::datasets, std::move(*loaded));
+  contents.volume = counted(memory_, Memory::Holder::datasets, std::move(*loaded));
   return {};
 }
 
@@ -120,34 +122,67 @@ Catalogue::Volume CatalogueWatcher::load_coarse(const fs::path& path, const Cata
   return counted(memory_, Memory::Holder::datasets, std::move(*volume));
 }
 
+// Whether it is to be read on.
+bool CatalogueWatcher::is_wanted(const std::string& name, const Catalogue::Volume& volume) const {
+  return volume && !volume->is_whole() && (demand_ == nullptr || demand_->is_asked(name, volume->size()));
+}
+
 Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& parallel) {
   const fs::path* path = nullptr;
-  Catalogue::Volume* least = nullptr;
+  Contents* least = nullptr;
   File* in_folder = nullptr;  // that has it
-  const auto look_at = [&](const fs::path& at, Catalogue::Volume& volume, File* file) {
-    if (!volume || volume->is_whole() || (least != nullptr && (*least)->size() <= volume->size())) return;
+  const auto look_at = [&](const fs::path& at, Contents& contents, File* file) {
+    if (!is_wanted(at.stem().string(), contents.volume) || (least != nullptr && least->volume->size() <= contents.volume->size())) return;
     path = &at;
-    least = &volume;
+    least = &contents;
     in_folder = file;
   };
-  for (auto& [at, volume] : files_) look_at(at, volume, nullptr);
-  for (auto& [at, file] : folder_files_) look_at(at, file.volume, &file);
-  if (auto* const remote = remote_.unfinished(); remote != nullptr && (least == nullptr || remote->volume->size() < (*least)->size())) {
+  for (auto& [at, contents] : files_) look_at(at, contents, nullptr);
+  for (auto& [at, file] : folder_files_) look_at(at, file, &file);
+  if (auto* const remote = remote_.unfinished(); remote != nullptr && (least == nullptr || remote->volume->size() < least->volume->size())) {
     const ScratchMemory::Scope scope(memory_.data_memory());
     remote_.read_on(*remote, parallel);
     return std::optional(*catalogue(false));
   }
   if (least == nullptr) return std::nullopt;
-  if (auto finer = load_coarse(*path, *least, parallel)) {
-    *least = std::move(finer);
+  const Catalogue::Volume before = least->volume;
+  if (auto finer = load_coarse(*path, before, parallel)) {
+    least->volume = std::move(finer);
   } else if (in_folder == nullptr) {
-    if (auto loaded = load_file(*path, *least, parallel); !loaded) return tl::unexpected(loaded.error());
+    const auto loaded = load_file(*path, *least, parallel);
+    if (!loaded && demand_ == nullptr) return tl::unexpected(loaded.error());
+    if (!loaded) spdlog::warn("the coarse scales read before stay in use: {}", loaded.error().message);
   } else {
-    least->reset();
-    poll_file(*path, *in_folder, parallel);
+    least->volume.reset();
+    in_folder->stamp.reset();
+    poll_file(*path, *in_folder, Read::all, parallel);
   }
-  if (*least && (*least)->is_whole()) spdlog::info("{}: all scales are loaded", path->string());
+  if (demand_ != nullptr && (!least->volume || least->volume == before)) {
+    least->volume = before;
+    if (!drop_idle({})) demand_->refuse(path->stem().string());  // with more room, the next try may succeed
+  }
+  if (least->volume && least->volume->is_whole()) spdlog::info("{}: all scales are loaded", path->string());
   return std::optional(*catalogue(false));
+}
+
+// Whether there were any.
+bool CatalogueWatcher::drop_idle(ScaleDemand::Clock::duration time) {
+  bool has_dropped = remote_.drop_idle(time);
+  const auto look_at = [&](const fs::path& path, Contents& contents) {
+    if (!contents.coarse || contents.volume == contents.coarse || contents.volume->description() != contents.coarse->description()) return;
+    if (!demand_->is_idle(path.stem().string(), time)) return;
+    contents.volume = contents.coarse;
+    has_dropped = true;
+    spdlog::info("{}: finer scales are dropped, as no session uses them", path.string());
+  };
+  for (auto& [path, contents] : files_) look_at(path, contents);
+  for (auto& [path, file] : folder_files_) look_at(path, file);
+  return has_dropped;
+}
+
+std::optional<Catalogue> CatalogueWatcher::drop_unused(ScaleDemand::Clock::duration time) {
+  if (demand_ == nullptr || !drop_idle(time)) return {};
+  return *catalogue(false);
 }
 
 Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const ParallelFor& parallel) {
@@ -156,15 +191,18 @@ Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const Paralle
   for (const fs::path& path : *paths) {
     File file;
     file.last_seen = stamp_of(path);  // the first load does not wait for a second look
-    if (Catalogue::check_name(path.stem().string())) file.volume = load_coarse(path, nullptr, parallel);
-    if (!file.volume) poll_file(path, file, parallel);
+    if (Catalogue::check_name(path.stem().string())) file.volume = file.coarse = load_coarse(path, nullptr, parallel);
+    if (!file.volume)
+      poll_file(path, file, Read::all, parallel);
+    else if (demand_ != nullptr)
+      file.stamp = file.last_seen;
     folder_files_[path] = std::move(file);
   }
   return {};
 }
 
 // Reads the file if it has changed and is stable. True if its contents are new.
-bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const ParallelFor& parallel) {
+bool CatalogueWatcher::poll_file(const fs::path& path, File& file, Read what, const ParallelFor& parallel) {
   // Before reading: a write during the read then counts as a change.
   const auto stamp = stamp_of(path);
   const bool is_stable = stamp == std::exchange(file.last_seen, stamp);
@@ -176,6 +214,15 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, const Paralle
   };
   const std::string name = path.stem().string();
   if (auto fit = Catalogue::check_name(name); !fit) return skip(path.string() + ": " + fit.error().message);
+  if (demand_ != nullptr && what == Read::what_is_served_first) {
+    if (auto coarse = load_coarse(path, nullptr, parallel)) {
+      file.stamp = stamp;
+      file.last_warning.clear();
+      if (file.volume && file.volume->description() == coarse->description()) return false;
+      file.volume = file.coarse = std::move(coarse);
+      return true;
+    }
+  }
   const std::uint64_t room = memory_.room();
   try {
     if (room <= file.too_little) throw NoRoom();
@@ -223,7 +270,7 @@ std::optional<Catalogue> CatalogueWatcher::poll(const ParallelFor& parallel) {
       const auto known = folder_files_.find(path);
       File file = known == folder_files_.end() ? File() : known->second;
       const bool was_known = file.volume != nullptr;
-      if (poll_file(path, file, parallel)) {
+      if (poll_file(path, file, Read::what_is_served_first, parallel)) {
         changed = true;
         spdlog::info("{} {}", path.string(), was_known ? "was reloaded" : "was loaded");
       }
@@ -242,7 +289,8 @@ std::optional<Catalogue> CatalogueWatcher::poll(const ParallelFor& parallel) {
 
 // What was read. A data set that cannot be added is an error at the start, and is skipped later.
 Result<Catalogue> CatalogueWatcher::catalogue(bool is_start) const {
-  auto volumes = files_;
+  std::vector<std::pair<fs::path, Catalogue::Volume>> volumes;
+  for (const auto& [path, contents] : files_) volumes.emplace_back(path, contents.volume);
   for (const auto& [path, file] : folder_files_) volumes.emplace_back(path, file.volume);
   for (const auto& set : remote_.all()) volumes.emplace_back(set.url.shown, set.volume);
   Catalogue catalogue;

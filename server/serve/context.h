@@ -17,6 +17,7 @@
 #include "server/serve/metrics.h"
 #include "server/serve/options.h"
 #include "server/serve/range_cache.h"
+#include "server/serve/scale_demand.h"
 #include "server/serve/static_files.h"
 
 namespace intervale {
@@ -32,6 +33,7 @@ struct ServerContext {
   const ServeOptions options;            // threads is not 0
   Memory memory;                         // before its holders
   AtomicSharedPtr<Catalogue> catalogue;  // nullptr: still loading
+  ScaleDemand scale_demand;              // with options.on_demand
   FairScheduler scheduler;
   Accounts accounts{scheduler};
   RangeCache ranges{memory, scheduler};

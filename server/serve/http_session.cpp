@@ -34,8 +34,8 @@ constexpr std::chrono::seconds kKeepAliveTime{30};  // between requests
 constexpr std::chrono::seconds kWriteTime{30};
 constexpr std::chrono::milliseconds kShutdownTime{1000};
 constexpr std::uint32_t kMaxHeader = 4096;
-// Measured: of a connection, with the session that it becomes, and of its TLS.
-constexpr std::uint64_t kConnectionMemory = 12 << 10, kTlsMemory = 55 << 10;
+// Measured: of a connection, with the session that it becomes but for its messages and what was sent; of its TLS.
+constexpr std::uint64_t kConnectionMemory = 21 << 9, kTlsMemory = 55 << 10;
 
 using Request = http::request<http::empty_body>;
 using Response = http::response<http::span_body<const char>>;

@@ -26,6 +26,8 @@ struct ServeOptions {
   std::optional<std::string> metrics_listen;               // a port of its own for /metrics; nullopt: on the main port
   std::optional<std::filesystem::path> viewer;             // folder of the viewer, see StaticFiles; nullopt: none
   bool tolerates_damage = false;                           // serves what is left of files with damaged pages (page_faults.h)
+  bool on_demand = false;                                  // finer scales of large files are read when views want them
+  std::chrono::milliseconds keep_time{600'000};            // and dropped when no session has used them for so long
   unsigned threads = 0;                                    // 0: one for each core
   std::optional<std::filesystem::path> tokens;             // file, see Tokens; nullopt: no token is required
   std::vector<std::string> allowed_origins;                // that may open sessions; empty: the request's host

@@ -35,15 +35,18 @@ void warn(RemoteDataSets::DataSet& set, const std::string& why) {
 
 }  // namespace
 
-RemoteDataSets::RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage)
-    : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage) {
+RemoteDataSets::RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage, ScaleDemand* demand)
+    : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage), demand_(demand) {
   for (const RemoteUrl& url : inputs_.urls) sets_.push_back({url, nullptr, {}, {}});
 }
+
+// From the coarsest scales on.
+void RemoteDataSets::begin(DataSet& set) { set.rest = std::make_unique<RemoteVolume>(set.url, inputs_.access, inputs_.limits); }
 
 Result<void> RemoteDataSets::load(const ParallelFor& parallel) {
   for (DataSet& set : sets_) {
     if (memory_.room() == kAnyRoom && !tolerates_damage_) {
-      set.rest = std::make_unique<RemoteVolume>(set.url, inputs_.access, inputs_.limits);
+      begin(set);
       if (auto done = read_next(set, parallel); !done) return done;
     } else if (auto done = read(set, inputs_.limits, parallel); !done) {
       return tl::unexpected(done.error());
@@ -56,7 +59,8 @@ Result<void> RemoteDataSets::load(const ParallelFor& parallel) {
 RemoteDataSets::DataSet* RemoteDataSets::unfinished() {
   DataSet* least = nullptr;
   for (DataSet& set : sets_) {
-    if (set.rest && (least == nullptr || set.volume->size() < least->volume->size())) least = &set;
+    if (!set.rest || (demand_ != nullptr && !demand_->is_asked(set.url.name, set.volume->size()))) continue;
+    if (least == nullptr || set.volume->size() < least->volume->size()) least = &set;
   }
   return least;
 }
@@ -64,7 +68,12 @@ RemoteDataSets::DataSet* RemoteDataSets::unfinished() {
 void RemoteDataSets::read_on(DataSet& set, const ParallelFor& parallel) {
   if (auto done = read_next(set, parallel); !done) {
     set.rest.reset();
-    set.stamp = {};
+    if (demand_ != nullptr) {
+      demand_->refuse(set.url.name);
+      begin(set);
+    } else {
+      set.stamp = {};
+    }
     return warn(set, done.error().message);
   }
   if (!set.rest) spdlog::info("{}: all scales are loaded", set.url.shown);
@@ -81,8 +90,30 @@ Result<void> RemoteDataSets::read_next(DataSet& set, const ParallelFor& parallel
       complete_in_data_memory(**volume, memory_, parallel);
     }
     set.volume = counted(memory_, Memory::Holder::datasets, *volume);
+    if (set.coarse && set.coarse->description() != set.volume->description()) set.coarse.reset();  // it has changed
+    if (!set.coarse && !set.volume->is_whole()) set.coarse = set.volume;
     return {};
   });
+}
+
+// For drop_idle(): of a file that was read whole.
+void RemoteDataSets::keep_coarse(DataSet& set, const ParallelFor& parallel) {
+  RemoteVolume begun(set.url, inputs_.access, inputs_.limits);
+  const auto coarse = begun.next(parallel);
+  if (coarse && !(*coarse)->is_whole() && (*coarse)->description() == set.volume->description())
+    set.coarse = counted(memory_, Memory::Holder::datasets, *coarse);
+}
+
+bool RemoteDataSets::drop_idle(ScaleDemand::Clock::duration time) {
+  bool has_dropped = false;
+  for (DataSet& set : sets_) {
+    if (!set.coarse || set.volume->size() <= set.coarse->size() || !demand_->is_idle(set.url.name, time)) continue;
+    set.volume = set.coarse;
+    begin(set);
+    has_dropped = true;
+    spdlog::info("{}: finer scales are dropped, as no session uses them", set.url.shown);
+  }
+  return has_dropped;
 }
 
 bool RemoteDataSets::poll(const ParallelFor& parallel) {
@@ -94,7 +125,7 @@ bool RemoteDataSets::poll(const ParallelFor& parallel) {
 }
 
 bool RemoteDataSets::poll_one(DataSet& set, const ParallelFor& parallel) {
-  if (set.volume->is_whole() && !set.stamp.is_known()) return false;
+  if (!set.stamp.is_known() && (set.volume->is_whole() || set.rest)) return false;
   // Folders wait meanwhile. There is another try soon.
   RemoteLimits once = inputs_.limits;
   once.attempts = 1;
@@ -102,6 +133,7 @@ bool RemoteDataSets::poll_one(DataSet& set, const ParallelFor& parallel) {
   if (changed) {
     set.last_warning.clear();
     if (*changed) spdlog::info("{} was reloaded", set.url.shown);
+    if (*changed && demand_ != nullptr) keep_coarse(set, parallel);
     return *changed;
   }
   warn(set, changed.error().message);
@@ -130,6 +162,8 @@ Result<bool> RemoteDataSets::read(DataSet& set, const RemoteLimits& given, const
     if (set.volume && set.volume->is_whole() && set.volume->description() == volume->description()) return false;
     if (faults.any()) spdlog::warn("{}: {}; {} of {} updates are not served", set.url.shown, to_text(faults), faults.lost_updates, volume->size());
     set.volume = counted(memory_, Memory::Holder::datasets, std::make_shared<const IntervalVolume>(std::move(*volume)));
+    set.rest.reset();
+    if (set.coarse && set.coarse->description() != set.volume->description()) set.coarse.reset();
     return true;
   });
 }

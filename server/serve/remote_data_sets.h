@@ -13,6 +13,7 @@
 #include "common/util/result.h"
 #include "server/serve/catalogue.h"
 #include "server/serve/memory.h"
+#include "server/serve/scale_demand.h"
 
 namespace intervale {
 
@@ -32,11 +33,12 @@ class RemoteDataSets {
     RemoteStamp stamp;                             // of what was read last
     std::string last_warning;                      // logged since then, not to be repeated
     std::unique_ptr<RemoteVolume> rest = nullptr;  // which is read on; nullptr: all of it was read, or could not be
+    Catalogue::Volume coarse = nullptr;            // its coarsest scales, where these were read first
   };
 
   // memory: counts the data sets, and must outlive them. Callers have a Scope of its data memory. tolerates_damage: as
-  // of CatalogueWatcher.
-  RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage);
+  // and demand: as of CatalogueWatcher.
+  RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage, ScaleDemand* demand = nullptr);
   RemoteDataSets(const RemoteDataSets&) = delete;
   RemoteDataSets& operator=(const RemoteDataSets&) = delete;
 
@@ -44,11 +46,13 @@ class RemoteDataSets {
   // read. Throws what `parallel` throws.
   Result<void> load(const ParallelFor& parallel);
 
-  // After load(): the data set with fewest updates whose rest is still to be read; nullptr: there is none.
+  // After load(): the data set with fewest updates whose rest is to be read; nullptr: there is none.
   [[nodiscard]] DataSet* unfinished();
   // Reads on of it, as far as the next scale. If that fails, it is logged, and what was read before stays: poll() tries
-  // to read all of it.
+  // to read all of it; on demand, it is refused, and tried again when it is asked for again.
   void read_on(DataSet& set, const ParallelFor& parallel);
+  // On demand: drops the finer scales of those that no session has used for so long. Whether there were any.
+  bool drop_idle(ScaleDemand::Clock::duration time);
 
   // Once poll_time is over, asks for each whether it has changed, and reads those that have, whole. True if contents are
   // new. What fails is logged, and tried again the next time; the last good contents stay. A server that sends neither
@@ -61,10 +65,13 @@ class RemoteDataSets {
   bool poll_one(DataSet& set, const ParallelFor& parallel);
   Result<bool> read(DataSet& set, const RemoteLimits& limits, const ParallelFor& parallel);
   Result<void> read_next(DataSet& set, const ParallelFor& parallel);
+  void begin(DataSet& set);
+  void keep_coarse(DataSet& set, const ParallelFor& parallel);
 
   RemoteInputs inputs_;
   Memory& memory_;
   bool tolerates_damage_;
+  ScaleDemand* demand_;
   std::vector<DataSet> sets_;
   std::chrono::steady_clock::time_point next_poll_{};
 };

@@ -80,23 +80,27 @@ class LevelSwitch {
 class Loading {
  public:
   // where: the end of the line that tells what is served. failed: called on that thread if nothing can be served.
-  Loading(const std::vector<std::filesystem::path>& inputs, RemoteInputs remote, bool tolerates_damage, Server& server, std::string where,
+  Loading(const std::vector<std::filesystem::path>& inputs, RemoteInputs remote, const ServeOptions& options, Server& server, std::string where,
           std::function<void(const Error&)> failed)
-      : watcher_(inputs, server.memory(), tolerates_damage, std::move(remote)),
+      : watcher_(inputs, server.memory(), options.tolerates_damage, std::move(remote), server.scale_demand()),
         server_(server),
+        keep_time_(options.keep_time),
         where_(std::move(where)),
         failed_(std::move(failed)),
         thread_([this](const std::stop_token& stop) { on_spare_cores([&] { run(stop); }); }) {}
-  void poll_now() {
-    const std::lock_guard lock(mutex_);
-    wanted_ = true;
-    wake_.notify_one();
+  Loading(const Loading&) = delete;
+  Loading& operator=(const Loading&) = delete;
+  ~Loading() {
+    if (auto* const demand = server_.scale_demand()) demand->set_wake([] {});
   }
+  void poll_now() { wake(polls_); }
   void request_stop() { thread_.request_stop(); }
 
  private:
+  using Clock = std::chrono::steady_clock;
   void run(const std::stop_token& stop) {
     try {
+      if (auto* const demand = server_.scale_demand()) demand->set_wake([this] { wake(reads_on_); });
       SpareCores cores(stop, server_.scheduler(), SpareCores::Rests::while_sessions_wait, server_.memory().data_memory());
       const ParallelFor& parallel = cores.all();
       auto catalogue = watcher_.load(parallel);
@@ -104,31 +108,45 @@ class Loading {
       const std::size_t count = catalogue->volumes().size();
       server_.offer(std::move(*catalogue));
       spdlog::info("serving {} data set{}{}", count, count == 1 ? "" : "s", where_);
-      for (auto more = watcher_.complete(parallel); !more || *more; more = watcher_.complete(parallel)) {
-        if (!more) return failed_(more.error());
-        server_.offer(std::move(**more));
-      }
-      for (wait(stop); !stop.stop_requested(); wait(stop)) {
+      while (!stop.stop_requested()) {
+        for (auto more = watcher_.complete(parallel); !more || *more; more = watcher_.complete(parallel)) {
+          if (!more) return failed_(more.error());
+          server_.offer(std::move(**more));
+        }
+        if (!wait_until_poll(stop)) continue;
         if (auto changed = watcher_.poll(parallel)) server_.offer(std::move(*changed));
+        if (auto fewer = watcher_.drop_unused(keep_time_)) server_.offer(std::move(*fewer));
       }
     } catch (const Stopped&) {
     } catch (const std::exception& exception) {
       failed_({exception.what()});
     }
   }
-  void wait(const std::stop_token& stop) {
+  void wake(bool& why) {
+    const std::lock_guard lock(mutex_);
+    why = true;
+    wake_.notify_one();
+  }
+  // Whether it is time to look at the folders; or something is to be read on before, or this is to stop.
+  bool wait_until_poll(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    wake_.wait_for(lock, stop, kPollTime, [this] { return wanted_; });
-    wanted_ = false;
+    const bool is_woken = wake_.wait_until(lock, stop, next_poll_, [this] { return polls_ || reads_on_; });
+    reads_on_ = false;
+    if (stop.stop_requested() || (is_woken && !polls_)) return false;
+    polls_ = false;
+    next_poll_ = Clock::now() + kPollTime;
+    return true;
   }
 
   CatalogueWatcher watcher_;
   Server& server_;
+  std::chrono::milliseconds keep_time_;
   std::string where_;
   std::function<void(const Error&)> failed_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
-  bool wanted_ = false;
+  bool polls_ = false, reads_on_ = false;  // what it was woken for
+  Clock::time_point next_poll_ = Clock::now() + kPollTime;
   std::jthread thread_;  // the last member: it uses the others
 };
 
@@ -171,7 +189,7 @@ Result<void> serve(const ServeOptions& requested, const LogOptions& log, const s
   auto server = Server::start(options);
   if (!server) return tl::unexpected(server.error());
   Result<void> loaded;
-  Loading loading(inputs, std::move(remote), options.tolerates_damage, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(),
+  Loading loading(inputs, std::move(remote), options, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(),
                   [&](const Error& error) {
                     boost::asio::post(signals, [&, error] {
                       loaded = tl::unexpected(error);

@@ -115,6 +115,7 @@ void Server::reload() {
 }
 
 Memory& Server::memory() { return running_->context.memory; }
+ScaleDemand* Server::scale_demand() { return running_->context.options.on_demand ? &running_->context.scale_demand : nullptr; }
 const FairScheduler& Server::scheduler() const { return running_->context.scheduler; }
 
 std::uint16_t Server::port() const { return running_->listener->endpoint().port(); }

@@ -13,6 +13,7 @@
 namespace intervale {
 
 class FairScheduler;
+class ScaleDemand;
 
 class Server {
  public:
@@ -31,6 +32,7 @@ class Server {
 
   // As long as the server.
   [[nodiscard]] Memory& memory();                        // what it holds
+  [[nodiscard]] ScaleDemand* scale_demand();             // of its sessions; nullptr without options.on_demand
   [[nodiscard]] const FairScheduler& scheduler() const;  // of its sessions
   [[nodiscard]] std::uint16_t port() const;
   [[nodiscard]] std::uint16_t metrics_port() const;  // port() if /metrics has no port of its own

@@ -41,6 +41,7 @@ constexpr std::chrono::milliseconds kFaultCost{100};
 constexpr std::chrono::milliseconds kUrgentWork{10};
 // A session that has all that its view wants, and gets no message for so long, rests (SessionState::rest()).
 constexpr std::chrono::seconds kRest{2};
+constexpr std::size_t kReadBuffer = 512;  // holds most messages of clients; grows for others
 // Payloads while other sessions wait for a worker: the first of a view, and the others.
 constexpr std::size_t kContendedFirstPayload = 1 << 10, kContendedPayload = 16 << 10;
 
@@ -58,7 +59,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         context_(context),
         peer_(std::move(peer)),
         threads_(context.ranges, context.background, peer_.account),
-        state_(find_granted(context.catalogue, peer_.scope), threads_),
+        state_(find_granted(context.catalogue, peer_.scope), threads_,
+               context.options.on_demand ? SessionState::Growth::on_demand : SessionState::Growth::by_itself),
         flow_(peer_.account),
         messages_(context.options.messages_per_second),
         views_(context.options.views_per_second),
@@ -140,6 +142,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     read_delay_.cancel();
   }
 
+  // Ends once the session runs, with the request and what only the handshake needs.
   asio::awaitable<void> run(std::shared_ptr<WebSocketSession> self, Request request) {
     prepare();
     if (const auto [error] = co_await ws_.async_accept(request, kAwait); error) {
@@ -152,7 +155,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     }
     open_deadline_ = Clock::now() + context_.options.handshake_time;
     spawn(write_messages(self));
-    co_await read_messages();
+    spawn(read_messages(self));
   }
 
   void prepare() {
@@ -175,13 +178,15 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     ws_.binary(true);
   }
 
-  asio::awaitable<void> read_messages() {
+  asio::awaitable<void> read_messages([[maybe_unused]] std::shared_ptr<WebSocketSession> self) {
     beast::flat_buffer buffer;
     Memory::Share buffered(context_.memory, Memory::Holder::sessions, 0);
     while (!fault_) {
       buffer.clear();
+      if (buffer.capacity() > kReadBuffer) buffer.shrink_to_fit();  // after a larger message
+      buffered.resize(buffer.capacity());
       do {
-        const std::size_t room = protocol::kMaxClientMessage + 1 - buffer.size();
+        const std::size_t room = std::min(protocol::kMaxClientMessage + 1 - buffer.size(), std::max(kReadBuffer, buffer.size()));
         const auto [error, size] = co_await ws_.async_read_some(buffer, room, kAwait);
         buffered.resize(buffer.capacity());
         if (error) {
@@ -264,8 +269,15 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       context_.metrics.count_refusal(Refusal::memory);
       return close({CloseCode::going_away, "the server has no capacity for another session"});
     }
-    if (auto fault = state_.receive(message)) return close(std::move(*fault));
-    if (std::holds_alternative<protocol::Open>(message)) context_.connections.set_waiting(registration_, false);
+    if (auto fault = state_.receive(message)) {
+      // Of a client that resumes: it tries again.
+      if (fault->code == CloseCode::going_away && use_) (void)ask_for_scales();
+      return close(std::move(*fault));
+    }
+    if (const auto* const open = std::get_if<protocol::Open>(&message)) {
+      context_.connections.set_waiting(registration_, false);
+      if (context_.options.on_demand) use_ = context_.scale_demand.use(open->dataset);
+    }
     memory_.resize(state_.memory_bytes());
     if (const auto* view = std::get_if<protocol::View>(&message)) timing_.on_view(view->epoch);
     if (state_.view_is_unanswered()) context_.scheduler.promote(flow_);
@@ -314,6 +326,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         }
         continue;
       }
+      if (state_.lacks_scales() && !ask_for_scales()) close({CloseCode::going_away, "the rest of the data set could not be read"});
       if (!fault_ && !state_.has_work()) co_await wait();
     }
   }
@@ -335,6 +348,9 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     context_.metrics.observe_selection(time);
     return message;
   }
+
+  // Of its data set, finer than those that are there. False if a moment ago they could not be had.
+  [[nodiscard]] bool ask_for_scales() { return context_.scale_demand.ask(state_.dataset(), state_.updates_there()); }
 
   // Until a message arrives, the client's time to send Open or Credit is over, or it is time to rest.
   asio::awaitable<void> wait() {
@@ -393,6 +409,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   Peer peer_;
   SessionThreads threads_;
   SessionState state_;
+  ScaleDemand::Use use_;  // of its data set
   FairScheduler::Flow flow_;
   Clock::duration unscheduled_{0};                                                        // work of the reader since it had a worker
   std::optional<std::pair<FairScheduler::Lane, FairScheduler::Priority>> reader_worker_;  // if it has one

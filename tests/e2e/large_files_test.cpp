@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "common/ivm/value_file.h"
@@ -13,6 +15,8 @@
 #include "server/serve/catalogue_watcher.h"
 #include "tests/support/analytic_fields.h"
 #include "tests/support/page_damage.h"
+#include "tests/support/process.h"
+#include "tests/support/programs.h"
 #include "tests/support/serving.h"
 #include "tests/support/temp_dir.h"
 
@@ -176,6 +180,192 @@ TEST_F(LargeFiles, ASessionEndsWhereTheRestIsDamagedOrAnotherFile) {
     EXPECT_EQ(end.code, unsigned(CloseCode::going_away));
     ASSERT_TRUE(end.fault);
     EXPECT_EQ(end.fault->text, "the rest of the data set could not be read");
+  }
+}
+
+// The finer scales of files are read for sessions that want them (serve --on-demand).
+struct OnDemand : LargeFiles {
+  // Whether the data set has finer scales than at first.
+  static bool is_whole(const Catalogue& catalogue, const std::string& name = "large") { return catalogue.find(name)->is_whole(); }
+  ScaleDemand demand;
+};
+
+TEST_F(OnDemand, ScalesAreReadOnceASessionWantsThemAndDroppedWhenNoneDoes) {
+  write(folder, large());
+  write(folder, noise({134, 130, 129}), "larger.ivm");
+  for (const bool is_folder : {true, false}) {
+    std::vector<std::filesystem::path> inputs{folder.path()};
+    if (!is_folder) inputs = {folder / "large.ivm", folder / "larger.ivm"};
+    CatalogueWatcher watcher(inputs, memory, false, {}, &demand);
+    const auto coarse = watcher.load().value();
+    EXPECT_FALSE(is_whole(coarse) || is_whole(coarse, "larger"));
+    EXPECT_FALSE(*watcher.complete()) << "nobody wants more";
+    EXPECT_FALSE(watcher.poll());
+    EXPECT_FALSE(watcher.poll()) << "and nothing has changed";
+    auto use = demand.use("larger");
+    EXPECT_FALSE(*watcher.complete());
+    const std::size_t size = coarse.find("larger")->size();
+    EXPECT_TRUE(demand.ask("larger", size));
+    const auto more = watcher.complete().value();
+    ASSERT_TRUE(more);
+    EXPECT_GT(more->find("larger")->size(), size);
+    EXPECT_FALSE(is_whole(*more, "larger"));
+    EXPECT_FALSE(is_whole(*more)) << "nobody wants that one";
+    EXPECT_FALSE(*watcher.complete()) << "one scale more is all that was wanted";
+    EXPECT_TRUE(demand.ask("larger", more->find("larger")->size()));
+    const auto all = watcher.complete().value();
+    ASSERT_TRUE(all);
+    EXPECT_TRUE(is_whole(*all, "larger"));
+    EXPECT_FALSE(*watcher.complete());
+    EXPECT_FALSE(watcher.poll());
+    EXPECT_FALSE(watcher.drop_unused({})) << "it is in use";
+    use.reset();
+    EXPECT_FALSE(watcher.drop_unused(std::chrono::minutes(1))) << "it was a moment ago";
+    const auto fewer = watcher.drop_unused({});
+    ASSERT_TRUE(fewer);
+    EXPECT_EQ(fewer->find("larger")->size(), size);
+    EXPECT_FALSE(watcher.drop_unused({}));
+    EXPECT_FALSE(*watcher.complete());
+    EXPECT_FALSE(watcher.poll());
+  }
+}
+
+TEST_F(OnDemand, FilesThatComeOrChangeAreServedByTheirCoarseScales) {
+  CatalogueWatcher watcher({folder.path()}, memory, false, {}, &demand);
+  EXPECT_TRUE(watcher.load().value().volumes().empty());
+  for (const auto& bytes : {large(), noise({71, 68, 67})}) {
+    auto use = demand.use("large");
+    write(folder, bytes);
+    EXPECT_FALSE(watcher.poll());
+    const auto polled = watcher.poll();
+    ASSERT_TRUE(polled);
+    EXPECT_FALSE(is_whole(*polled));
+    EXPECT_FALSE(*watcher.complete());
+    EXPECT_TRUE(demand.ask("large", polled->find("large")->size()));
+    const auto all = watcher.complete().value();
+    ASSERT_TRUE(all);
+    EXPECT_TRUE(is_whole(*all));
+    EXPECT_EQ(all->find("large")->description(), polled->find("large")->description());
+    EXPECT_FALSE(watcher.poll());
+    use.reset();
+    EXPECT_TRUE(watcher.drop_unused({}));
+  }
+}
+
+TEST_F(OnDemand, WhatCannotBeReadIsRefusedAndTheCoarseScalesStay) {
+  std::vector<std::byte> bytes = large();
+  testing::damage_page(bytes, testing::page_count(bytes) - 1);
+  const auto file = write(folder, bytes);
+  for (const auto& input : {file, file.parent_path()}) {
+    ScaleDemand here;
+    CatalogueWatcher watcher({input}, memory, false, {}, &here);
+    const auto coarse = watcher.load().value();
+    const auto use = here.use("large");
+    EXPECT_TRUE(here.ask("large", coarse.find("large")->size()));
+    const auto failed = watcher.complete();
+    ASSERT_TRUE(failed && *failed);
+    EXPECT_EQ((*failed)->find("large"), coarse.find("large"));
+    EXPECT_FALSE(*watcher.complete()) << "it is not tried again at once";
+    EXPECT_FALSE(here.ask("large", coarse.find("large")->size()));
+    EXPECT_FALSE(watcher.poll());
+    EXPECT_FALSE(watcher.poll());
+  }
+}
+
+// What is wanted is told from the session's thread to the one that reads.
+TEST_F(OnDemand, ASessionGetsTheScalesThatItWants) {
+  const auto file = write(folder, large());
+  ServeOptions options;
+  options.on_demand = true;
+  const auto server = start(options);
+  ASSERT_TRUE(server->scale_demand());
+  EXPECT_FALSE(start()->scale_demand());
+  CatalogueWatcher watcher({file}, server->memory(), false, {}, server->scale_demand());
+  auto coarse = watcher.load().value();
+  const std::uint64_t some = coarse.find("large")->size(), all = coarse.find("large")->description().updates;
+  server->offer(std::move(coarse));
+  std::optional<RawClient> client(server->port());
+  client->send(protocol::Open{"large", "test", protocol::kMaxWindow});
+  protocol::View view{1, {.error_percent = 100}};
+  view.shown = {{{-1, 2}}, Refine::uniform};
+  client->send(view);
+  EXPECT_EQ(client->expect<protocol::Opened>().description.updates, all);
+  EXPECT_EQ(client->stream_to_end(), 0U) << "done without more";
+  EXPECT_FALSE(*watcher.complete());
+  view.epoch = 2;
+  view.lod = {};
+  view.early = true;
+  client->send(view);
+  std::uint64_t updates = 0;
+  while (updates < some) updates += client->expect<protocol::Batch>().updates;
+  EXPECT_EQ(updates, some);
+  std::optional<Catalogue> whole;
+  ASSERT_TRUE(eventually([&] {
+    whole = watcher.complete().value();
+    return whole.has_value();
+  }));
+  EXPECT_TRUE(is_whole(*whole));
+  server->offer(std::move(*whole));
+  EXPECT_EQ(updates + client->stream_to_end(), all);
+  EXPECT_FALSE(watcher.drop_unused({}));
+  client.reset();
+  EXPECT_TRUE(eventually([&] { return watcher.drop_unused({}).has_value(); }));
+}
+
+TEST_F(OnDemand, ASessionEndsWhereTheRestIsDamaged) {
+  std::vector<std::byte> damaged = large();
+  testing::damage_page(damaged, testing::page_count(damaged) - 1);
+  ServeOptions options;
+  options.on_demand = true;
+  const auto server = start(options);
+  CatalogueWatcher watcher({write(folder, damaged)}, server->memory(), false, {}, server->scale_demand());
+  server->offer(watcher.load().value());
+  for (int i = 0; i < 2; ++i) {
+    RawClient client(server->port());
+    client.send(protocol::Open{"large", "test", protocol::kMaxWindow});
+    client.send(protocol::View{1, {}});
+    EXPECT_TRUE(client.expect<protocol::Opened>().description.updates > 0);
+    if (i == 0) {
+      std::optional<Catalogue> tried;
+      ASSERT_TRUE(eventually([&] {
+        tried = watcher.complete().value();
+        return tried.has_value();
+      }));
+      server->offer(std::move(*tried));
+    }
+    const auto end = client.end();
+    EXPECT_EQ(end.code, unsigned(CloseCode::going_away));
+    ASSERT_TRUE(end.fault);
+    EXPECT_EQ(end.fault->text, "the rest of the data set could not be read");
+  }
+}
+
+TEST_F(OnDemand, TheProgramReadsOnAndDrops) {
+  write(folder, large());
+  ServerProgram server(folder.path(), {"--on-demand", "--keep-time", "0.1"}), plain(folder.path());
+  const std::string memory_of = "intervale_dataset_memory_bytes{dataset=\"large\"}";
+  const double coarse = metric(server.port(), memory_of);
+  const auto fetch = [](const ServerProgram& from, const Arguments& more) {
+    const auto fetched = run(Arguments{program("intervale-client"), "fetch", from.url("large"), "--range", "0.4", "0.6", "--digest"} + more);
+    EXPECT_EQ(fetched.status, 0) << fetched.err;
+    return fetched.out;
+  };
+  fetch(server, {"--error-percent", "100"});
+  EXPECT_EQ(metric(server.port(), memory_of), coarse);
+  EXPECT_EQ(fetch(server, {}).substr(0, 60), fetch(plain, {}).substr(0, 60));
+  EXPECT_TRUE(server.process().wait_for("all scales are loaded"));
+  EXPECT_TRUE(server.process().wait_for("finer scales are dropped"));
+  EXPECT_TRUE(eventually([&] { return metric(server.port(), memory_of) == coarse; }));
+  EXPECT_EQ(fetch(server, {}).substr(0, 60), fetch(plain, {}).substr(0, 60)) << "they are read again";
+}
+
+TEST(OnDemandOptions, ThatCannotBeAreOneLine) {
+  const auto serve = [](const Arguments& more) { return run(Arguments{program("intervale"), "serve", buckyball().string()} + more); };
+  for (const Arguments& wrong : {Arguments{"--keep-time", "5"}, Arguments{"--on-demand", "--tolerate-damage"},
+                                 Arguments{"--on-demand", "--max-memory", "1GB"}, Arguments{"--on-demand", "--keep-time", "-1"}}) {
+    const auto refused = serve(wrong);
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
   }
 }
 

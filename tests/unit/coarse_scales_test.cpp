@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <random>
 #include <span>
@@ -14,12 +15,14 @@
 
 #include "client/core/client_session.h"
 #include "client/local/fetch_local.h"
+#include "common/ivm/distance_codes.h"
 #include "common/ivm/extraction.h"
 #include "common/ivm/load_volume.h"
 #include "common/ivm/value_file.h"
 #include "common/mesh/mesh_digest.h"
 #include "common/parallel/all_cores.h"
 #include "common/ranges/extract_meshes.h"
+#include "common/view/screen_error.h"
 #include "protocol/codec.h"
 #include "protocol/session/local_worker.h"
 #include "protocol/session/session_state.h"
@@ -150,6 +153,46 @@ TEST(CoarseScales, WantFinerOnesWhereTheirErrorsAreAboveTheThreshold) {
   }
 }
 
+// A camera wants no scale of whose diamonds half the width is within its pixel error, wherever they are.
+TEST(CoarseScales, EstimatesWantFinerOnesWhereTheirDiamondsAreLargeOnTheScreen) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> anywhere(-200, 300), within(0, 1);
+  for (const auto& made : std::span(kFiles).first(testing::cases(kFiles.size()))) {
+    const Bytes file = std::apply(file_of, made);
+    const SharedVolume all = whole(file);
+    const Grid& grid = all->description().grid;
+    const Box box = box_of(grid);
+    for (const CoarseScales& scales : scales_of(file)) {
+      const SharedVolume some = coarse(file, scales);
+      const double half_width = std::ldexp(diamond_width(grid), scales.finest - 1) / 2;
+      int wanting = 0;
+      for (int i = 0; i < 200; ++i) {
+        Lod lod;
+        lod.camera = Camera{.eye = {anywhere(random), anywhere(random), anywhere(random)}, .look_at = {33, 30, 10}, .viewport = {640, 480}};
+        lod.camera->pixel_error = std::exp(8 * within(random) - 2);
+        EXPECT_FALSE(estimates_want_finer(*all, lod));
+        const bool is_wanted = estimates_want_finer(*some, lod);
+        wanting += int(is_wanted);
+        EXPECT_FALSE(estimates_want_finer(*some, {.error_percent = 100, .camera = lod.camera})) << "the error is enough";
+        Lod finer = lod;
+        finer.camera->pixel_error /= 2;
+        EXPECT_TRUE(!is_wanted || estimates_want_finer(*some, finer));
+        if (is_wanted) continue;
+        const ScreenError screen(*lod.camera, grid);
+        for (int point = 0; point < 50; ++point) {
+          ScreenError::Region region;
+          for (std::size_t axis = 0; axis < 3; ++axis) region.middle[axis] = within(random) * double(grid.dims[axis] - 1);
+          EXPECT_LE(half_width * screen.pixels_per_unit(region), lod.camera->pixel_error);
+        }
+      }
+      EXPECT_GT(wanting, 20);
+      EXPECT_LT(wanting, 180);
+      EXPECT_EQ(estimates_want_finer(*some, {.roi = box}), wants_finer(*some, {.roi = box}));
+      EXPECT_EQ(estimates_want_finer(*some, {.error_percent = 40}), wants_finer(*some, {.error_percent = 40}));
+    }
+  }
+}
+
 // Any range, refined in any way: what finer values make relevant besides is not shown.
 TEST(CoarseScales, EndAFetchOnceNothingFinerIsWanted) {
   std::mt19937 random(3);
@@ -258,7 +301,11 @@ TEST(CoarseScales, RefuseWhatIsDamagedCutShortOrNoFile) {
 
 // A client and the sending side, which has begun with coarse scales.
 struct GrowingSession {
-  explicit GrowingSession(SharedVolume volume) : found(std::move(volume)) { client.connected({}); }
+  explicit GrowingSession(SharedVolume volume, SessionState::Growth growth = SessionState::Growth::by_itself)
+      : found(std::move(volume)),
+        server([this](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return found; }, worker, growth) {
+    client.connected({});
+  }
 
   // Until nothing is left to do, or so many messages were sent to the client.
   void run(int messages = 1 << 20) {
@@ -281,7 +328,7 @@ struct GrowingSession {
 
   SharedVolume found;
   LocalWorker worker;
-  SessionState server{[this](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return found; }, worker};
+  SessionState server;
   ClientSession client{{.dataset = "made", .client = "test"}};
 };
 
@@ -346,6 +393,66 @@ TEST(CoarseScales, AViewIsDoneWithThemIfNothingMoreComes) {
     session.run();
     EXPECT_EQ(session.client.state(), ClientSession::State::idle);
     EXPECT_GT(session.client.mesh()->updates(), 0U);
+  }
+}
+
+TEST(CoarseScales, OnDemandAViewIsDoneWithTheScalesThatItWants) {
+  std::vector<SharedVolume> growing;
+  for (const CoarseScales& scales : scales_of(large())) growing.push_back(coarse(large(), scales));
+  growing.push_back(whole(large()));
+  ASSERT_EQ(growing.size(), 3U);
+  GrowingSession session(growing[0], SessionState::Growth::on_demand);
+  EXPECT_FALSE(session.server.lacks_scales());
+  std::size_t there = 0;
+  std::uint64_t updates = 0;
+  for (const double pixels : {200.0, 12.0, 6.0, 0.5}) {
+    ViewRequest view = view_of({1.25, kInf}, pixels);
+    view.lod.camera->eye = {400, 350, 300};
+    view.lod.camera->look_at = {67, 65, 64};
+    view.early = pixels != 12;
+    ASSERT_TRUE(session.client.look(view));
+    session.run();
+    while (session.server.lacks_scales()) {
+      EXPECT_NE(session.client.state(), ClientSession::State::idle);
+      ASSERT_LT(++there, growing.size());
+      EXPECT_EQ(session.server.updates_there(), growing[there - 1]->size());
+      session.found = growing[there];
+      session.run();
+    }
+    EXPECT_EQ(session.client.state(), ClientSession::State::idle) << pixels;
+    EXPECT_EQ(estimates_want_finer(*growing[there], view.lod), false);
+    EXPECT_TRUE(there == 0 || estimates_want_finer(*growing[there - 1], view.lod)) << "no more is asked for than is wanted";
+    EXPECT_GT(session.client.mesh()->updates(), updates);
+    updates = session.client.mesh()->updates();
+  }
+  EXPECT_EQ(there, 2U);
+  ViewRequest rest = view_of({1.25, kInf}, 1);
+  rest.lod = {.error = 0};
+  ASSERT_TRUE(session.client.look(rest));
+  session.run();
+  GrowingSession at_once(growing.back());
+  ASSERT_TRUE(at_once.client.look(rest));
+  at_once.run();
+  EXPECT_EQ(mesh_digest(session.client.mesh()->mesh()), mesh_digest(at_once.client.mesh()->mesh()));
+}
+
+// A client may resume as far as the data set is there; else it is told to try again.
+TEST(CoarseScales, OnDemandWhatIsThereIsResumed) {
+  const SharedVolume all = whole(large()), some = coarse(large(), scales_of(large())[0]);
+  const auto group_of = [&all](UpdateIndex update) {
+    const Place place = all->set().place(update);
+    return SlotGroup{.key = place.key, .slots = std::uint64_t(1) << place.slot};
+  };
+  for (const auto growth : {SessionState::Growth::by_itself, SessionState::Growth::on_demand}) {
+    LocalWorker worker;
+    SessionState server([&some](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return some; }, worker, growth);
+    const auto opened = server.receive(protocol::Open{"made", "test", protocol::kMaxWindow, some->description().content_hash});
+    EXPECT_EQ(opened.has_value(), growth == SessionState::Growth::by_itself);
+    if (opened) continue;
+    EXPECT_FALSE(server.receive(protocol::Have{{group_of(UpdateIndex{0})}}));
+    const auto fault = server.receive(protocol::Have{{group_of(UpdateIndex{some->size()})}});
+    ASSERT_TRUE(fault);
+    EXPECT_EQ(fault->code, protocol::CloseCode::going_away);
   }
 }
 

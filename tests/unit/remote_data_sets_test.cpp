@@ -94,6 +94,77 @@ TEST_F(RemoteDataSetsTest, AnotherFileTakesThePlaceOfTheOneThatWasBegun) {
   EXPECT_FALSE(*watcher.complete());
 }
 
+TEST_F(RemoteDataSetsTest, OnDemandScalesAreReadOnceTheyAreWantedAndDroppedAgain) {
+  ScaleDemand demand;
+  CatalogueWatcher watcher({}, memory, false, inputs(), &demand);
+  const auto coarse = scan(watcher.load().value());
+  std::size_t before = web.requests().size();
+  EXPECT_FALSE(*watcher.complete());
+  EXPECT_EQ(web.requests().size(), before);
+  EXPECT_FALSE(watcher.poll()) << "it has not changed";
+  for (int i = 0; i < 2; ++i) {
+    auto use = demand.use("scan");
+    std::shared_ptr<const IntervalVolume> held = coarse;
+    while (!held->is_whole()) {
+      EXPECT_TRUE(demand.ask("scan", held->size()));
+      const auto more = watcher.complete();
+      ASSERT_TRUE(more && *more);
+      held = scan(**more);
+    }
+    EXPECT_EQ(held->description(), coarse->description());
+    EXPECT_FALSE(watcher.drop_unused({}));
+    use.reset();
+    const auto fewer = watcher.drop_unused({});
+    ASSERT_TRUE(fewer);
+    EXPECT_EQ(scan(*fewer), coarse);
+    EXPECT_FALSE(watcher.drop_unused({}));
+  }
+}
+
+TEST_F(RemoteDataSetsTest, OnDemandWhatCannotBeReadIsRefusedUntilItCan) {
+  ScaleDemand demand;
+  CatalogueWatcher watcher({}, memory, false, inputs(), &demand);
+  const auto coarse = scan(watcher.load().value());
+  std::atomic<bool> is_away = true;
+  web.misbehave([&](const FileRequest&, std::size_t, FileAnswer& answer) {
+    if (is_away) answer = {.status = 404};
+  });
+  const auto use = demand.use("scan");
+  EXPECT_TRUE(demand.ask("scan", coarse->size()));
+  const auto failed = watcher.complete();
+  ASSERT_TRUE(failed && *failed);
+  EXPECT_EQ(scan(**failed), coarse);
+  EXPECT_FALSE(*watcher.complete()) << "it is not tried again at once";
+  EXPECT_FALSE(demand.ask("scan", coarse->size()));
+  is_away = false;
+  EXPECT_FALSE(watcher.poll());
+  const auto later = ScaleDemand::Clock::now() + ScaleDemand::kRetry;
+  std::shared_ptr<const IntervalVolume> held = coarse;
+  while (!held->is_whole()) {
+    EXPECT_TRUE(demand.ask("scan", held->size(), later));
+    const auto more = watcher.complete();
+    ASSERT_TRUE(more && *more);
+    held = scan(**more);
+  }
+}
+
+TEST_F(RemoteDataSetsTest, OnDemandAFileThatChangesIsDroppedToItsOwnCoarseScales) {
+  ScaleDemand demand;
+  CatalogueWatcher watcher({}, memory, false, inputs(), &demand);
+  const auto before = scan(watcher.load().value());
+  auto field = testing::random_value_field({134, 70, 66}, 2);
+  const auto bytes = encode_values(build_value_volume(field.volume, field.format), on_all_cores);
+  web.set(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), "\"two\"");
+  const auto changed = watcher.poll();
+  ASSERT_TRUE(changed);
+  const auto whole = scan(*changed);
+  EXPECT_NE(whole->description(), before->description());
+  const auto fewer = watcher.drop_unused({});
+  ASSERT_TRUE(fewer);
+  EXPECT_EQ(scan(*fewer)->description(), whole->description());
+  EXPECT_LT(scan(*fewer)->size(), whole->size());
+}
+
 TEST_F(RemoteDataSetsTest, AreReadWholeAtOnceWhereMemoryIsLimited) {
   Memory limited(std::uint64_t(1) << 30);
   CatalogueWatcher watcher({}, limited, false, inputs());
