@@ -182,6 +182,8 @@ Result<bool> draw(const PictureOptions& picture, const PictureSubject& subject, 
 Result<void> run(const FetchCommand& options) {
   const auto source = parse_source(options);
   if (!source) return tl::unexpected(source.error());
+  if (options.fetch.on_demand && !std::holds_alternative<RemoteUrl>(*source))
+    return misuse("--on-demand is for files on web servers; intervale serve has an option of that name");
   if (options.output) {
     if (auto writable = check_mesh_path(*options.output); !writable) return writable;
   }
@@ -225,6 +227,9 @@ void add_fetch_command(Program& program) {
                   "ws://HOST:PORT/NAME (or wss://) of a server; or https://HOST/FILE.ivm (or http://), a file on a web server, which is read as far "
                   "as the mesh needs it")
       ->required();
+  command.add_flag("--on-demand", options->fetch.on_demand,
+                   "Of a file on a web server, read no finer scales than --pixel-error needs if it is estimated how far surfaces move. "
+                   "Without it a camera needs all of the file");
   command.add_option("-o,--output", options->output, "Mesh file to write: .vtu, .vtp, .ply, .stl, .obj or .glb")->type_name("MESH");
   add_ranges_option(command, options->range, kShownRangeHelp);
   add_refine_option(command, options->refine, kShownRefineHelp);

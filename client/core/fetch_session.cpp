@@ -7,7 +7,7 @@
 namespace intervale {
 
 bool takes_coarse_first(const FetchOptions& options) {
-  return !options.lod.camera && !options.lod.max_tets && !options.lod.max_updates && !options.max_bytes;
+  return (!options.lod.camera || options.on_demand) && !options.lod.max_tets && !options.lod.max_updates && !options.max_bytes;
 }
 
 FetchSession::FetchSession(const std::string& name, const std::string& server, const FetchOptions& options, const FetchEvents& events)

@@ -26,6 +26,9 @@ struct FetchOptions {
   // The most bytes of messages that are received; only the first one, the description, may exceed it. No updates
   // arrive for less than that message and protocol::kMinCredit.
   std::optional<std::uint64_t> max_bytes;
+  // Of a file that is read meanwhile (fetch_growing()): with a camera, no finer scales than estimates want
+  // (estimates_want_finer()). Otherwise a camera wants all of the file, to measure how far surfaces move.
+  bool on_demand = false;
   std::chrono::seconds reconnect{30};  // how long to try to reach a lost server again; 0: not at all
 };
 
@@ -49,8 +52,8 @@ struct FetchEvents {
 };
 
 // Whether what is asked for may be sent from the coarse scales of a data set before the finer ones are there: the mesh is
-// the same in the end. Not with a camera, since how far surfaces move is not known yet; nor where a budget ends the stream,
-// since the order of what arrives matters then.
+// the same in the end. Not with a camera, since how far surfaces move is not known yet, unless on_demand; nor where a
+// budget ends the stream, since the order of what arrives matters then.
 [[nodiscard]] bool takes_coarse_first(const FetchOptions& options);
 
 // On one thread. options and events must outlive it.

@@ -32,7 +32,10 @@ std::optional<protocol::Fault> pass_messages(ClientSession& client, SessionState
 class LocalStream {
  public:
   LocalStream(SharedVolume volume, const FetchOptions& options, const FetchEvents& events)
-      : volume_(std::move(volume)), fetch_(name(), "'" + name() + "'", options, events) {
+      : volume_(std::move(volume)),
+        server_([this](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return volume_; }, worker_,
+                options.on_demand ? SessionState::Growth::on_demand : SessionState::Growth::by_itself),
+        fetch_(name(), "'" + name() + "'", options, events) {
     fetch_.session().connected(FetchSession::Clock::now());
   }
   LocalStream(const LocalStream&) = delete;
@@ -66,7 +69,7 @@ class LocalStream {
  private:
   SharedVolume volume_;
   LocalWorker worker_;
-  SessionState server_{[this](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return volume_; }, worker_};
+  SessionState server_;
   FetchSession fetch_;
   bool is_grown_ = false;
 };
@@ -122,7 +125,8 @@ Result<Fetched> fetch_growing(const NextVolume& next, const FetchOptions& option
       if (stream && events.on_notice) events.on_notice("the data of '" + stream->name() + "' changed meanwhile; starting again");
       stream.emplace(*std::move(read), options, events);
     }
-    if (wants_finer(*stream->volume(), options.lod)) ahead.start();
+    const auto wants = options.on_demand ? estimates_want_finer : wants_finer;
+    if (wants(*stream->volume(), options.lod)) ahead.start();
     return {};
   };
   if (auto begun = take(next(takes_coarse_first(options) ? ReadOn::one_scale : ReadOn::all, parallel)); !begun) return tl::unexpected(begun.error());

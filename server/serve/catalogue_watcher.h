@@ -44,9 +44,10 @@ class CatalogueWatcher {
   Result<Catalogue> load(const ParallelFor& parallel = serial);
 
   // After load(): reads on, of the data set that has fewest updates of those that are not whole and of which more is
-  // wanted: as far as the next scale, at last all of it. Returns the new catalogue; nullopt once nothing more is wanted.
-  // A named file that turns out to be damaged is an error; such a file in a folder is logged, and leaves the catalogue.
-  // What is wrong with a URL then is logged. On demand, what cannot be read is logged, and refused; what is there stays.
+  // wanted: as far as the next scale, at last all of it. Returns the new catalogue; nullopt once nothing more is
+  // wanted. A named file that turns out to be damaged is an error; such a file in a folder is logged, and leaves the
+  // catalogue. What is wrong with a URL then is logged. On demand, what cannot be read is logged, and refused; what is
+  // there stays.
   Result<std::optional<Catalogue>> complete(const ParallelFor& parallel = serial);
 
   // On demand: drops the finer scales of data sets that no session has used for so long. Returns the new catalogue, or

@@ -25,8 +25,8 @@ class ScaleDemand {
   // While it exists, a session has the data set open.
   using Use = std::unique_ptr<ScaleDemand, EndUse>;
 
-  // What is not wanted any more, because all who asked are gone, is read for so long; what could not be read is not tried
-  // again for so long.
+  // What is not wanted any more, because all who asked are gone, is read for so long; what could not be read is not
+  // tried again for so long.
   static constexpr std::chrono::seconds kLinger{30}, kRetry{5};
 
   [[nodiscard]] Use use(const std::string& name);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <span>
@@ -118,6 +119,49 @@ TEST(Remote, FetchReadsCoarseScalesFirstAndNoFinerOnesThanItNeeds) {
       EXPECT_EQ(of_file.at("bytes_read"), of_file.at("bytes"));
     }
   }
+}
+
+TEST(Remote, FetchOnDemandReadsTheScalesThatACameraWants) {
+  const TempDir folder;
+  const std::string volume = folder / "gyroid.nrrd", file = folder / "gyroid.ivm";
+  ASSERT_EQ(run({program("intervale"), "sample", "gyroid", "--size", "129", "-o", volume}).status, 0);
+  ASSERT_EQ(run({program("intervale"), "build", volume, "-o", file}).status, 0);
+  const ServerProgram on_demand(file, {"--on-demand"});
+  const FileServer web(contents_of(file));
+  for (const bool is_coarse : {true, false}) {
+    const Arguments more{"--range",
+                         "-0.3",
+                         "0.4",
+                         "--eye",
+                         "3",
+                         "4",
+                         "5",
+                         "--look-at",
+                         "0",
+                         "0",
+                         "0",
+                         "--viewport",
+                         "640",
+                         "480",
+                         "--pixel-error",
+                         is_coarse ? "12" : "0.5",
+                         "--json"};
+    const auto served = json_of(run(Arguments{program("intervale-client"), "fetch", on_demand.url("gyroid")} + more));
+    const auto read = json_of(run(Arguments{program("intervale-client"), "fetch", web.url("/gyroid.ivm"), "--on-demand"} + more));
+    EXPECT_GT(read.at("tets"), 1000);
+    const auto bytes_read = read.at("file").at("bytes_read").get<std::size_t>();
+    if (is_coarse) {
+      // And what coarser scales let it want before.
+      EXPECT_GE(read.at("updates"), served.at("updates"));
+      EXPECT_LT(read.at("updates"), 2 * served.at("updates").get<int>());
+      EXPECT_LT(bytes_read, contents_of(file).size() / 4);
+    } else {
+      EXPECT_EQ(bytes_read, contents_of(file).size());
+    }
+  }
+  const auto refused = run({program("intervale-client"), "fetch", on_demand.url("gyroid"), "--range", "0", "1", "--on-demand"});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
 }
 
 TEST(Remote, FetchSaysThatThereIsNoServer) {
