@@ -239,6 +239,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, Read what, co
     if (file.volume && file.volume->description() == volume.contents->description()) return false;
     log_faults(path, faults, *volume.contents);
     file.volume = counted(memory_, Memory::Holder::datasets, std::make_shared<const IntervalVolume>(std::move(*volume.contents)));
+    if (file.coarse && file.coarse->description() != file.volume->description()) file.coarse.reset();
     return true;
   } catch (const NoRoom&) {
     file.too_little = std::max(file.too_little, room);

@@ -86,8 +86,10 @@ class Loading {
         server_(server),
         keep_time_(options.keep_time),
         where_(std::move(where)),
-        failed_(std::move(failed)),
-        thread_([this](const std::stop_token& stop) { on_spare_cores([&] { run(stop); }); }) {}
+        failed_(std::move(failed)) {
+    if (auto* const demand = server_.scale_demand()) demand->set_wake([this] { wake(reads_on_); });
+    thread_ = std::jthread([this](const std::stop_token& stop) { on_spare_cores([&] { run(stop); }); });
+  }
   Loading(const Loading&) = delete;
   Loading& operator=(const Loading&) = delete;
   ~Loading() {
@@ -100,7 +102,6 @@ class Loading {
   using Clock = std::chrono::steady_clock;
   void run(const std::stop_token& stop) {
     try {
-      if (auto* const demand = server_.scale_demand()) demand->set_wake([this] { wake(reads_on_); });
       SpareCores cores(stop, server_.scheduler(), SpareCores::Rests::while_sessions_wait, server_.memory().data_memory());
       const ParallelFor& parallel = cores.all();
       auto catalogue = watcher_.load(parallel);
