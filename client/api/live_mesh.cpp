@@ -133,8 +133,10 @@ class LiveMesh::Worker {
         if (stream || !session_.mesh() || !was_lost_ || options_.reconnect.count() == 0) return stream;
         session_.disconnected();
         lost = stream.error();
-        deadline = Clock::now() + options_.reconnect;
-        backoff = Backoff(std::random_device{}());
+        if (std::exchange(has_progress_, false)) {
+          deadline = Clock::now() + options_.reconnect;
+          backoff = Backoff(std::random_device{}());
+        }
       }
       const auto pause = backoff.next();
       if (Clock::now() + pause > deadline) return tl::unexpected(*lost);
@@ -169,6 +171,7 @@ class LiveMesh::Worker {
       const bool is_late = make_state();
       const auto event = connection.receive(session_, is_late ? next_state() : Clock::time_point::max());
       if (!event) return tl::unexpected(event.error());
+      has_progress_ = has_progress_ || event->updates > 0 || event->kind == ClientSession::Event::Kind::done;
       if (event->kind == ClientSession::Event::Kind::opened) {
         if (auto opened = take_description(); !opened) return opened;
       }
@@ -245,6 +248,7 @@ class LiveMesh::Worker {
   ClientSession session_;
   CameraMotion motion_;
   bool was_lost_ = false;
+  bool has_progress_ = true;        // since it was lost last: updates came, or the end of the stream
   bool is_changed_ = false;         // the mesh, since the last state
   Clock::time_point changed_at_{};  // when it changed last
   Clock::time_point made_at_{};     // the last state

@@ -22,8 +22,8 @@ enum class ReadOn { one_scale, all };
 using NextVolume = std::function<Result<std::shared_ptr<const IntervalVolume>>(ReadOn how, const ParallelFor& parallel)>;
 
 // The same of a data set that is read meanwhile, with the same mesh. Coarse scales are used as soon as they are there,
-// while the next one is read; what the view does not want is not read (takes_coarse_first(), wants_finer(), on_demand). If the
-// data set changes, the stream starts again, and its events and figures with it. parallel: for `next`.
+// while the next one is read; what the view does not want is not read (takes_coarse_first(), wants_finer(), on_demand).
+// If the data set changes, the stream starts again, and its events and figures with it. parallel: for `next`.
 [[nodiscard]] Result<Fetched> fetch_growing(const NextVolume& next, const FetchOptions& options, const FetchEvents& events,
                                             const ParallelFor& parallel = serial);
 

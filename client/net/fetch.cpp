@@ -41,23 +41,27 @@ class Fetch {
     while (!stream_.has_enough()) {
       const auto event = connection_->receive(stream_.session());
       if (!event) return tl::unexpected(event.error());
+      has_progress_ = has_progress_ || event->updates > 0 || event->kind == ClientSession::Event::Kind::done;
       if (auto received = stream_.received(*event); !received) return received;
       if (auto sent = connection_->send(stream_.session()); !sent) return sent;
     }
     return {};
   }
 
-  // Fails with `why` once the time for it is over, or as stream() does.
+  // Fails with `why` once the time for it is over, or as stream() does. A server that is reached again, but sends
+  // nothing new before it ends the session, has not been reached.
   Result<void> reconnect(const Error& why) {
-    stream_.notice(why.message + "; connecting again");
-    const auto deadline = Clock::now() + options_.reconnect;
-    Backoff backoff(std::random_device{}());
+    if (std::exchange(has_progress_, false)) {
+      stream_.notice(why.message + "; connecting again");
+      deadline_ = Clock::now() + options_.reconnect;
+      backoff_ = Backoff(std::random_device{}());
+    }
     stream_.session().disconnected();
     connection_.reset();
     Result<void> done;
     while (!connection_) {
-      const auto wait = backoff.next();
-      if (Clock::now() + wait > deadline) return tl::unexpected(why);
+      const auto wait = backoff_.next();
+      if (Clock::now() + wait > deadline_) return tl::unexpected(why);
       std::this_thread::sleep_for(wait);
       done = stream();
     }
@@ -70,6 +74,9 @@ class Fetch {
   const FetchOptions& options_;
   FetchSession stream_;
   std::optional<StreamConnection> connection_;
+  bool has_progress_ = true;      // since it was lost last: updates came, or the end of the stream
+  Clock::time_point deadline_{};  // for reaching the server again
+  Backoff backoff_{0};
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -357,6 +358,19 @@ TEST_F(OnDemand, TheProgramReadsOnAndDrops) {
   EXPECT_TRUE(server.process().wait_for("finer scales are dropped"));
   EXPECT_TRUE(eventually([&] { return metric(server.port(), memory_of) == coarse; }));
   EXPECT_EQ(fetch(server, {}).substr(0, 60), fetch(plain, {}).substr(0, 60)) << "they are read again";
+}
+
+// A server that is reached again and again, but has nothing new, is lost.
+TEST_F(OnDemand, AFetchEndsWhereTheRestIsDamaged) {
+  std::vector<std::byte> damaged = large();
+  testing::damage_page(damaged, testing::page_count(damaged) - 1);
+  const ServerProgram server(write(folder, damaged).string(), {"--on-demand"});
+  const auto begun = std::chrono::steady_clock::now();
+  const auto fetched = run({program("intervale-client"), "fetch", server.url("large"), "--range", "0.4", "0.6", "--reconnect", "2"});
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(20));
+  EXPECT_EQ(fetched.status, 1);
+  EXPECT_THAT(fetched.err, HasSubstr("intervale-client: the server at 127.0.0.1"));
+  EXPECT_THAT(fetched.err, HasSubstr("the rest of the data set could not be read"));
 }
 
 TEST(OnDemandOptions, ThatCannotBeAreOneLine) {
