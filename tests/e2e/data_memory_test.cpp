@@ -140,6 +140,19 @@ TEST(DataMemory, AFullScratchDiskRefusesWhatDoesNotFit) {
   EXPECT_EQ(log.status, 0);
   EXPECT_THAT(log.err,
               AllOf(HasSubstr("skipped: " + files + "/large.ivm: cannot be read: the scratch folder '"), HasSubstr("No space left on device\n")));
+  // On demand, the coarse scales stay.
+  ServerProgram on_demand(files, options + Arguments{"--on-demand"}, with_disk);
+  const auto fetch = [&on_demand](const std::string& error) {
+    return run(
+        {program("intervale-client"), "fetch", on_demand.url("large"), "--range", "30000", "34000", "--error-percent", error, "--reconnect", "1"});
+  };
+  for (int i = 0; i < 2; ++i) {
+    const auto refused = fetch("1");
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_THAT(refused.err, HasSubstr("the rest of the data set could not be read"));
+    EXPECT_EQ(fetch("100").status, 0);
+  }
+  EXPECT_EQ(metric(on_demand.port(), "intervale_datasets"), 2);
 }
 
 }  // namespace
