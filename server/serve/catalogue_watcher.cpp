@@ -84,7 +84,7 @@ Result<Catalogue> CatalogueWatcher::load(const ParallelFor& parallel) {
       continue;
     }
     const auto coarse = load_coarse(input, nullptr, parallel);
-    auto& [path, contents] = files_.emplace_back(input, Contents{coarse, coarse});
+    auto& [path, contents] = files_.emplace_back(input, Contents{coarse, demand_ != nullptr ? coarse : nullptr});
     if (coarse) continue;
     if (auto loaded = load_file(path, contents, parallel); !loaded) return tl::unexpected(loaded.error());
   }
@@ -169,7 +169,8 @@ Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& p
 bool CatalogueWatcher::drop_idle(ScaleDemand::Clock::duration time) {
   bool has_dropped = remote_.drop_idle(time);
   const auto look_at = [&](const fs::path& path, Contents& contents) {
-    if (!contents.coarse || contents.volume == contents.coarse || contents.volume->description() != contents.coarse->description()) return;
+    if (!contents.coarse || !contents.volume || contents.volume == contents.coarse) return;
+    if (contents.volume->description() != contents.coarse->description()) return;
     if (!demand_->is_idle(path.stem().string(), time)) return;
     contents.volume = contents.coarse;
     has_dropped = true;
@@ -191,11 +192,13 @@ Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const Paralle
   for (const fs::path& path : *paths) {
     File file;
     file.last_seen = stamp_of(path);  // the first load does not wait for a second look
-    if (Catalogue::check_name(path.stem().string())) file.volume = file.coarse = load_coarse(path, nullptr, parallel);
-    if (!file.volume)
+    if (Catalogue::check_name(path.stem().string())) file.volume = load_coarse(path, nullptr, parallel);
+    if (!file.volume) {
       poll_file(path, file, Read::all, parallel);
-    else if (demand_ != nullptr)
+    } else if (demand_ != nullptr) {
+      file.coarse = file.volume;
       file.stamp = file.last_seen;
+    }
     folder_files_[path] = std::move(file);
   }
   return {};

@@ -65,7 +65,7 @@ class CatalogueWatcher {
   // The contents of a file. nullptr: there are none.
   struct Contents {
     Catalogue::Volume volume;
-    Catalogue::Volume coarse;  // its coarsest scales, where these were read first
+    Catalogue::Volume coarse;  // on demand, its coarsest scales, where these were read first
   };
   struct File : Contents {               // the last good contents
     std::optional<FileStamp> stamp;      // when it was last read; nullopt: never

@@ -91,17 +91,20 @@ Result<void> RemoteDataSets::read_next(DataSet& set, const ParallelFor& parallel
     }
     set.volume = counted(memory_, Memory::Holder::datasets, *volume);
     if (set.coarse && set.coarse->description() != set.volume->description()) set.coarse.reset();  // it has changed
-    if (!set.coarse && !set.volume->is_whole()) set.coarse = set.volume;
+    if (demand_ != nullptr && !set.coarse && !set.volume->is_whole()) set.coarse = set.volume;
     return {};
   });
 }
 
 // For drop_idle(): of a file that was read whole.
 void RemoteDataSets::keep_coarse(DataSet& set, const ParallelFor& parallel) {
-  RemoteVolume begun(set.url, inputs_.access, inputs_.limits);
-  const auto coarse = begun.next(parallel);
-  if (coarse && !(*coarse)->is_whole() && (*coarse)->description() == set.volume->description())
-    set.coarse = counted(memory_, Memory::Holder::datasets, *coarse);
+  (void)catching(set.url, [&]() -> Result<void> {
+    RemoteVolume begun(set.url, inputs_.access, inputs_.limits);
+    const auto coarse = begun.next(parallel);
+    if (coarse && !(*coarse)->is_whole() && (*coarse)->description() == set.volume->description())
+      set.coarse = counted(memory_, Memory::Holder::datasets, *coarse);
+    return {};
+  });
 }
 
 bool RemoteDataSets::drop_idle(ScaleDemand::Clock::duration time) {

@@ -33,7 +33,7 @@ class RemoteDataSets {
     RemoteStamp stamp;                             // of what was read last
     std::string last_warning;                      // logged since then, not to be repeated
     std::unique_ptr<RemoteVolume> rest = nullptr;  // which is read on; nullptr: all of it was read, or could not be
-    Catalogue::Volume coarse = nullptr;            // its coarsest scales, where these were read first
+    Catalogue::Volume coarse = nullptr;            // on demand, its coarsest scales, where these were read first
   };
 
   // memory: counts the data sets, and must outlive them. Callers have a Scope of its data memory. tolerates_damage: as
