@@ -133,7 +133,7 @@ class LiveMesh::Worker {
         if (stream || !session_.mesh() || !was_lost_ || options_.reconnect.count() == 0) return stream;
         session_.disconnected();
         lost = stream.error();
-        if (std::exchange(has_progress_, false)) {
+        if (std::exchange(has_progress_, false) || !was_opened_) {
           deadline = Clock::now() + options_.reconnect;
           backoff = Backoff(std::random_device{}());
         }
@@ -164,6 +164,7 @@ class LiveMesh::Worker {
   Result<void> receive_until_end(StreamConnection& connection) {
     if (auto looked = take_request(); !looked) return looked;
     session_.connected(Clock::now());
+    was_opened_ = false;
     if (auto sent = connection.send(session_); !sent) return sent;
     while (!is_ending()) {
       if (auto looked = take_request(); !looked) return looked;
@@ -171,6 +172,7 @@ class LiveMesh::Worker {
       const bool is_late = make_state();
       const auto event = connection.receive(session_, is_late ? next_state() : Clock::time_point::max());
       if (!event) return tl::unexpected(event.error());
+      was_opened_ = was_opened_ || event->kind != ClientSession::Event::Kind::none;
       has_progress_ = has_progress_ || event->updates > 0 || event->kind == ClientSession::Event::Kind::done;
       if (event->kind == ClientSession::Event::Kind::opened) {
         if (auto opened = take_description(); !opened) return opened;
@@ -248,6 +250,7 @@ class LiveMesh::Worker {
   ClientSession session_;
   CameraMotion motion_;
   bool was_lost_ = false;
+  bool was_opened_ = false;         // over the last connection
   bool has_progress_ = true;        // since it was lost last: updates came, or the end of the stream
   bool is_changed_ = false;         // the mesh, since the last state
   Clock::time_point changed_at_{};  // when it changed last

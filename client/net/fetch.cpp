@@ -37,10 +37,12 @@ class Fetch {
     if (!connection) return tl::unexpected(connection.error());
     connection_ = std::move(*connection);
     stream_.session().connected(Clock::now());
+    was_opened_ = false;
     if (auto sent = connection_->send(stream_.session()); !sent) return sent;
     while (!stream_.has_enough()) {
       const auto event = connection_->receive(stream_.session());
       if (!event) return tl::unexpected(event.error());
+      was_opened_ = was_opened_ || event->kind != ClientSession::Event::Kind::none;
       has_progress_ = has_progress_ || event->updates > 0 || event->kind == ClientSession::Event::Kind::done;
       if (auto received = stream_.received(*event); !received) return received;
       if (auto sent = connection_->send(stream_.session()); !sent) return sent;
@@ -48,10 +50,10 @@ class Fetch {
     return {};
   }
 
-  // Fails with `why` once the time for it is over, or as stream() does. A server that is reached again, but sends
-  // nothing new before it ends the session, has not been reached.
+  // Fails with `why` once the time for it is over, or as stream() does. A server that is reached again and opens the
+  // data set, but sends nothing new before it ends the session, has not been reached.
   Result<void> reconnect(const Error& why) {
-    if (std::exchange(has_progress_, false)) {
+    if (std::exchange(has_progress_, false) || !was_opened_) {
       stream_.notice(why.message + "; connecting again");
       deadline_ = Clock::now() + options_.reconnect;
       backoff_ = Backoff(std::random_device{}());
@@ -74,6 +76,7 @@ class Fetch {
   const FetchOptions& options_;
   FetchSession stream_;
   std::optional<StreamConnection> connection_;
+  bool was_opened_ = false;       // over the last connection
   bool has_progress_ = true;      // since it was lost last: updates came, or the end of the stream
   Clock::time_point deadline_{};  // for reaching the server again
   Backoff backoff_{0};

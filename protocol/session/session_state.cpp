@@ -56,9 +56,11 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
 tl::expected<bool, Fault> SessionState::grow() {
   if (volume_->is_whole()) return false;
   const auto found = find_(dataset_);
-  if (!found || (*found)->description() != volume_->description())
-    return tl::unexpected(Fault{CloseCode::going_away, "the rest of the data set could not be read"});
+  const bool has_more = found && (*found)->description() == volume_->description();
+  if (!has_more && growth_ == Growth::on_demand && !lacks_scales()) return false;  // it keeps what it has
+  if (!has_more) return tl::unexpected(Fault{CloseCode::going_away, "the rest of the data set could not be read"});
   if ((*found)->size() <= volume_->size()) return false;
+  may_have_ += ((*found)->size() - volume_->size()) * (1 + std::uint64_t(volume_->description().channels.size()));
   const StreamPlan before(std::move(*plan_));
   volume_ = *found;
   plan_.emplace(volume_);

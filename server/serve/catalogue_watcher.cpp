@@ -131,7 +131,10 @@ Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& p
   const fs::path* path = nullptr;
   Contents* least = nullptr;
   File* in_folder = nullptr;  // that has it
+  std::set<std::string> names;
   const auto look_at = [&](const fs::path& at, Contents& contents, File* file) {
+    const bool is_first = contents.volume && names.insert(at.stem().string()).second;
+    if (demand_ != nullptr && !is_first) return;  // another one of the name is served
     if (!is_wanted(at.stem().string(), contents.volume) || (least != nullptr && least->volume->size() <= contents.volume->size())) return;
     path = &at;
     least = &contents;
@@ -159,15 +162,17 @@ Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& p
   }
   if (demand_ != nullptr && (!least->volume || least->volume == before)) {
     least->volume = before;
-    if (!drop_idle({})) demand_->refuse(path->stem().string());  // with more room, the next try may succeed
+    demand_->refuse(path->stem().string());
+  } else if (demand_ != nullptr && least->volume->description() != before->description()) {
+    least->coarse = load_coarse(*path, nullptr, parallel);  // the file has changed
   }
   if (least->volume && least->volume->is_whole()) spdlog::info("{}: all scales are loaded", path->string());
   return std::optional(*catalogue(false));
 }
 
-// Whether there were any.
-bool CatalogueWatcher::drop_idle(ScaleDemand::Clock::duration time) {
-  bool has_dropped = remote_.drop_idle(time);
+std::optional<Catalogue> CatalogueWatcher::drop_unused(ScaleDemand::Clock::duration time) {
+  if (demand_ == nullptr) return {};
+  bool has_dropped = remote_.drop_unused(time);
   const auto look_at = [&](const fs::path& path, Contents& contents) {
     if (!contents.coarse || !contents.volume || contents.volume == contents.coarse) return;
     if (contents.volume->description() != contents.coarse->description()) return;
@@ -178,11 +183,7 @@ bool CatalogueWatcher::drop_idle(ScaleDemand::Clock::duration time) {
   };
   for (auto& [path, contents] : files_) look_at(path, contents);
   for (auto& [path, file] : folder_files_) look_at(path, file);
-  return has_dropped;
-}
-
-std::optional<Catalogue> CatalogueWatcher::drop_unused(ScaleDemand::Clock::duration time) {
-  if (demand_ == nullptr || !drop_idle(time)) return {};
+  if (!has_dropped) return {};
   return *catalogue(false);
 }
 

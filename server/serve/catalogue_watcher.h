@@ -79,7 +79,6 @@ class CatalogueWatcher {
   [[nodiscard]] Catalogue::Volume load_coarse(const std::filesystem::path& path, const Catalogue::Volume& held, const ParallelFor& parallel);
   enum class Read { what_is_served_first, all };
   bool poll_file(const std::filesystem::path& path, File& file, Read read, const ParallelFor& parallel);
-  bool drop_idle(ScaleDemand::Clock::duration time);
   [[nodiscard]] Result<Catalogue> catalogue(bool is_start) const;
 
   std::vector<std::filesystem::path> inputs_;

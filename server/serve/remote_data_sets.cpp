@@ -89,14 +89,16 @@ Result<void> RemoteDataSets::read_next(DataSet& set, const ParallelFor& parallel
       set.rest.reset();
       complete_in_data_memory(**volume, memory_, parallel);
     }
-    set.volume = counted(memory_, Memory::Holder::datasets, *volume);
+    // Less, if it was begun again.
+    const bool is_less = set.volume && set.volume->description() == (*volume)->description() && (*volume)->size() < set.volume->size();
+    if (!is_less) set.volume = counted(memory_, Memory::Holder::datasets, *volume);
     if (set.coarse && set.coarse->description() != set.volume->description()) set.coarse.reset();  // it has changed
     if (demand_ != nullptr && !set.coarse && !set.volume->is_whole()) set.coarse = set.volume;
     return {};
   });
 }
 
-// For drop_idle(): of a file that was read whole.
+// For drop_unused(): of a file that was read whole.
 void RemoteDataSets::keep_coarse(DataSet& set, const ParallelFor& parallel) {
   (void)catching(set.url, [&]() -> Result<void> {
     RemoteVolume begun(set.url, inputs_.access, inputs_.limits);
@@ -107,7 +109,7 @@ void RemoteDataSets::keep_coarse(DataSet& set, const ParallelFor& parallel) {
   });
 }
 
-bool RemoteDataSets::drop_idle(ScaleDemand::Clock::duration time) {
+bool RemoteDataSets::drop_unused(ScaleDemand::Clock::duration time) {
   bool has_dropped = false;
   for (DataSet& set : sets_) {
     if (!set.coarse || set.volume->size() <= set.coarse->size() || !demand_->is_idle(set.url.name, time)) continue;

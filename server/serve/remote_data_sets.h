@@ -52,7 +52,7 @@ class RemoteDataSets {
   // to read all of it; on demand, it is refused, and tried again when it is asked for again.
   void read_on(DataSet& set, const ParallelFor& parallel);
   // On demand: drops the finer scales of those that no session has used for so long. Whether there were any.
-  bool drop_idle(ScaleDemand::Clock::duration time);
+  bool drop_unused(ScaleDemand::Clock::duration time);
 
   // Once poll_time is over, asks for each whether it has changed, and reads those that have, whole. True if contents are
   // new. What fails is logged, and tried again the next time; the last good contents stay. A server that sends neither

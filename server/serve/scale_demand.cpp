@@ -6,7 +6,9 @@ namespace intervale {
 
 ScaleDemand::Use ScaleDemand::use(const std::string& name) {
   const std::lock_guard lock(mutex_);
-  ++entries_[name].sessions;
+  Entry& entry = entries_[name];
+  if (entry.sessions == 0 && Clock::now() >= entry.last_use + kLinger) entry.asked = 0;
+  ++entry.sessions;
   return Use(this, {name});
 }
 
@@ -23,8 +25,7 @@ bool ScaleDemand::ask(const std::string& name, std::uint64_t held, Clock::time_p
   entry.last_use = now;
   if (entry.refused != Clock::time_point() && now < entry.refused + kRetry) return false;
   entry.refused = {};
-  if (held < entry.asked) return true;
-  entry.asked = held + 1;
+  entry.asked = std::max(entry.asked, held + 1);
   wake_();
   return true;
 }

@@ -113,6 +113,8 @@ class Loading {
         for (auto more = watcher_.complete(parallel); !more || *more; more = watcher_.complete(parallel)) {
           if (!more) return failed_(more.error());
           server_.offer(std::move(**more));
+          // Folders do not wait for all of it.
+          if (server_.scale_demand() != nullptr && Clock::now() >= next_poll_) break;
         }
         if (!wait_until_poll(stop)) continue;
         if (auto changed = watcher_.poll(parallel)) server_.offer(std::move(*changed));
@@ -131,9 +133,9 @@ class Loading {
   // Whether it is time to look at the folders; or something is to be read on before, or this is to stop.
   bool wait_until_poll(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    const bool is_woken = wake_.wait_until(lock, stop, next_poll_, [this] { return polls_ || reads_on_; });
+    wake_.wait_until(lock, stop, next_poll_, [this] { return polls_ || reads_on_; });
     reads_on_ = false;
-    if (stop.stop_requested() || (is_woken && !polls_)) return false;
+    if (stop.stop_requested() || (!polls_ && Clock::now() < next_poll_)) return false;
     polls_ = false;
     next_poll_ = Clock::now() + kPollTime;
     return true;

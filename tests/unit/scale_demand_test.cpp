@@ -20,14 +20,14 @@ TEST(ScaleDemand, WhatIsAskedForIsWantedUntilItIsThere) {
   EXPECT_TRUE(demand.ask("scan", 100));
   EXPECT_TRUE(demand.ask("scan", 100));
   EXPECT_TRUE(demand.ask("scan", 50)) << "of who does not know yet that there is more";
-  EXPECT_EQ(woken, 1);
+  EXPECT_EQ(woken, 3);
   EXPECT_TRUE(demand.is_asked("scan", 50));
   EXPECT_TRUE(demand.is_asked("scan", 100));
   EXPECT_FALSE(demand.is_asked("scan", 101));
   EXPECT_FALSE(demand.is_asked("other", 0));
   EXPECT_TRUE(demand.ask("scan", 800));
   EXPECT_TRUE(demand.is_asked("scan", 101));
-  EXPECT_EQ(woken, 2);
+  EXPECT_EQ(woken, 4);
 }
 
 TEST(ScaleDemand, IsForgottenSomeTimeAfterTheLastSession) {
