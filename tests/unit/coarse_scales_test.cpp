@@ -12,6 +12,7 @@
 #include <span>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "client/core/client_session.h"
 #include "client/local/fetch_local.h"
@@ -438,7 +439,8 @@ TEST(CoarseScales, OnDemandAViewIsDoneWithTheScalesThatItWants) {
 
 // A client may resume as far as the data set is there; else it is told to try again.
 TEST(CoarseScales, OnDemandWhatIsThereIsResumed) {
-  const SharedVolume all = whole(large()), some = coarse(large(), scales_of(large())[0]);
+  const SharedVolume all = whole(large()), first = coarse(large(), scales_of(large())[0]);
+  SharedVolume some = first;
   const auto group_of = [&all](UpdateIndex update) {
     const Place place = all->set().place(update);
     return SlotGroup{.key = place.key, .slots = std::uint64_t(1) << place.slot};
@@ -450,7 +452,21 @@ TEST(CoarseScales, OnDemandWhatIsThereIsResumed) {
     EXPECT_EQ(opened.has_value(), growth == SessionState::Growth::by_itself);
     if (opened) continue;
     EXPECT_FALSE(server.receive(protocol::Have{{group_of(UpdateIndex{0})}}));
-    const auto fault = server.receive(protocol::Have{{group_of(UpdateIndex{some->size()})}});
+    some = all;
+    EXPECT_TRUE(server.next()) << "opened";
+    EXPECT_FALSE(server.next()) << "it has grown";
+    EXPECT_EQ(server.updates_there(), all->size());
+    std::vector<SlotGroup> rest;
+    for (UpdateIndex update{std::uint32_t(first->size())}; update < 2 * first->size(); ++update) {
+      const SlotGroup one = group_of(update);
+      if (rest.empty() || rest.back().key != one.key) rest.push_back({.key = one.key});
+      rest.back().slots |= one.slots;
+    }
+    for (const SlotGroup& group : rest) ASSERT_FALSE(server.receive(protocol::Have{{group}}));
+    some = first;
+    SessionState other([&some](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return some; }, worker, growth);
+    EXPECT_FALSE(other.receive(protocol::Open{"made", "test", protocol::kMaxWindow, some->description().content_hash}));
+    const auto fault = other.receive(protocol::Have{{group_of(UpdateIndex{some->size()})}});
     ASSERT_TRUE(fault);
     EXPECT_EQ(fault->code, protocol::CloseCode::going_away);
   }
