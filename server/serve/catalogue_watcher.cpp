@@ -142,7 +142,7 @@ Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& p
   };
   for (auto& [at, contents] : files_) look_at(at, contents, nullptr);
   for (auto& [at, file] : folder_files_) look_at(at, file, &file);
-  if (auto* const remote = remote_.unfinished(); remote != nullptr && (least == nullptr || remote->volume->size() < least->volume->size())) {
+  if (auto* const remote = remote_.unfinished(names); remote != nullptr && (least == nullptr || remote->volume->size() < least->volume->size())) {
     const ScratchMemory::Scope scope(memory_.data_memory());
     remote_.read_on(*remote, parallel);
     return std::optional(*catalogue(false));

@@ -53,13 +53,15 @@ Result<void> RemoteDataSets::load(const ParallelFor& parallel) {
     }
   }
   next_poll_ = std::chrono::steady_clock::now() + inputs_.poll_time;
+  if (demand_ != nullptr) inputs_.limits.attempts = 1;  // from now on others wait meanwhile, and who wants it asks again
   return {};
 }
 
-RemoteDataSets::DataSet* RemoteDataSets::unfinished() {
+RemoteDataSets::DataSet* RemoteDataSets::unfinished(const std::set<std::string>& taken) {
   DataSet* least = nullptr;
   for (DataSet& set : sets_) {
-    if (!set.rest || (demand_ != nullptr && !demand_->is_asked(set.url.name, set.volume->size()))) continue;
+    if (!set.rest) continue;
+    if (demand_ != nullptr && (taken.contains(set.url.name) || !demand_->is_asked(set.url.name, set.volume->size()))) continue;
     if (least == nullptr || set.volume->size() < least->volume->size()) least = &set;
   }
   return least;

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -46,8 +47,9 @@ class RemoteDataSets {
   // read. Throws what `parallel` throws.
   Result<void> load(const ParallelFor& parallel);
 
-  // After load(): the data set with fewest updates whose rest is to be read; nullptr: there is none.
-  [[nodiscard]] DataSet* unfinished();
+  // After load(): the data set with fewest updates whose rest is to be read; nullptr: there is none. taken: names under
+  // which others are served, which nobody can ask for.
+  [[nodiscard]] DataSet* unfinished(const std::set<std::string>& taken);
   // Reads on of it, as far as the next scale. If that fails, it is logged, and what was read before stays: poll() tries
   // to read all of it; on demand, it is refused, and tried again when it is asked for again.
   void read_on(DataSet& set, const ParallelFor& parallel);
