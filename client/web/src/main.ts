@@ -270,11 +270,20 @@ const toggleValueColors = () => view.set(exclusive({ colorBy: view.value.colorBy
 // The address follows the view, and the view follows an address that the user enters.
 function watchAddress(): void {
   let timer = 0;
-  view.watch([], (value) => {
+  let last = location.hash; // as read or written
+  const write = () => {
+    if (location.hash !== last) return; // the user entered another one, and 'hashchange' follows
+    history.replaceState(null, '', toHash(view.value) || location.pathname + location.search);
+    last = location.hash;
+  };
+  view.watch([], () => {
     window.clearTimeout(timer);
-    timer = window.setTimeout(() => history.replaceState(null, '', toHash(value) || location.pathname + location.search), kHashDelayMs);
+    timer = window.setTimeout(write, kHashDelayMs);
   });
-  window.addEventListener('hashchange', () => view.set(fromHash(location.hash)));
+  window.addEventListener('hashchange', () => {
+    last = location.hash;
+    view.set(fromHash(last));
+  });
 }
 
 function start(): void {

@@ -192,6 +192,20 @@ onPage('the address restores the picture', async (page) => {
   await other.context().close();
 });
 
+onPage('an address that is entered while another is due to be written is kept', async (page) => {
+  await page.evaluate(() => {
+    window.intervale.set({ wireframe: true });
+    const { port1, port2 } = new MessageChannel();
+    port1.onmessage = () => (location.hash = '#data=full'); // the timer is due: it runs before 'hashchange' is told
+    port2.postMessage(null);
+    const due = performance.now() + 400;
+    while (performance.now() < due);
+  });
+  await page.waitForFunction(() => window.intervale.progress?.full);
+  await settled(page);
+  assert.ok(page.url().includes('data=full'));
+});
+
 onPage('pictures and meshes are saved', async (page) => {
   for (const [id, name] of [['save-picture', 'gyroid.png'], ['save-vtu', 'gyroid.vtu'], ['save-stl', 'gyroid.stl'], ['save-glb', 'gyroid.glb']]) {
     const [download] = await Promise.all([page.waitForEvent('download'), page.click(`#${id}`)]);
