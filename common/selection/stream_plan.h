@@ -64,6 +64,9 @@ class StreamPlan {
   // At first everything that the range of the data set needs is relevant.
   explicit StreamPlan(std::shared_ptr<const IntervalVolume> volume);
 
+  // Whether the data set has these updates.
+  [[nodiscard]] bool has(const SlotGroup& updates) const;
+
   // Marks the updates that a resuming client has as sent: slots of a supercube. False if the data set has no such
   // updates. Before the first set_lod(). If ancestors are missing, the client cannot use the updates; the server is
   // not affected.

@@ -6,6 +6,12 @@
 
 namespace intervale {
 
+bool StreamPlan::has(const SlotGroup& updates) const {
+  const SupercubeSet& set = volume_->set();
+  const auto found = set.find_supercube(scale_of_key(updates.key), position_of_key(updates.key));
+  return found && (updates.slots & ~set.occupancy()[found->supercube]) == 0;
+}
+
 bool StreamPlan::resume(SupercubeKey key, std::uint64_t slots) {
   const SupercubeSet& set = volume_->set();
   const auto found = set.find_supercube(scale_of_key(key), position_of_key(key));
@@ -27,11 +33,8 @@ void StreamPlan::resume(const StreamPlan& other) {
 
 bool StreamPlan::forget(std::span<const SlotGroup> groups) {
   if (groups.empty()) return true;
+  if (!std::all_of(groups.begin(), groups.end(), [this](const SlotGroup& g) { return has(g); })) return false;
   const SupercubeSet& set = volume_->set();
-  for (const SlotGroup& g : groups) {
-    const auto found = set.find_supercube(scale_of_key(g.key), position_of_key(g.key));
-    if (!found || (g.slots & ~set.occupancy()[found->supercube]) != 0) return false;
-  }
   SetNeighbours around(set);
   const auto sent_slots = [this](const SetFinder::Found& found) { return found.occupancy == 0 ? 0 : sent_.slots(found.brick, found.key); };
   merge_finest_first(groups, around, sent_slots, [&](const SlotGroup&, Slot slot) {

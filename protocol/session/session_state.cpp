@@ -20,8 +20,8 @@ Fault other_version(std::uint32_t payload) {
                                         (theirs < protocol::kPayloadVersion ? ": update the client" : ": update the server")};
 }
 
-// What a client that resumes may have is not there yet.
-Fault is_being_read() { return {CloseCode::going_away, "the data set is being read"}; }
+// Most memory of messages that wait for a data set to grow: Haves of some five million updates.
+constexpr std::uint64_t kMostHeld = 4 << 20;
 
 // Once a view is so exact, updates of every range with at least such errors go ahead of the rest of it: few, so that it is
 // not put off for long.
@@ -32,7 +32,39 @@ constexpr std::uint32_t kContendedVisits = 8 << 10;  // while other sessions wai
 }  // namespace
 
 std::optional<Fault> SessionState::receive(const protocol::ClientMessage& message) {
+  const bool may_wait = std::holds_alternative<protocol::Have>(message) || std::holds_alternative<protocol::View>(message);
+  return may_wait && (!held_.empty() || lacks_updates_of(message)) ? hold(message) : handle(message);
+}
+
+std::optional<Fault> SessionState::handle(const protocol::ClientMessage& message) {
   return std::visit([this](const auto& m) { return on(m); }, message);
+}
+
+// Whether it is a Have of updates that may be among those that are still to come.
+bool SessionState::lacks_updates_of(const protocol::ClientMessage& message) const {
+  const auto* const have = std::get_if<protocol::Have>(&message);
+  if (have == nullptr || !resumed_ || volume_->is_whole()) return false;
+  return !std::all_of(have->splits.begin(), have->splits.end(), [this](const SlotGroup& g) { return plan_->has(g); });
+}
+
+std::optional<Fault> SessionState::hold(const protocol::ClientMessage& message) {
+  const auto* const view = std::get_if<protocol::View>(&message);
+  const auto groups = view != nullptr ? view->forget.size() : std::get<protocol::Have>(message).splits.size();
+  held_bytes_ += sizeof(message) + groups * sizeof(SlotGroup) + (view != nullptr && view->depth ? view->depth->codes.size() : 0);
+  if (held_bytes_ > kMostHeld) return Fault{CloseCode::going_away, "the data set is being read"};
+  held_.push_back(message);
+  return {};
+}
+
+// The first that waits, if it need not wait any longer.
+std::optional<Fault> SessionState::handle_held() {
+  handles_held_ = !lacks_updates_of(held_.front());
+  if (!handles_held_) return {};
+  const protocol::ClientMessage message = std::move(held_.front());
+  held_.erase(held_.begin());
+  if (held_.empty()) held_bytes_ = 0;
+  handles_held_ = !held_.empty();
+  return handle(message);
 }
 
 std::optional<Fault> SessionState::on(const protocol::Open& open) {
@@ -45,8 +77,6 @@ std::optional<Fault> SessionState::on(const protocol::Open& open) {
   plan_.emplace(volume_);
   planned_ = {volume_->description().whole()};
   may_have_ = volume_->size() * (1 + std::uint64_t(volume_->description().channels.size()));
-  // Updates that the client has may be among those that are not there yet.
-  if (open.resume && !volume_->is_whole() && growth_ == Growth::by_itself) return is_being_read();
   resumed_ = open.resume && *open.resume == volume_->description().content_hash;
   return grant(open.credit);
 }
@@ -73,6 +103,7 @@ tl::expected<bool, Fault> SessionState::grow() {
   search_.reset();
   is_new_ = true;
   waits_ = false;
+  handles_held_ = !held_.empty();
   find_growth();
   return true;
 }
@@ -92,16 +123,15 @@ void SessionState::rest() {
 std::optional<Fault> SessionState::on(const protocol::Have& have) {
   if (!opened() || view_ != ViewState::none) return Fault{CloseCode::out_of_order, "Have is allowed between Open and the first View only"};
   if (!resumed_) return {};
-  const auto absent = [this](CloseCode code, const char* text) { return volume_->is_whole() ? Fault{code, text} : is_being_read(); };
   if (have.channel && *have.channel >= volume_->description().channels.size())
     return Fault{CloseCode::malformed, "Have names a channel that the data set does not contain"};
   for (const SlotGroup& g : have.splits) {
     // Each update is named once, and each value of a channel: naming them again would be work for nothing.
     const auto named = std::uint64_t(std::popcount(g.slots));
-    if (named > may_have_) return absent(CloseCode::too_large, "Have names more updates than the data set contains");
+    if (named > may_have_) return Fault{CloseCode::too_large, "Have names more updates than the data set contains"};
     may_have_ -= named;
     if (have.channel ? !plan_->resume(*have.channel, g.key, g.slots) : !plan_->resume(g.key, g.slots))
-      return absent(CloseCode::malformed, "Have names updates that the data set does not contain");
+      return Fault{CloseCode::malformed, "Have names updates that the data set does not contain"};
   }
   plan_->settle();
   return {};
@@ -252,6 +282,10 @@ std::optional<protocol::ServerMessage> SessionState::next(std::size_t max_payloa
   if (!has_grown) return has_grown.error();
   if (*has_grown) return {};  // what follows is has_work()
   if (!has_work()) return {};
+  if (handles_held_) {
+    if (auto fault = handle_held()) return *std::move(fault);
+    return {};
+  }
   waits_ = false;
   if (is_ahead()) {
     begin_ahead();

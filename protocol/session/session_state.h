@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/selection/stream_plan.h"
 #include "protocol/limits.h"
@@ -31,7 +32,8 @@ class SessionState {
   // worker: must outlive the session. Where waits() says so, it must be called again when the worker has done something.
   SessionState(Find find, SessionWorker& worker, Growth growth = Growth::by_itself) : find_(std::move(find)), worker_(worker), growth_(growth) {}
 
-  // Handles a client's message. A fault ends the session: call nothing afterwards.
+  // Handles a client's message. A fault ends the session: call nothing afterwards. A Have that names updates of a data set
+  // that is not whole, and has not all of them yet, waits until it has grown, as do the views after it.
   [[nodiscard]] std::optional<protocol::Fault> receive(const protocol::ClientMessage& message);
 
   // The next message to send. nullopt: none now; call again if has_work(). A fault ends the session, as that of receive():
@@ -52,8 +54,8 @@ class SessionState {
   void rest();
   [[nodiscard]] bool may_rest() const { return view_ == ViewState::done && !plan_->rests(); }
 
-  // There may be a batch to select and encode.
-  [[nodiscard]] bool has_work() const { return opened_was_sent_ && is_streaming() && !needs_credit() && !waits(); }
+  // There may be a batch to select and encode, or a message that waited can be handled.
+  [[nodiscard]] bool has_work() const { return opened_was_sent_ && (handles_held_ || (is_streaming() && !needs_credit() && !waits())); }
   // Until it is known what new ranges need, how far their surfaces move, or what is within a budget; or until the data set
   // grows, which whoever calls next() has to find out.
   [[nodiscard]] bool waits() const {
@@ -61,8 +63,10 @@ class SessionState {
   }
   // Nothing was sent yet for the last view.
   [[nodiscard]] bool view_is_unanswered() const { return view_ == ViewState::unanswered; }
-  // The last view cannot be completed before the data set grows. Of Growth::on_demand.
-  [[nodiscard]] bool lacks_scales() const { return growth_ == Growth::on_demand && is_streaming() && !volume_->is_whole() && !is_grown_; }
+  // The last view cannot be completed, or the client cannot resume, before the data set grows. Of Growth::on_demand.
+  [[nodiscard]] bool lacks_scales() const {
+    return growth_ == Growth::on_demand && opened() && !volume_->is_whole() && (!held_.empty() || (is_streaming() && !is_grown_));
+  }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
   // Updates of the data set that are there. 0 before Open.
   [[nodiscard]] std::uint64_t updates_there() const { return volume_ ? volume_->size() : 0; }
@@ -70,7 +74,7 @@ class SessionState {
   [[nodiscard]] bool needs_credit() const { return is_streaming() && credit_ < protocol::kMinCredit; }
   [[nodiscard]] const std::string& dataset() const { return dataset_; }
   // Besides what is shared.
-  [[nodiscard]] std::uint64_t memory_bytes() const { return plan_ ? plan_->memory_bytes() : 0; }
+  [[nodiscard]] std::uint64_t memory_bytes() const { return (plan_ ? plan_->memory_bytes() : 0) + held_bytes_; }
   [[nodiscard]] std::uint64_t updates_sent() const { return plan_ ? plan_->sent() : 0; }
 
  private:
@@ -80,6 +84,10 @@ class SessionState {
   enum class ViewState { none, unanswered, streaming, ahead_of_rest, ahead, done };
 
   [[nodiscard]] bool is_streaming() const { return view_ != ViewState::none && view_ != ViewState::done; }
+  std::optional<protocol::Fault> handle(const protocol::ClientMessage& message);
+  [[nodiscard]] bool lacks_updates_of(const protocol::ClientMessage& message) const;
+  std::optional<protocol::Fault> hold(const protocol::ClientMessage& message);
+  std::optional<protocol::Fault> handle_held();
   std::optional<protocol::Fault> on(const protocol::Open& open);
   std::optional<protocol::Fault> on(const protocol::View& view);
   std::optional<protocol::Fault> on(const protocol::Credit& credit);
@@ -132,6 +140,9 @@ class SessionState {
   std::size_t first_payload_ = kFirstPayload;  // of the view
   bool resumed_ = false;                       // the client has updates of this data set, with the same contents
   bool opened_was_sent_ = false;
+  std::vector<protocol::ClientMessage> held_;  // Haves and Views that wait for the data set to grow, oldest first
+  std::uint64_t held_bytes_ = 0;
+  bool handles_held_ = false;  // it has grown since
   ViewState view_ = ViewState::none;
 };
 

@@ -269,11 +269,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
       context_.metrics.count_refusal(Refusal::memory);
       return close({CloseCode::going_away, "the server has no capacity for another session"});
     }
-    if (auto fault = state_.receive(message)) {
-      // Of a client that resumes: it tries again.
-      if (fault->code == CloseCode::going_away && use_) (void)ask_for_scales();
-      return close(std::move(*fault));
-    }
+    if (auto fault = state_.receive(message)) return close(std::move(*fault));
     if (const auto* const open = std::get_if<protocol::Open>(&message)) {
       context_.connections.set_waiting(registration_, false);
       if (context_.options.on_demand) use_ = context_.scale_demand.use(open->dataset);
@@ -314,7 +310,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         message = state_.next();
       }
       if (message && std::holds_alternative<Fault>(*message)) {
-        fault_ = std::get<Fault>(*std::move(message));
+        close(std::get<Fault>(*std::move(message)));
       } else if (message) {
         if (!co_await send(*message)) co_return abort_connection();
         stalled_since_ = Clock::now();

@@ -437,38 +437,81 @@ TEST(CoarseScales, OnDemandAViewIsDoneWithTheScalesThatItWants) {
   EXPECT_EQ(mesh_digest(session.client.mesh()->mesh()), mesh_digest(at_once.client.mesh()->mesh()));
 }
 
-// A client may resume as far as the data set is there; else it is told to try again.
-TEST(CoarseScales, OnDemandWhatIsThereIsResumed) {
-  const SharedVolume all = whole(large()), first = coarse(large(), scales_of(large())[0]);
-  SharedVolume some = first;
-  const auto group_of = [&all](UpdateIndex update) {
+// Who resumes with updates that are not there yet waits for them, and gets the rest: as from a data set that was whole.
+TEST(CoarseScales, ASessionThatResumesWaitsForTheScalesThatItHas) {
+  const SharedVolume all = whole(large()), first = coarse(large(), scales_of(large())[0]), more = coarse(large(), scales_of(large())[1]);
+  ASSERT_LT(first->size(), more->size());
+  ASSERT_LT(more->size(), all->size());
+  // What the client has: the first 2/3 of all scales.
+  std::vector<SlotGroup> groups;
+  for (UpdateIndex update; update < all->size() * 2 / 3; ++update) {
     const Place place = all->set().place(update);
-    return SlotGroup{.key = place.key, .slots = std::uint64_t(1) << place.slot};
+    if (groups.empty() || groups.back().key != place.key) groups.push_back({.key = place.key});
+    groups.back().slots |= std::uint64_t(1) << place.slot;
+  }
+  const std::size_t some = groups.size() / 3;
+  const std::span<const SlotGroup> span = groups;
+  const auto stream = [](SessionState& server) {
+    std::uint64_t updates = 0;
+    while (const auto message = server.next()) {
+      EXPECT_FALSE(std::holds_alternative<protocol::Fault>(*message));
+      if (const auto* const batch = std::get_if<protocol::Batch>(&*message)) updates += batch->updates;
+    }
+    return updates;
   };
   for (const auto growth : {SessionState::Growth::by_itself, SessionState::Growth::on_demand}) {
+    SharedVolume there = first;
     LocalWorker worker;
-    SessionState server([&some](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return some; }, worker, growth);
-    const auto opened = server.receive(protocol::Open{"made", "test", protocol::kMaxWindow, some->description().content_hash});
-    EXPECT_EQ(opened.has_value(), growth == SessionState::Growth::by_itself);
-    if (opened) continue;
-    EXPECT_FALSE(server.receive(protocol::Have{{group_of(UpdateIndex{0})}}));
-    some = all;
-    EXPECT_TRUE(server.next()) << "opened";
+    SessionState server([&there](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return there; }, worker, growth);
+    const auto send = [&server](const protocol::ClientMessage& message) { return server.receive(message); };
+    EXPECT_FALSE(send(protocol::Open{"made", "test", protocol::kMaxWindow, all->description().content_hash}));
+    EXPECT_TRUE(std::get<protocol::Opened>(server.next().value()).resumed);
+    for (const auto part : {span.first(some), span.subspan(some, some), span.subspan(2 * some)})
+      EXPECT_FALSE(send(protocol::Have{{part.begin(), part.end()}}));
+    EXPECT_FALSE(send(protocol::View{1, {}}));
+    EXPECT_GT(server.memory_bytes(), groups.size() * sizeof(SlotGroup) / 2);
+    EXPECT_FALSE(server.next());
+    EXPECT_EQ(server.lacks_scales(), growth == SessionState::Growth::on_demand);
+    there = more;
+    while (server.next() || server.has_work()) EXPECT_EQ(server.updates_there(), more->size());
+    EXPECT_EQ(server.lacks_scales(), growth == SessionState::Growth::on_demand);
+    there = all;
     EXPECT_FALSE(server.next()) << "it has grown";
-    EXPECT_EQ(server.updates_there(), all->size());
-    std::vector<SlotGroup> rest;
-    for (UpdateIndex update{std::uint32_t(first->size())}; update < 2 * first->size(); ++update) {
-      const SlotGroup one = group_of(update);
-      if (rest.empty() || rest.back().key != one.key) rest.push_back({.key = one.key});
-      rest.back().slots |= one.slots;
+    std::uint64_t updates = 0;
+    while (server.has_work()) updates += stream(server);
+    EXPECT_EQ(updates, all->size() - all->size() * 2 / 3);
+    EXPECT_FALSE(server.lacks_scales());
+  }
+}
+
+// What a whole data set has not is a fault, however long it was waited for; so is too much to keep, and another data set.
+TEST(CoarseScales, ASessionThatResumesWithWhatDoesNotExistEnds) {
+  const SharedVolume all = whole(large()), first = coarse(large(), scales_of(large())[0]);
+  const SlotGroup wrong{.key = all->set().place(UpdateIndex{0}).key, .slots = ~std::uint64_t(0)};
+  for (const int cause : {0, 1, 2}) {
+    SharedVolume there = first;
+    LocalWorker worker;
+    SessionState server([&there](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return there; }, worker,
+                        SessionState::Growth::on_demand);
+    EXPECT_FALSE(server.receive(protocol::Open{"made", "test", protocol::kMaxWindow, all->description().content_hash}));
+    EXPECT_TRUE(server.next());
+    const protocol::Have have{std::vector<SlotGroup>(protocol::kMaxHave, wrong)};
+    EXPECT_FALSE(server.receive(have));
+    if (cause == 0) {
+      there = all;
+      EXPECT_FALSE(server.next()) << "it has grown";
+      EXPECT_EQ(std::get<protocol::Fault>(server.next().value()).code, protocol::CloseCode::malformed);
+    } else if (cause == 1) {
+      std::optional<protocol::Fault> fault;
+      int sent = 1;
+      for (; !fault && sent < 1000; ++sent) fault = server.receive(have);
+      EXPECT_GT(sent, 64);
+      ASSERT_TRUE(fault);
+      EXPECT_EQ(fault->code, protocol::CloseCode::going_away);
+    } else {
+      there = whole(std::apply(file_of, kFiles.front()));
+      EXPECT_EQ(std::get<protocol::Fault>(server.next().value()).code, protocol::CloseCode::going_away);
     }
-    for (const SlotGroup& group : rest) ASSERT_FALSE(server.receive(protocol::Have{{group}}));
-    some = first;
-    SessionState other([&some](const std::string&) -> tl::expected<SessionState::Volume, protocol::Fault> { return some; }, worker, growth);
-    EXPECT_FALSE(other.receive(protocol::Open{"made", "test", protocol::kMaxWindow, some->description().content_hash}));
-    const auto fault = other.receive(protocol::Have{{group_of(UpdateIndex{some->size()})}});
-    ASSERT_TRUE(fault);
-    EXPECT_EQ(fault->code, protocol::CloseCode::going_away);
   }
 }
 
