@@ -68,8 +68,8 @@ class SessionState {
     return growth_ == Growth::on_demand && opened() && !volume_->is_whole() && (!held_.empty() || (is_streaming() && !is_grown_));
   }
   [[nodiscard]] bool opened() const { return volume_ != nullptr; }
-  // Updates of the data set that are there. 0 before Open.
-  [[nodiscard]] std::uint64_t updates_there() const { return volume_ ? volume_->size() : 0; }
+  // What is there of the data set. nullptr before Open.
+  [[nodiscard]] const Volume& volume() const { return volume_; }
   // Sends nothing until the client grants more credit.
   [[nodiscard]] bool needs_credit() const { return is_streaming() && credit_ < protocol::kMinCredit; }
   [[nodiscard]] const std::string& dataset() const { return dataset_; }

@@ -84,12 +84,10 @@ Result<Catalogue> CatalogueWatcher::load(const ParallelFor& parallel) {
       continue;
     }
     const auto coarse = load_coarse(input, nullptr, parallel);
-    auto& [path, contents] = files_.emplace_back(input, Contents{coarse, demand_ != nullptr ? coarse : nullptr});
+    auto& [path, contents] = files_.emplace_back(input, Contents{coarse, demand_ != nullptr ? coarse : nullptr, {}});
     if (coarse) continue;
     if (auto loaded = load_file(path, contents, parallel); !loaded) return tl::unexpected(loaded.error());
   }
-  const ScratchMemory::Scope scope(memory_.data_memory());
-  if (auto loaded = remote_.load(parallel); !loaded) return tl::unexpected(loaded.error());
   return catalogue(true);
 }
 
@@ -123,56 +121,59 @@ Catalogue::Volume CatalogueWatcher::load_coarse(const fs::path& path, const Cata
 }
 
 // Whether it is to be read on.
-bool CatalogueWatcher::is_wanted(const std::string& name, const Catalogue::Volume& volume) const {
-  return volume && !volume->is_whole() && (demand_ == nullptr || demand_->is_asked(name, volume->size()));
+bool CatalogueWatcher::is_wanted(const Catalogue::Volume& volume) const {
+  return volume && !volume->is_whole() && (demand_ == nullptr || demand_->is_wanted(*volume));
 }
 
 Result<std::optional<Catalogue>> CatalogueWatcher::complete(const ParallelFor& parallel) {
   const fs::path* path = nullptr;
   Contents* least = nullptr;
   File* in_folder = nullptr;  // that has it
-  std::set<std::string> names;
   const auto look_at = [&](const fs::path& at, Contents& contents, File* file) {
-    const bool is_first = contents.volume && names.insert(at.stem().string()).second;
-    if (demand_ != nullptr && !is_first) return;  // another one of the name is served
-    if (!is_wanted(at.stem().string(), contents.volume) || (least != nullptr && least->volume->size() <= contents.volume->size())) return;
+    if (!is_wanted(contents.volume) || (least != nullptr && least->volume->size() <= contents.volume->size())) return;
     path = &at;
     least = &contents;
     in_folder = file;
   };
   for (auto& [at, contents] : files_) look_at(at, contents, nullptr);
   for (auto& [at, file] : folder_files_) look_at(at, file, &file);
-  if (auto* const remote = remote_.unfinished(names); remote != nullptr && (least == nullptr || remote->volume->size() < least->volume->size())) {
-    const ScratchMemory::Scope scope(memory_.data_memory());
-    remote_.read_on(*remote, parallel);
-    return std::optional(*catalogue(false));
-  }
   if (least == nullptr) return std::nullopt;
-  const Catalogue::Volume before = least->volume;
-  if (auto finer = load_coarse(*path, before, parallel)) {
+  if (auto finer = load_coarse(*path, least->volume, parallel)) {
     least->volume = std::move(finer);
+    least->last_warning.clear();
+  } else if (demand_ != nullptr) {
+    read_on_demand(*path, *least, in_folder != nullptr, parallel);
   } else if (in_folder == nullptr) {
-    const auto loaded = load_file(*path, *least, parallel);
-    if (!loaded && demand_ == nullptr) return tl::unexpected(loaded.error());
-    if (!loaded) spdlog::warn("the coarse scales read before stay in use: {}", loaded.error().message);
+    if (auto loaded = load_file(*path, *least, parallel); !loaded) return tl::unexpected(loaded.error());
   } else {
     least->volume.reset();
     in_folder->stamp.reset();
     poll_file(*path, *in_folder, Read::all, parallel);
   }
-  if (demand_ != nullptr && (!least->volume || least->volume == before)) {
-    least->volume = before;
-    demand_->refuse(path->stem().string());
-  } else if (demand_ != nullptr && least->volume->description() != before->description()) {
-    least->coarse = load_coarse(*path, nullptr, parallel);  // the file has changed
-  }
   if (least->volume && least->volume->is_whole()) spdlog::info("{}: all scales are loaded", path->string());
   return std::optional(*catalogue(false));
 }
 
+// All of a file whose coarse scales are there. If that fails, they stay. If it is another file, its contents take their
+// place; those of one in a folder with the next polls.
+void CatalogueWatcher::read_on_demand(const fs::path& path, Contents& contents, bool is_in_folder, const ParallelFor& parallel) {
+  const Catalogue::Volume before = contents.volume;
+  const auto loaded = load_file(path, contents, parallel);
+  const bool is_other = loaded && contents.volume->description() != before->description();
+  if (loaded && !is_other) return contents.last_warning.clear();
+  if (is_other && !is_in_folder) {
+    contents.coarse = load_coarse(path, nullptr, parallel);
+    return;
+  }
+  contents.volume = before;
+  demand_->refuse(*before);
+  const std::string why = is_other ? path.string() + ": it has changed" : loaded.error().message;
+  if (std::exchange(contents.last_warning, why) != why) spdlog::warn("the coarse scales read before stay in use: {}", why);
+}
+
 std::optional<Catalogue> CatalogueWatcher::drop_unused(ScaleDemand::Clock::duration time) {
   if (demand_ == nullptr) return {};
-  bool has_dropped = remote_.drop_unused(time);
+  bool has_dropped = false;
   const auto look_at = [&](const fs::path& path, Contents& contents) {
     if (!contents.coarse || !contents.volume || contents.volume == contents.coarse) return;
     if (contents.volume->description() != contents.coarse->description()) return;
@@ -196,9 +197,9 @@ Result<void> CatalogueWatcher::load_folder(const fs::path& folder, const Paralle
     if (Catalogue::check_name(path.stem().string())) file.volume = load_coarse(path, nullptr, parallel);
     if (!file.volume) {
       poll_file(path, file, Read::all, parallel);
-    } else if (demand_ != nullptr) {
-      file.coarse = file.volume;
+    } else {
       file.stamp = file.last_seen;
+      if (demand_ != nullptr) file.coarse = file.volume;
     }
     folder_files_[path] = std::move(file);
   }
@@ -252,10 +253,7 @@ bool CatalogueWatcher::poll_file(const fs::path& path, File& file, Read what, co
 }
 
 std::optional<Catalogue> CatalogueWatcher::poll(const ParallelFor& parallel) {
-  bool changed = [&] {
-    const ScratchMemory::Scope scope(memory_.data_memory());
-    return remote_.poll(parallel);
-  }();
+  bool changed = false;
   std::map<fs::path, File> found;
   for (const fs::path& input : inputs_) {
     const bool is_file = std::any_of(files_.begin(), files_.end(), [&input](const auto& named) { return named.first == input; });
@@ -293,17 +291,19 @@ std::optional<Catalogue> CatalogueWatcher::poll(const ParallelFor& parallel) {
 }
 
 // What was read. A data set that cannot be added is an error at the start, and is skipped later.
-Result<Catalogue> CatalogueWatcher::catalogue(bool is_start) const {
+Result<Catalogue> CatalogueWatcher::catalogue(bool is_start) {
   std::vector<std::pair<fs::path, Catalogue::Volume>> volumes;
   for (const auto& [path, contents] : files_) volumes.emplace_back(path, contents.volume);
   for (const auto& [path, file] : folder_files_) volumes.emplace_back(path, file.volume);
-  for (const auto& set : remote_.all()) volumes.emplace_back(set.url.shown, set.volume);
   Catalogue catalogue;
   for (const auto& [path, volume] : volumes) {
-    if (!volume) continue;
-    const auto added = catalogue.add(volume);
+    const auto added = volume ? catalogue.add(volume) : Result<void>();
     if (!added && is_start) return fail(added.error().message + " (" + path.string() + ")");
-    if (!added) spdlog::warn("skipped: {} ({})", added.error().message, path.string());
+    if (added) {
+      skipped_.erase(path);
+    } else if (skipped_.insert(path).second) {
+      spdlog::warn("skipped: {} ({})", added.error().message, path.string());
+    }
   }
   return catalogue;
 }

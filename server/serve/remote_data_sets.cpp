@@ -9,6 +9,7 @@
 #include "common/ivm/load_volume.h"
 #include "common/parallel/all_cores.h"
 #include "protocol/codec.h"
+#include "server/scratch/scratch_memory.h"
 
 namespace intervale {
 namespace {
@@ -29,55 +30,70 @@ auto catching(const RemoteUrl& url, const Read& read) -> decltype(read()) {
   }
 }
 
-void warn(RemoteDataSets::DataSet& set, const std::string& why) {
-  if (std::exchange(set.last_warning, why) != why) spdlog::warn("the data read before stays in use: {}", why);
-}
-
 }  // namespace
 
 RemoteDataSets::RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage, ScaleDemand* demand)
     : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage), demand_(demand) {
   for (const RemoteUrl& url : inputs_.urls) sets_.push_back({url, nullptr, {}, {}});
+  once_ = inputs_.limits;
+  once_.attempts = 1;
+}
+
+void RemoteDataSets::warn(DataSet& set, const std::string& why) {
+  if (std::exchange(set.last_warning, why) != why) spdlog::warn("the data read before stays in use: {}", why);
+}
+
+Catalogue RemoteDataSets::catalogue() const {
+  Catalogue catalogue;
+  for (const DataSet& set : sets_) (void)catalogue.add(set.volume);  // as at the start
+  return catalogue;
 }
 
 // From the coarsest scales on.
-void RemoteDataSets::begin(DataSet& set) { set.rest = std::make_unique<RemoteVolume>(set.url, inputs_.access, inputs_.limits); }
+void RemoteDataSets::begin(DataSet& set) {
+  set.rest = std::make_unique<RemoteVolume>(set.url, inputs_.access, demand_ != nullptr && set.volume ? once_ : inputs_.limits);
+}
 
-Result<void> RemoteDataSets::load(const ParallelFor& parallel) {
+Result<Catalogue> RemoteDataSets::load(const ParallelFor& parallel) {
+  const ScratchMemory::Scope scope(memory_.data_memory());
+  Catalogue catalogue;
   for (DataSet& set : sets_) {
     if (memory_.room() == kAnyRoom && !tolerates_damage_) {
       begin(set);
-      if (auto done = read_next(set, parallel); !done) return done;
+      if (auto done = read_next(set, parallel); !done) return tl::unexpected(done.error());
     } else if (auto done = read(set, inputs_.limits, parallel); !done) {
       return tl::unexpected(done.error());
     }
+    if (auto added = catalogue.add(set.volume); !added) return fail(added.error().message + " (" + set.url.shown + ")");
   }
   next_poll_ = std::chrono::steady_clock::now() + inputs_.poll_time;
-  if (demand_ != nullptr) inputs_.limits.attempts = 1;  // from now on others wait meanwhile, and who wants it asks again
-  return {};
+  return catalogue;
 }
 
-RemoteDataSets::DataSet* RemoteDataSets::unfinished(const std::set<std::string>& taken) {
+Result<std::optional<Catalogue>> RemoteDataSets::complete(const ParallelFor& parallel) {
   DataSet* least = nullptr;
   for (DataSet& set : sets_) {
-    if (!set.rest) continue;
-    if (demand_ != nullptr && (taken.contains(set.url.name) || !demand_->is_asked(set.url.name, set.volume->size()))) continue;
+    if (!set.rest || (demand_ != nullptr && !demand_->is_wanted(*set.volume))) continue;
     if (least == nullptr || set.volume->size() < least->volume->size()) least = &set;
   }
-  return least;
+  if (least == nullptr) return std::nullopt;
+  const ScratchMemory::Scope scope(memory_.data_memory());
+  read_on(*least, parallel);
+  return std::optional(catalogue());
 }
 
 void RemoteDataSets::read_on(DataSet& set, const ParallelFor& parallel) {
   if (auto done = read_next(set, parallel); !done) {
     set.rest.reset();
     if (demand_ != nullptr) {
-      demand_->refuse(set.url.name);
+      demand_->refuse(*set.volume);
       begin(set);
     } else {
       set.stamp = {};
     }
     return warn(set, done.error().message);
   }
+  set.last_warning.clear();
   if (!set.rest) spdlog::info("{}: all scales are loaded", set.url.shown);
 }
 
@@ -100,18 +116,8 @@ Result<void> RemoteDataSets::read_next(DataSet& set, const ParallelFor& parallel
   });
 }
 
-// For drop_unused(): of a file that was read whole.
-void RemoteDataSets::keep_coarse(DataSet& set, const ParallelFor& parallel) {
-  (void)catching(set.url, [&]() -> Result<void> {
-    RemoteVolume begun(set.url, inputs_.access, inputs_.limits);
-    const auto coarse = begun.next(parallel);
-    if (coarse && !(*coarse)->is_whole() && (*coarse)->description() == set.volume->description())
-      set.coarse = counted(memory_, Memory::Holder::datasets, *coarse);
-    return {};
-  });
-}
-
-bool RemoteDataSets::drop_unused(ScaleDemand::Clock::duration time) {
+std::optional<Catalogue> RemoteDataSets::drop_unused(ScaleDemand::Clock::duration time) {
+  if (demand_ == nullptr) return {};
   bool has_dropped = false;
   for (DataSet& set : sets_) {
     if (!set.coarse || set.volume->size() <= set.coarse->size() || !demand_->is_idle(set.url.name, time)) continue;
@@ -120,31 +126,45 @@ bool RemoteDataSets::drop_unused(ScaleDemand::Clock::duration time) {
     has_dropped = true;
     spdlog::info("{}: finer scales are dropped, as no session uses them", set.url.shown);
   }
-  return has_dropped;
+  if (!has_dropped) return {};
+  return catalogue();
 }
 
-bool RemoteDataSets::poll(const ParallelFor& parallel) {
-  if (sets_.empty() || std::chrono::steady_clock::now() < next_poll_) return false;
+std::optional<Catalogue> RemoteDataSets::poll(const ParallelFor& parallel) {
+  if (sets_.empty() || std::chrono::steady_clock::now() < next_poll_) return {};
+  const ScratchMemory::Scope scope(memory_.data_memory());
   bool changed = false;
   for (DataSet& set : sets_) changed = poll_one(set, parallel) || changed;
   next_poll_ = std::chrono::steady_clock::now() + inputs_.poll_time;
-  return changed;
+  if (!changed) return {};
+  return catalogue();
 }
 
 bool RemoteDataSets::poll_one(DataSet& set, const ParallelFor& parallel) {
   if (!set.stamp.is_known() && (set.volume->is_whole() || set.rest)) return false;
-  // Folders wait meanwhile. There is another try soon.
-  RemoteLimits once = inputs_.limits;
-  once.attempts = 1;
-  const auto changed = read(set, once, parallel);
-  if (changed) {
-    set.last_warning.clear();
-    if (*changed) spdlog::info("{} was reloaded", set.url.shown);
-    if (*changed && demand_ != nullptr) keep_coarse(set, parallel);
-    return *changed;
+  const auto changed = demand_ != nullptr ? read_if_changed(set, parallel) : read(set, once_, parallel);
+  if (!changed) {
+    warn(set, changed.error().message);
+    return false;
   }
-  warn(set, changed.error().message);
-  return false;
+  set.last_warning.clear();
+  if (*changed) spdlog::info("{} was reloaded", set.url.shown);
+  return *changed;
+}
+
+// On demand: the coarse scales.
+Result<bool> RemoteDataSets::read_if_changed(DataSet& set, const ParallelFor& parallel) {
+  RemoteFile file(set.url, inputs_.access, once_, &set.stamp);
+  const auto begun = file.begin(parallel);
+  if (!begun && begun.error().kind == RemoteFailure::Kind::unchanged) return false;
+  if (!begun && begun.error().kind == RemoteFailure::Kind::final) return tl::unexpected(begun.error().error);
+  const Catalogue::Volume before = set.volume;
+  begin(set);
+  if (auto done = read_next(set, parallel); !done) {
+    begin(set);
+    return tl::unexpected(done.error());
+  }
+  return set.volume != before;
 }
 
 // True if there are new contents.

@@ -3,9 +3,8 @@
 
 #include <chrono>
 #include <memory>
-#include <set>
+#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/remote/load_remote.h"
@@ -13,6 +12,7 @@
 #include "common/util/parallel.h"
 #include "common/util/result.h"
 #include "server/serve/catalogue.h"
+#include "server/serve/data_set_source.h"
 #include "server/serve/memory.h"
 #include "server/serve/scale_demand.h"
 
@@ -25,9 +25,27 @@ struct RemoteInputs {
   std::chrono::milliseconds poll_time{60'000};  // between questions whether a file has changed
 };
 
-// One thread at a time. What was read of a file lies in memory: what becomes of it on its server does not affect sessions.
-class RemoteDataSets {
+// Each is read into memory. A file on a server that sends neither ETag nor Last-Modified is not looked at again.
+class RemoteDataSets : public DataSetSource {
  public:
+  // memory: counts the data sets, and must outlive them; if it has data memory, they lie there. tolerates_damage and
+  // demand: as of CatalogueWatcher.
+  RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage = false, ScaleDemand* demand = nullptr);
+  RemoteDataSets(const RemoteDataSets&) = delete;
+  RemoteDataSets& operator=(const RemoteDataSets&) = delete;
+
+  // Where memory is limited, and with tolerates_damage, all of each is read. Fails if one cannot be read, and if two
+  // have one name.
+  Result<Catalogue> load(const ParallelFor& parallel = serial) override;
+  // What cannot be read is logged, and what was read before stays: poll() tries to read all of it; on demand, it is
+  // refused, and tried again when it is asked for again.
+  Result<std::optional<Catalogue>> complete(const ParallelFor& parallel = serial) override;
+  // Once poll_time is over, asks for each whether it has changed, and reads those that have: whole, or on demand their
+  // coarse scales. What fails is logged, and tried again the next time; the last good contents stay.
+  std::optional<Catalogue> poll(const ParallelFor& parallel = serial) override;
+  std::optional<Catalogue> drop_unused(ScaleDemand::Clock::duration time) override;
+
+ private:
   struct DataSet {
     RemoteUrl url;
     Catalogue::Volume volume;                      // the last good contents; nullptr: not read yet
@@ -37,40 +55,17 @@ class RemoteDataSets {
     Catalogue::Volume coarse = nullptr;            // on demand, its coarsest scales, where these were read first
   };
 
-  // memory: counts the data sets, and must outlive them. Callers have a Scope of its data memory. tolerates_damage: as
-  // and demand: as of CatalogueWatcher.
-  RemoteDataSets(RemoteInputs inputs, Memory& memory, bool tolerates_damage, ScaleDemand* demand = nullptr);
-  RemoteDataSets(const RemoteDataSets&) = delete;
-  RemoteDataSets& operator=(const RemoteDataSets&) = delete;
-
-  // Reads all of them; of large files of every range the coarse scales, if memory is not limited. Fails if one cannot be
-  // read. Throws what `parallel` throws.
-  Result<void> load(const ParallelFor& parallel);
-
-  // After load(): the data set with fewest updates whose rest is to be read; nullptr: there is none. taken: names under
-  // which others are served, which nobody can ask for.
-  [[nodiscard]] DataSet* unfinished(const std::set<std::string>& taken);
-  // Reads on of it, as far as the next scale. If that fails, it is logged, and what was read before stays: poll() tries
-  // to read all of it; on demand, it is refused, and tried again when it is asked for again.
+  static void warn(DataSet& set, const std::string& why);
+  [[nodiscard]] Catalogue catalogue() const;
   void read_on(DataSet& set, const ParallelFor& parallel);
-  // On demand: drops the finer scales of those that no session has used for so long. Whether there were any.
-  bool drop_unused(ScaleDemand::Clock::duration time);
-
-  // Once poll_time is over, asks for each whether it has changed, and reads those that have, whole. True if contents are
-  // new. What fails is logged, and tried again the next time; the last good contents stay. A server that sends neither
-  // ETag nor Last-Modified is not asked.
-  bool poll(const ParallelFor& parallel);
-
-  [[nodiscard]] const std::vector<DataSet>& all() const { return sets_; }
-
- private:
   bool poll_one(DataSet& set, const ParallelFor& parallel);
+  Result<bool> read_if_changed(DataSet& set, const ParallelFor& parallel);
   Result<bool> read(DataSet& set, const RemoteLimits& limits, const ParallelFor& parallel);
   Result<void> read_next(DataSet& set, const ParallelFor& parallel);
   void begin(DataSet& set);
-  void keep_coarse(DataSet& set, const ParallelFor& parallel);
 
   RemoteInputs inputs_;
+  RemoteLimits once_;  // a request that fails is not repeated: there is another try soon
   Memory& memory_;
   bool tolerates_damage_;
   ScaleDemand* demand_;

@@ -4,55 +4,70 @@
 
 namespace intervale {
 
-ScaleDemand::Use ScaleDemand::use(const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  Entry& entry = entries_[name];
-  if (entry.sessions == 0 && Clock::now() >= entry.last_use + kLinger) entry.asked = 0;
-  ++entry.sessions;
-  return Use(this, {name});
+ScaleDemand::Use::Use(ScaleDemand& demand, std::string name) : demand_(demand), name_(std::move(name)) {
+  const std::lock_guard lock(demand_.mutex_);
+  ++demand_.entries_[name_].sessions;
 }
 
-void ScaleDemand::end_use(const std::string& name) {
-  const std::lock_guard lock(mutex_);
-  Entry& entry = entries_.at(name);
+ScaleDemand::Use::~Use() {
+  const std::lock_guard lock(demand_.mutex_);
+  demand_.forget(wanted_);
+  Entry& entry = demand_.entries_.at(name_);
   --entry.sessions;
   entry.last_use = Clock::now();
 }
 
-bool ScaleDemand::ask(const std::string& name, std::uint64_t held, Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
-  Entry& entry = entries_[name];
-  entry.last_use = now;
-  if (entry.refused != Clock::time_point() && now < entry.refused + kRetry) return false;
-  entry.refused = {};
-  entry.asked = std::max(entry.asked, held + 1);
-  wake_();
-  return true;
+bool ScaleDemand::Use::want(const IntervalVolume* held, Clock::time_point now) {
+  if (held == nullptr && wanted_ == nullptr) return true;
+  const std::lock_guard lock(demand_.mutex_);
+  Entry& entry = demand_.entries_.at(name_);
+  const bool is_refused = held != nullptr && entry.refuses(*held) && now < entry.refused_until;
+  if (is_refused) {
+    held = nullptr;
+  } else if (held != nullptr) {
+    entry.refused_until = {};
+  }
+  if (held != wanted_) {
+    demand_.forget(wanted_);
+    wanted_ = held;
+    if (held != nullptr) {
+      ++demand_.wanted_[held];
+      demand_.wake_();
+    }
+  }
+  return !is_refused;
 }
 
-bool ScaleDemand::is_asked(const std::string& name, std::uint64_t held, Clock::time_point now) const {
+void ScaleDemand::forget(const IntervalVolume* wanted) {
+  const auto found = wanted_.find(wanted);
+  if (found != wanted_.end() && --found->second == 0) wanted_.erase(found);
+}
+
+bool ScaleDemand::Entry::refuses(const IntervalVolume& held) const {
+  return refusals > 0 && contents == held.description().content_hash && updates == held.size();
+}
+
+bool ScaleDemand::is_wanted(const IntervalVolume& held, Clock::time_point now) const {
+  const std::lock_guard lock(mutex_);
+  if (!wanted_.contains(&held)) return false;
+  const auto found = entries_.find(held.description().name);
+  return found == entries_.end() || !found->second.refuses(held) || now >= found->second.refused_until;
+}
+
+void ScaleDemand::refuse(const IntervalVolume& held, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  Entry& entry = entries_[held.description().name];
+  entry.refusals = entry.refuses(held) ? entry.refusals + 1 : 1;
+  entry.contents = held.description().content_hash;
+  entry.updates = held.size();
+  const unsigned doublings = std::min(entry.refusals - 1, 8U);
+  entry.refused_until = now + std::min(kRetry * (1 << doublings), kLongestRetry);
+}
+
+bool ScaleDemand::is_idle(const std::string& name, Clock::duration time, Clock::time_point now) const {
   const std::lock_guard lock(mutex_);
   const auto found = entries_.find(name);
-  if (found == entries_.end()) return false;
-  const Entry& entry = found->second;
-  return held < entry.asked && (entry.sessions > 0 || now < entry.last_use + kLinger);
-}
-
-void ScaleDemand::refuse(const std::string& name, Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
-  Entry& entry = entries_[name];
-  entry.refused = now;
-  entry.asked = 0;
-}
-
-bool ScaleDemand::is_idle(const std::string& name, Clock::duration time, Clock::time_point now) {
-  const std::lock_guard lock(mutex_);
-  const auto found = entries_.find(name);
-  if (found == entries_.end()) return true;
-  Entry& entry = found->second;
-  if (entry.sessions > 0 || now < entry.last_use + time) return false;
-  entry.asked = 0;
-  return true;
+  return found == entries_.end() || (found->second.sessions == 0 && now >= found->second.last_use + time);
 }
 
 }  // namespace intervale

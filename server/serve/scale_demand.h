@@ -7,54 +7,67 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
 
+#include "common/ivm/interval_volume.h"
+
 namespace intervale {
 
-// Data sets by name. Any thread. Memory: an entry for each name that a session has used.
+// Data sets by name, and what is there of them by identity: who has other contents than those that are served, or less
+// of them, wants nothing. Any thread. Memory: an entry for each name that a session has used.
 class ScaleDemand {
  public:
   using Clock = std::chrono::steady_clock;
-  struct EndUse {
-    std::string name;
-    void operator()(ScaleDemand* demand) const { demand->end_use(name); }
+
+  // What could not be read is not tried again for so long: twice as long with each time, up to the other.
+  static constexpr std::chrono::seconds kRetry{5}, kLongestRetry{60};
+
+  // While it exists, a session has the data set open. One thread at a time. The demand must outlive it.
+  class Use {
+   public:
+    Use(ScaleDemand& demand, std::string name);
+    ~Use();
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+    // held: what the session has of it, if it wants more; only the address is kept. nullptr: it wants no more. False: a
+    // moment ago no more could be had, and it is not waited for.
+    [[nodiscard]] bool want(const IntervalVolume* held, Clock::time_point now = Clock::now());
+
+   private:
+    ScaleDemand& demand_;
+    std::string name_;
+    const IntervalVolume* wanted_ = nullptr;
   };
-  // While it exists, a session has the data set open.
-  using Use = std::unique_ptr<ScaleDemand, EndUse>;
 
-  // What is not wanted any more, because all who asked are gone, is read for so long; what could not be read is not
-  // tried again for so long.
-  static constexpr std::chrono::seconds kLinger{30}, kRetry{5};
-
-  [[nodiscard]] Use use(const std::string& name);
-  // More than `held` updates are wanted. False: a moment ago they could not be had.
-  [[nodiscard]] bool ask(const std::string& name, std::uint64_t held, Clock::time_point now = Clock::now());
-
-  // wake: called when something is asked for, on any thread; not any more once it was replaced. It must not call this.
+  // wake: called when a session wants more, on any thread; not any more once it was replaced. It must not call this.
   void set_wake(std::function<void()> wake) {
     const std::lock_guard lock(mutex_);
     wake_ = std::move(wake);
   }
-  // Whether more than `held` updates were asked for, and still are wanted.
-  [[nodiscard]] bool is_asked(const std::string& name, std::uint64_t held, Clock::time_point now = Clock::now()) const;
-  // No more can be had for now.
-  void refuse(const std::string& name, Clock::time_point now = Clock::now());
-  // Whether no session has used it, or asked for it, for so long. Then what was asked for is forgotten.
-  [[nodiscard]] bool is_idle(const std::string& name, Clock::duration time, Clock::time_point now = Clock::now());
+  // Whether a session has this, and wants more.
+  [[nodiscard]] bool is_wanted(const IntervalVolume& held, Clock::time_point now = Clock::now()) const;
+  // More than this cannot be had for now.
+  void refuse(const IntervalVolume& held, Clock::time_point now = Clock::now());
+  // Whether no session has used it for so long.
+  [[nodiscard]] bool is_idle(const std::string& name, Clock::duration time, Clock::time_point now = Clock::now()) const;
 
  private:
   struct Entry {
     std::size_t sessions = 0;
-    Clock::time_point last_use{}, refused{};
-    std::uint64_t asked = 0;  // at least so many updates
+    Clock::time_point last_use{};
+    // What was refused, how often in a row, and until when.
+    std::uint64_t contents = 0, updates = 0;
+    unsigned refusals = 0;
+    Clock::time_point refused_until{};
+    [[nodiscard]] bool refuses(const IntervalVolume& held) const;
   };
-  void end_use(const std::string& name);
+  void forget(const IntervalVolume* wanted);
 
   mutable std::mutex mutex_;
   std::map<std::string, Entry> entries_;
+  std::map<const IntervalVolume*, std::size_t> wanted_;  // by how many sessions
   std::function<void()> wake_ = [] {};
 };
 

@@ -9,22 +9,18 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
-#include <condition_variable>
 #include <csignal>
-#include <exception>
 #include <functional>
-#include <mutex>
+#include <memory>
 #include <optional>
-#include <stop_token>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <utility>
 
-#include "common/parallel/all_cores.h"
 #include "server/serve/catalogue_watcher.h"
+#include "server/serve/loading.h"
+#include "server/serve/remote_data_sets.h"
 #include "server/serve/server.h"
-#include "server/serve/spare_cores.h"
 
 namespace intervale {
 namespace {
@@ -75,83 +71,18 @@ class LevelSwitch {
   std::string level_;
 };
 
-// Loads the data sets, and follows the changes of their folders, on a thread of its own: that may take long, and signals
-// are heard meanwhile.
-class Loading {
- public:
-  // where: the end of the line that tells what is served. failed: called on that thread if nothing can be served.
-  Loading(const std::vector<std::filesystem::path>& inputs, RemoteInputs remote, const ServeOptions& options, Server& server, std::string where,
-          std::function<void(const Error&)> failed)
-      : watcher_(inputs, server.memory(), options.tolerates_damage, std::move(remote), server.scale_demand()),
-        server_(server),
-        keep_time_(options.keep_time),
-        where_(std::move(where)),
-        failed_(std::move(failed)) {
-    if (auto* const demand = server_.scale_demand()) demand->set_wake([this] { wake(reads_on_); });
-    thread_ = std::jthread([this](const std::stop_token& stop) { on_spare_cores([&] { run(stop); }); });
+// Where the data sets come from.
+std::vector<Loading::Input> sources(const std::vector<std::filesystem::path>& inputs, RemoteInputs remote, const ServeOptions& options,
+                                    Server& server) {
+  std::vector<Loading::Input> all;
+  if (!inputs.empty())
+    all.push_back({std::make_unique<CatalogueWatcher>(inputs, server.memory(), options.tolerates_damage, server.scale_demand()), kPollTime});
+  if (!remote.urls.empty()) {
+    const auto time = std::min<std::chrono::milliseconds>(kPollTime, remote.poll_time);
+    all.push_back({std::make_unique<RemoteDataSets>(std::move(remote), server.memory(), options.tolerates_damage, server.scale_demand()), time});
   }
-  Loading(const Loading&) = delete;
-  Loading& operator=(const Loading&) = delete;
-  ~Loading() {
-    if (auto* const demand = server_.scale_demand()) demand->set_wake([] {});
-  }
-  void poll_now() { wake(polls_); }
-  void request_stop() { thread_.request_stop(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  void run(const std::stop_token& stop) {
-    try {
-      SpareCores cores(stop, server_.scheduler(), SpareCores::Rests::while_sessions_wait, server_.memory().data_memory());
-      const ParallelFor& parallel = cores.all();
-      auto catalogue = watcher_.load(parallel);
-      if (!catalogue) return failed_(catalogue.error());
-      const std::size_t count = catalogue->volumes().size();
-      server_.offer(std::move(*catalogue));
-      spdlog::info("serving {} data set{}{}", count, count == 1 ? "" : "s", where_);
-      while (!stop.stop_requested()) {
-        for (auto more = watcher_.complete(parallel); !more || *more; more = watcher_.complete(parallel)) {
-          if (!more) return failed_(more.error());
-          server_.offer(std::move(**more));
-          // Folders do not wait for all of it.
-          if (server_.scale_demand() != nullptr && Clock::now() >= next_poll_) break;
-        }
-        if (!wait_until_poll(stop)) continue;
-        if (auto changed = watcher_.poll(parallel)) server_.offer(std::move(*changed));
-        if (auto fewer = watcher_.drop_unused(keep_time_)) server_.offer(std::move(*fewer));
-      }
-    } catch (const Stopped&) {
-    } catch (const std::exception& exception) {
-      failed_({exception.what()});
-    }
-  }
-  void wake(bool& why) {
-    const std::lock_guard lock(mutex_);
-    why = true;
-    wake_.notify_one();
-  }
-  // Whether it is time to look at the folders; or something is to be read on before, or this is to stop.
-  bool wait_until_poll(const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    wake_.wait_until(lock, stop, next_poll_, [this] { return polls_ || reads_on_; });
-    reads_on_ = false;
-    if (stop.stop_requested() || (!polls_ && Clock::now() < next_poll_)) return false;
-    polls_ = false;
-    next_poll_ = Clock::now() + kPollTime;
-    return true;
-  }
-
-  CatalogueWatcher watcher_;
-  Server& server_;
-  std::chrono::milliseconds keep_time_;
-  std::string where_;
-  std::function<void(const Error&)> failed_;
-  std::mutex mutex_;
-  std::condition_variable_any wake_;
-  bool polls_ = false, reads_on_ = false;  // what it was woken for
-  Clock::time_point next_poll_ = Clock::now() + kPollTime;
-  std::jthread thread_;  // the last member: it uses the others
-};
+  return all;
+}
 
 // Calls act for every signal, while the io_context runs.
 void on_each_signal(boost::asio::signal_set& signals, const std::function<void()>& act) {
@@ -192,13 +123,13 @@ Result<void> serve(const ServeOptions& requested, const LogOptions& log, const s
   auto server = Server::start(options);
   if (!server) return tl::unexpected(server.error());
   Result<void> loaded;
-  Loading loading(inputs, std::move(remote), options, **server, (options.viewer ? "; the viewer is at " : " at ") + (*server)->url(),
-                  [&](const Error& error) {
-                    boost::asio::post(signals, [&, error] {
-                      loaded = tl::unexpected(error);
-                      signals.stop();
-                    });
-                  });
+  const std::string where = (options.viewer ? "; the viewer is at " : " at ") + (*server)->url();
+  Loading loading(sources(inputs, std::move(remote), options, **server), **server, options.keep_time, where, [&](const Error& error) {
+    boost::asio::post(signals, [&, error] {
+      loaded = tl::unexpected(error);
+      signals.stop();
+    });
+  });
   boost::asio::steady_timer timer(signals);
   LevelSwitch level(log);
   on_each_signal(hang_up, [&] {

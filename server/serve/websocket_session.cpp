@@ -272,7 +272,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     if (auto fault = state_.receive(message)) return close(std::move(*fault));
     if (const auto* const open = std::get_if<protocol::Open>(&message)) {
       context_.connections.set_waiting(registration_, false);
-      if (context_.options.on_demand) use_ = context_.scale_demand.use(open->dataset);
+      if (context_.options.on_demand) use_.emplace(context_.scale_demand, open->dataset);
     }
     memory_.resize(state_.memory_bytes());
     if (const auto* view = std::get_if<protocol::View>(&message)) timing_.on_view(view->epoch);
@@ -322,7 +322,8 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
         }
         continue;
       }
-      if (state_.lacks_scales() && !ask_for_scales()) close({CloseCode::going_away, "the rest of the data set could not be read"});
+      if (use_ && !use_->want(state_.lacks_scales() ? state_.volume().get() : nullptr))
+        close({CloseCode::going_away, "the rest of the data set could not be read"});
       if (!fault_ && !state_.has_work()) co_await wait();
     }
   }
@@ -344,9 +345,6 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
     context_.metrics.observe_selection(time);
     return message;
   }
-
-  // Of its data set, finer than those that are there. False if a moment ago they could not be had.
-  [[nodiscard]] bool ask_for_scales() { return context_.scale_demand.ask(state_.dataset(), state_.updates_there()); }
 
   // Until a message arrives, the client's time to send Open or Credit is over, or it is time to rest.
   asio::awaitable<void> wait() {
@@ -405,7 +403,7 @@ class WebSocketSession : public Connection, public std::enable_shared_from_this<
   Peer peer_;
   SessionThreads threads_;
   SessionState state_;
-  ScaleDemand::Use use_;  // of its data set
+  std::optional<ScaleDemand::Use> use_;  // of its data set
   FairScheduler::Flow flow_;
   Clock::duration unscheduled_{0};                                                        // work of the reader since it had a worker
   std::optional<std::pair<FairScheduler::Lane, FairScheduler::Priority>> reader_worker_;  // if it has one

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <optional>
 #include <random>
 #include <stdexcept>
@@ -18,6 +19,7 @@
 #include "server/builder/value_steps.h"
 #include "server/serve/catalogue_watcher.h"
 #include "tests/support/analytic_fields.h"
+#include "tests/support/file_server.h"
 #include "tests/support/page_damage.h"
 #include "tests/support/process.h"
 #include "tests/support/programs.h"
@@ -196,23 +198,23 @@ TEST_F(OnDemand, ScalesAreReadOnceASessionWantsThemAndDroppedWhenNoneDoes) {
   for (const bool is_folder : {true, false}) {
     std::vector<std::filesystem::path> inputs{folder.path()};
     if (!is_folder) inputs = {folder / "large.ivm", folder / "larger.ivm"};
-    CatalogueWatcher watcher(inputs, memory, false, {}, &demand);
+    CatalogueWatcher watcher(inputs, memory, false, &demand);
     const auto coarse = watcher.load().value();
     EXPECT_FALSE(is_whole(coarse) || is_whole(coarse, "larger"));
     EXPECT_FALSE(*watcher.complete()) << "nobody wants more";
     EXPECT_FALSE(watcher.poll());
     EXPECT_FALSE(watcher.poll()) << "and nothing has changed";
-    auto use = demand.use("larger");
+    std::optional<ScaleDemand::Use> use(std::in_place, demand, "larger");
     EXPECT_FALSE(*watcher.complete());
     const std::size_t size = coarse.find("larger")->size();
-    EXPECT_TRUE(demand.ask("larger", size));
+    EXPECT_TRUE(use->want(coarse.find("larger").get()));
     const auto more = watcher.complete().value();
     ASSERT_TRUE(more);
     EXPECT_GT(more->find("larger")->size(), size);
     EXPECT_FALSE(is_whole(*more, "larger"));
     EXPECT_FALSE(is_whole(*more)) << "nobody wants that one";
     EXPECT_FALSE(*watcher.complete()) << "one scale more is all that was wanted";
-    EXPECT_TRUE(demand.ask("larger", more->find("larger")->size()));
+    EXPECT_TRUE(use->want(more->find("larger").get()));
     const auto all = watcher.complete().value();
     ASSERT_TRUE(all);
     EXPECT_TRUE(is_whole(*all, "larger"));
@@ -231,17 +233,17 @@ TEST_F(OnDemand, ScalesAreReadOnceASessionWantsThemAndDroppedWhenNoneDoes) {
 }
 
 TEST_F(OnDemand, FilesThatComeOrChangeAreServedByTheirCoarseScales) {
-  CatalogueWatcher watcher({folder.path()}, memory, false, {}, &demand);
+  CatalogueWatcher watcher({folder.path()}, memory, false, &demand);
   EXPECT_TRUE(watcher.load().value().volumes().empty());
   for (const auto& bytes : {large(), noise({71, 68, 67})}) {
-    auto use = demand.use("large");
+    std::optional<ScaleDemand::Use> use(std::in_place, demand, "large");
     write(folder, bytes);
     EXPECT_FALSE(watcher.poll());
     const auto polled = watcher.poll();
     ASSERT_TRUE(polled);
     EXPECT_FALSE(is_whole(*polled));
     EXPECT_FALSE(*watcher.complete());
-    EXPECT_TRUE(demand.ask("large", polled->find("large")->size()));
+    EXPECT_TRUE(use->want(polled->find("large").get()));
     const auto all = watcher.complete().value();
     ASSERT_TRUE(all);
     EXPECT_TRUE(is_whole(*all));
@@ -258,15 +260,15 @@ TEST_F(OnDemand, WhatCannotBeReadIsRefusedAndTheCoarseScalesStay) {
   const auto file = write(folder, bytes);
   for (const auto& input : {file, file.parent_path()}) {
     ScaleDemand here;
-    CatalogueWatcher watcher({input}, memory, false, {}, &here);
+    CatalogueWatcher watcher({input}, memory, false, &here);
     const auto coarse = watcher.load().value();
-    const auto use = here.use("large");
-    EXPECT_TRUE(here.ask("large", coarse.find("large")->size()));
+    ScaleDemand::Use use(here, "large");
+    EXPECT_TRUE(use.want(coarse.find("large").get()));
     const auto failed = watcher.complete();
     ASSERT_TRUE(failed && *failed);
     EXPECT_EQ((*failed)->find("large"), coarse.find("large"));
     EXPECT_FALSE(*watcher.complete()) << "it is not tried again at once";
-    EXPECT_FALSE(here.ask("large", coarse.find("large")->size()));
+    EXPECT_FALSE(use.want(coarse.find("large").get()));
     EXPECT_FALSE(watcher.poll());
     EXPECT_FALSE(watcher.poll());
   }
@@ -280,7 +282,7 @@ TEST_F(OnDemand, ASessionGetsTheScalesThatItWants) {
   const auto server = start(options);
   ASSERT_TRUE(server->scale_demand());
   EXPECT_FALSE(start()->scale_demand());
-  CatalogueWatcher watcher({file}, server->memory(), false, {}, server->scale_demand());
+  CatalogueWatcher watcher({file}, server->memory(), false, server->scale_demand());
   auto coarse = watcher.load().value();
   const std::uint64_t some = coarse.find("large")->size(), all = coarse.find("large")->description().updates;
   server->offer(std::move(coarse));
@@ -318,7 +320,7 @@ TEST_F(OnDemand, ASessionEndsWhereTheRestIsDamaged) {
   ServeOptions options;
   options.on_demand = true;
   const auto server = start(options);
-  CatalogueWatcher watcher({write(folder, damaged)}, server->memory(), false, {}, server->scale_demand());
+  CatalogueWatcher watcher({write(folder, damaged)}, server->memory(), false, server->scale_demand());
   server->offer(watcher.load().value());
   for (int i = 0; i < 2; ++i) {
     RawClient client(server->port());
@@ -369,7 +371,7 @@ TEST_F(OnDemand, WhoResumesWaitsForTheScalesThatItHas) {
   options.on_demand = true;
   options.listen = "127.0.0.1:" + std::to_string(port);
   server = Server::start(options).value();
-  CatalogueWatcher watcher({file}, server->memory(), false, {}, server->scale_demand());
+  CatalogueWatcher watcher({file}, server->memory(), false, server->scale_demand());
   server->offer(watcher.load().value());
   request.shown.ranges = {{0.4, 0.6001}};
   ASSERT_TRUE(live->look(request));
@@ -401,6 +403,24 @@ TEST_F(OnDemand, TheProgramReadsOnAndDrops) {
   EXPECT_TRUE(server.process().wait_for("finer scales are dropped"));
   EXPECT_TRUE(eventually([&] { return metric(server.port(), memory_of) == coarse; }));
   EXPECT_EQ(fetch(server, {}).substr(0, 60), fetch(plain, {}).substr(0, 60)) << "they are read again";
+}
+
+TEST_F(OnDemand, AWebServerThatDoesNotAnswerHoldsUpNoFile) {
+  const auto file = write(folder, large());
+  testing::FileServer web(contents_of(file));
+  ServerProgram server(folder.path(), {web.url("/far.ivm"), "--on-demand"});
+  web.misbehave([](const testing::FileRequest&, std::size_t, testing::FileAnswer& answer) { answer.hangs = true; });
+  const std::size_t before = web.requests().size();
+  Process waits({program("intervale-client"), "fetch", server.url("far"), "--range", "0.4", "0.6"});
+  ASSERT_TRUE(eventually([&] { return web.requests().size() > before; }));
+  const auto begun = std::chrono::steady_clock::now();
+  const auto fetched = run({program("intervale-client"), "fetch", server.url("large"), "--range", "0.4", "0.6"});
+  EXPECT_EQ(fetched.status, 0) << fetched.err;
+  std::filesystem::copy_file(buckyball(), folder / "new.ivm");
+  EXPECT_TRUE(server.process().wait_for("new.ivm was loaded"));
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(20)) << "less than what is waited for a web server";
+  EXPECT_EQ(web.requests().size(), before + 1) << "which is what it still does";
+  waits.signal(SIGTERM);
 }
 
 // A server that is reached again and again, but has nothing new, is lost.

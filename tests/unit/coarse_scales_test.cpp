@@ -416,7 +416,7 @@ TEST(CoarseScales, OnDemandAViewIsDoneWithTheScalesThatItWants) {
     while (session.server.lacks_scales()) {
       EXPECT_NE(session.client.state(), ClientSession::State::idle);
       ASSERT_LT(++there, growing.size());
-      EXPECT_EQ(session.server.updates_there(), growing[there - 1]->size());
+      EXPECT_EQ(session.server.volume()->size(), growing[there - 1]->size());
       session.found = growing[there];
       session.run();
     }
@@ -473,7 +473,7 @@ TEST(CoarseScales, ASessionThatResumesWaitsForTheScalesThatItHas) {
     EXPECT_FALSE(server.next());
     EXPECT_EQ(server.lacks_scales(), growth == SessionState::Growth::on_demand);
     there = more;
-    while (server.next() || server.has_work()) EXPECT_EQ(server.updates_there(), more->size());
+    while (server.next() || server.has_work()) EXPECT_EQ(server.volume()->size(), more->size());
     EXPECT_EQ(server.lacks_scales(), growth == SessionState::Growth::on_demand);
     there = all;
     EXPECT_FALSE(server.next()) << "it has grown";

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -12,7 +13,6 @@
 #include "common/ivm/value_file.h"
 #include "common/parallel/all_cores.h"
 #include "server/builder/value_builder.h"
-#include "server/serve/catalogue_watcher.h"
 #include "tests/support/file_server.h"
 #include "tests/support/interval_volumes.h"
 #include "tests/support/value_fields.h"
@@ -46,130 +46,137 @@ struct RemoteDataSetsTest : ::testing::Test {
 };
 
 TEST_F(RemoteDataSetsTest, AreServedByTheirCoarseScalesFirst) {
-  CatalogueWatcher watcher({}, memory, false, inputs());
-  const auto coarse = scan(watcher.load().value());
+  RemoteDataSets sets(inputs(), memory);
+  const auto coarse = scan(sets.load().value());
   ASSERT_TRUE(coarse);
   EXPECT_FALSE(coarse->is_whole());
   const std::size_t before = web.requests().size();
-  const auto more = watcher.complete();
+  const auto more = sets.complete();
   ASSERT_TRUE(more && *more);
   EXPECT_GT(web.requests().size(), before);
   const auto whole = scan(**more);
   EXPECT_TRUE(whole->is_whole());
   EXPECT_EQ(whole->description(), coarse->description());
   EXPECT_EQ(whole->size(), decode_volume(std::as_bytes(std::span(large())), "scan", on_all_cores)->size());
-  EXPECT_FALSE(*watcher.complete());
-  EXPECT_FALSE(watcher.poll()) << "it has not changed";
+  EXPECT_FALSE(*sets.complete());
+  EXPECT_FALSE(sets.poll()) << "it has not changed";
 }
 
 TEST_F(RemoteDataSetsTest, WhatCannotBeReadOnStaysCoarseUntilItCan) {
-  CatalogueWatcher watcher({}, memory, false, inputs());
-  ASSERT_FALSE(scan(watcher.load().value())->is_whole());
+  RemoteDataSets sets(inputs(), memory);
+  ASSERT_FALSE(scan(sets.load().value())->is_whole());
   std::atomic<bool> is_away = true;
   web.misbehave([&](const FileRequest&, std::size_t, FileAnswer& answer) {
     if (is_away) answer = {.status = 404};
   });
-  const auto more = watcher.complete();
+  const auto more = sets.complete();
   ASSERT_TRUE(more && *more);
   EXPECT_FALSE(scan(**more)->is_whole());
-  EXPECT_FALSE(*watcher.complete()) << "it is not tried again at once";
-  EXPECT_FALSE(watcher.poll());
+  EXPECT_FALSE(*sets.complete()) << "it is not tried again at once";
+  EXPECT_FALSE(sets.poll());
   is_away = false;
-  const auto mended = watcher.poll();
+  const auto mended = sets.poll();
   ASSERT_TRUE(mended);
   EXPECT_TRUE(scan(*mended)->is_whole());
-  EXPECT_FALSE(watcher.poll());
+  EXPECT_FALSE(sets.poll());
 }
 
 TEST_F(RemoteDataSetsTest, AnotherFileTakesThePlaceOfTheOneThatWasBegun) {
-  CatalogueWatcher watcher({}, memory, false, inputs());
-  const auto before = scan(watcher.load().value());
+  RemoteDataSets sets(inputs(), memory);
+  const auto before = scan(sets.load().value());
   auto field = testing::random_value_field({9, 8, 7}, 2);
   const auto bytes = encode_values(build_value_volume(field.volume, field.format));
   web.set(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), "\"two\"");
-  const auto more = watcher.complete();
+  const auto more = sets.complete();
   ASSERT_TRUE(more && *more);
   EXPECT_TRUE(scan(**more)->is_whole());
   EXPECT_NE(scan(**more)->description(), before->description());
-  EXPECT_FALSE(*watcher.complete());
+  EXPECT_FALSE(*sets.complete());
 }
 
 TEST_F(RemoteDataSetsTest, OnDemandScalesAreReadOnceTheyAreWantedAndDroppedAgain) {
   ScaleDemand demand;
-  CatalogueWatcher watcher({}, memory, false, inputs(), &demand);
-  const auto coarse = scan(watcher.load().value());
+  RemoteDataSets sets(inputs(), memory, false, &demand);
+  const auto coarse = scan(sets.load().value());
   std::size_t before = web.requests().size();
-  EXPECT_FALSE(*watcher.complete());
+  EXPECT_FALSE(*sets.complete());
   EXPECT_EQ(web.requests().size(), before);
-  EXPECT_FALSE(watcher.poll()) << "it has not changed";
+  EXPECT_FALSE(sets.poll()) << "it has not changed";
   for (int i = 0; i < 2; ++i) {
-    auto use = demand.use("scan");
+    std::optional<ScaleDemand::Use> use(std::in_place, demand, "scan");
     std::shared_ptr<const IntervalVolume> held = coarse;
     while (!held->is_whole()) {
-      EXPECT_TRUE(demand.ask("scan", held->size()));
-      const auto more = watcher.complete();
+      EXPECT_TRUE(use->want(held.get()));
+      const auto more = sets.complete();
       ASSERT_TRUE(more && *more);
       held = scan(**more);
     }
     EXPECT_EQ(held->description(), coarse->description());
-    EXPECT_FALSE(watcher.drop_unused({}));
+    EXPECT_FALSE(sets.drop_unused({}));
     use.reset();
-    const auto fewer = watcher.drop_unused({});
+    const auto fewer = sets.drop_unused({});
     ASSERT_TRUE(fewer);
     EXPECT_EQ(scan(*fewer), coarse);
-    EXPECT_FALSE(watcher.drop_unused({}));
+    EXPECT_FALSE(sets.drop_unused({}));
   }
 }
 
 TEST_F(RemoteDataSetsTest, OnDemandWhatCannotBeReadIsRefusedUntilItCan) {
   ScaleDemand demand;
-  CatalogueWatcher watcher({}, memory, false, inputs(), &demand);
-  const auto coarse = scan(watcher.load().value());
+  RemoteDataSets sets(inputs(), memory, false, &demand);
+  const auto coarse = scan(sets.load().value());
   std::atomic<bool> is_away = true;
   web.misbehave([&](const FileRequest&, std::size_t, FileAnswer& answer) {
     if (is_away) answer = {.status = 404};
   });
-  const auto use = demand.use("scan");
-  EXPECT_TRUE(demand.ask("scan", coarse->size()));
-  const auto failed = watcher.complete();
+  ScaleDemand::Use use(demand, "scan");
+  EXPECT_TRUE(use.want(coarse.get()));
+  const auto failed = sets.complete();
   ASSERT_TRUE(failed && *failed);
   EXPECT_EQ(scan(**failed), coarse);
-  EXPECT_FALSE(*watcher.complete()) << "it is not tried again at once";
-  EXPECT_FALSE(demand.ask("scan", coarse->size()));
+  EXPECT_FALSE(*sets.complete()) << "it is not tried again at once";
+  EXPECT_FALSE(use.want(coarse.get()));
   is_away = false;
-  EXPECT_FALSE(watcher.poll());
+  EXPECT_FALSE(sets.poll());
   const auto later = ScaleDemand::Clock::now() + ScaleDemand::kRetry;
   std::shared_ptr<const IntervalVolume> held = coarse;
   while (!held->is_whole()) {
-    EXPECT_TRUE(demand.ask("scan", held->size(), later));
-    const auto more = watcher.complete();
+    EXPECT_TRUE(use.want(held.get(), later));
+    const auto more = sets.complete();
     ASSERT_TRUE(more && *more);
     held = scan(**more);
   }
 }
 
-TEST_F(RemoteDataSetsTest, OnDemandAFileThatChangesIsDroppedToItsOwnCoarseScales) {
+TEST_F(RemoteDataSetsTest, OnDemandAFileThatChangesIsServedByItsOwnCoarseScales) {
   ScaleDemand demand;
-  CatalogueWatcher watcher({}, memory, false, inputs(), &demand);
-  const auto before = scan(watcher.load().value());
+  RemoteDataSets sets(inputs(), memory, false, &demand);
+  const auto before = scan(sets.load().value());
+  EXPECT_FALSE(sets.poll());
   auto field = testing::random_value_field({134, 70, 66}, 2);
   const auto bytes = encode_values(build_value_volume(field.volume, field.format), on_all_cores);
   web.set(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), "\"two\"");
-  const auto changed = watcher.poll();
+  const auto changed = sets.poll();
   ASSERT_TRUE(changed);
-  const auto whole = scan(*changed);
-  EXPECT_NE(whole->description(), before->description());
-  const auto fewer = watcher.drop_unused({});
-  ASSERT_TRUE(fewer);
-  EXPECT_EQ(scan(*fewer)->description(), whole->description());
-  EXPECT_LT(scan(*fewer)->size(), whole->size());
+  std::shared_ptr<const IntervalVolume> held = scan(*changed);
+  EXPECT_NE(held->description(), before->description());
+  EXPECT_FALSE(held->is_whole());
+  EXPECT_FALSE(sets.poll());
+  ScaleDemand::Use use(demand, "scan");
+  while (!held->is_whole()) {
+    EXPECT_TRUE(use.want(held.get()));
+    const auto more = sets.complete();
+    ASSERT_TRUE(more && *more);
+    held = scan(**more);
+  }
+  EXPECT_NE(held->description(), before->description());
 }
 
 TEST_F(RemoteDataSetsTest, AreReadWholeAtOnceWhereMemoryIsLimited) {
   Memory limited(std::uint64_t(1) << 30);
-  CatalogueWatcher watcher({}, limited, false, inputs());
-  EXPECT_TRUE(scan(watcher.load().value())->is_whole());
-  EXPECT_FALSE(*watcher.complete());
+  RemoteDataSets sets(inputs(), limited);
+  EXPECT_TRUE(scan(sets.load().value())->is_whole());
+  EXPECT_FALSE(*sets.complete());
 }
 
 }  // namespace
