@@ -36,7 +36,7 @@ std::string line_of(const nlohmann::ordered_json& dataset) {
                        values.at("greatest").get<double>(), shown(dataset.at("updates")));
   }
   const auto& range = dataset.at("range");
-  return fmt::format("{}, range [{}, {}], {} updates, {} tetrahedra in full\n", name, shown(range.at(0)), shown(range.at(1)),
+  return fmt::format("{}, range [{:g}, {:g}], {} updates, {} tetrahedra in full\n", name, range.at(0).get<double>(), range.at(1).get<double>(),
                      shown(dataset.at("updates")), shown(dataset.at("full").at("tets")));
 }
 

@@ -20,6 +20,7 @@
 #include "common/patch/visit_samples.h"
 #include "common/program/progress.h"
 #include "common/program/range_option.h"
+#include "common/remote/remote_url.h"
 #include "common/util/printable.h"
 #include "server/builder/build_data_set.h"
 #include "server/cli/build_input.h"
@@ -242,6 +243,7 @@ std::uint64_t most_resident_bytes() {
 
 Result<void> run(const BuildCommand& options) {
   const auto start = std::chrono::steady_clock::now();
+  if (is_remote_url(options.input)) return misuse("volumes are read from files, not from URLs: download '" + printable(options.input) + "' first");
   const auto range = parse_range(options.range);
   if (!range) return tl::unexpected(range.error());
   if (!*range && options.refine != "boundary") return misuse("--refine belongs to a range: give --range too, or --refine to extract");

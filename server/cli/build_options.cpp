@@ -43,6 +43,8 @@ Result<std::optional<RawLayout>> parse_layout(const BuildCommand& options) {
   const bool any = !options.dims.empty() || !options.type.empty() || !options.spacing.empty() || !options.origin.empty() || !options.affine.empty() ||
                    options.big_endian || options.skip != 0;
   if (!any) return std::optional<RawLayout>{};
+  if (options.dims.empty() && options.type.empty())
+    return misuse("--spacing, --origin, --affine, --big-endian and --skip describe raw input, which needs --dims X Y Z and --type, too");
   if (options.dims.empty() || options.type.empty()) return misuse("raw input needs both --dims X Y Z and --type");
   RawLayout layout;
   const auto type = parse_sample_type(options.type);

@@ -45,7 +45,7 @@ Result<std::unique_ptr<ScratchMemory>> open_data_memory(const ServeCommand& opti
   if (options.serve.max_memory && *options.serve.max_memory <= *options.data_memory)
     return misuse("--max-memory must be more than --data-memory, which it includes");
   auto memory = ScratchMemory::open_for_data_sets(options.scratch.value_or(kScratchFolder), *options.data_memory);
-  if (!memory) return fail("--data-memory: " + memory.error().message);
+  if (!memory) return tl::unexpected(Error{"--data-memory: " + memory.error().message, memory.error().usage});
   ScratchMemory::install(**memory);
   return memory;
 }

@@ -119,12 +119,12 @@ ScratchMemory::Reading::Reading() {
 Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open(const std::filesystem::path& folder, std::uint64_t budget, unsigned threads) {
   const std::uint64_t least = kProgram + threads * kThread;
   if (budget < least)
-    return fail("a budget of " + megabytes(budget) + " is too small: with " + std::to_string(threads) + " threads at least " + megabytes(least));
+    return misuse("a budget of " + megabytes(budget) + " is too small: with " + std::to_string(threads) + " threads at least " + megabytes(least));
   return map_file(folder, budget, Use::build);
 }
 
 Result<std::unique_ptr<ScratchMemory>> ScratchMemory::open_for_data_sets(const std::filesystem::path& folder, std::uint64_t budget) {
-  if (budget < kLeastData) return fail("a budget of " + megabytes(budget) + " is too small: at least " + megabytes(kLeastData));
+  if (budget < kLeastData) return misuse("a budget of " + megabytes(budget) + " is too small: at least " + megabytes(kLeastData));
   auto memory = map_file(folder, budget, Use::data_sets);
   if (memory) (*memory)->keeping_ = std::jthread([&scratch = **memory](const std::stop_token& stop) { scratch.keep(stop); });
   return memory;

@@ -290,21 +290,26 @@ std::optional<Catalogue> CatalogueWatcher::poll(const ParallelFor& parallel) {
   return *catalogue(false);
 }
 
-// What was read. A data set that cannot be added is an error at the start, and is skipped later.
+// What was read. A named data set that cannot be added is an error at the start; others are skipped.
 Result<Catalogue> CatalogueWatcher::catalogue(bool is_start) {
-  std::vector<std::pair<fs::path, Catalogue::Volume>> volumes;
-  for (const auto& [path, contents] : files_) volumes.emplace_back(path, contents.volume);
-  for (const auto& [path, file] : folder_files_) volumes.emplace_back(path, file.volume);
   Catalogue catalogue;
-  for (const auto& [path, volume] : volumes) {
-    const auto added = volume ? catalogue.add(volume) : Result<void>();
-    if (!added && is_start) return fail(added.error().message + " (" + path.string() + ")");
+  const auto add = [&](const fs::path& path, const Contents& contents) {
+    auto added = contents.volume ? catalogue.add(contents.volume) : Result<void>();
+    return added.map_error([&](const Error& error) { return Error{error.message + " (" + path.string() + ")"}; });
+  };
+  const auto skip = [&](const fs::path& path, const Result<void>& added) {
     if (added) {
       skipped_.erase(path);
     } else if (skipped_.insert(path).second) {
-      spdlog::warn("skipped: {} ({})", added.error().message, path.string());
+      spdlog::warn("skipped: {}", added.error().message);
     }
+  };
+  for (const auto& [path, contents] : files_) {
+    auto added = add(path, contents);
+    if (!added && is_start) return tl::unexpected(added.error());
+    skip(path, added);
   }
+  for (const auto& [path, file] : folder_files_) skip(path, add(path, file));
   return catalogue;
 }
 

@@ -32,8 +32,8 @@ class CatalogueWatcher : public DataSetSource {
   CatalogueWatcher(std::vector<std::filesystem::path> inputs, Memory& memory, bool tolerates_damage = false, ScaleDemand* demand = nullptr)
       : inputs_(std::move(inputs)), memory_(memory), tolerates_damage_(tolerates_damage), demand_(demand) {}
 
-  // A file in a folder that is damaged, or whose name is invalid, is logged and skipped. A named file with such a fault
-  // is an error; so are two data sets of one name, and a folder that cannot be read.
+  // A file in a folder that is damaged, or whose name is invalid or taken, is logged and skipped. A named file with such
+  // a fault is an error; so is a folder that cannot be read.
   Result<Catalogue> load(const ParallelFor& parallel = serial) override;
 
   // A named file that turns out to be damaged is an error; such a file in a folder is logged, and leaves the catalogue.

@@ -77,7 +77,9 @@ Result<void> Loading::offer(Source& source, Catalogue catalogue) {
   skipped_ = std::move(skipped);
   const std::size_t count = all.volumes().size();
   server_.offer(std::move(all));
-  if (!std::exchange(is_offered_, true)) spdlog::info("serving {} data set{}{}", count, count == 1 ? "" : "s", where_);
+  if (std::exchange(is_offered_, true)) return {};
+  spdlog::info("serving {} data set{}{}", count, count == 1 ? "" : "s", where_);
+  if (server_.memory().is_full()) spdlog::warn("the data sets take more memory than --max-memory allows: sessions are refused");
   return {};
 }
 

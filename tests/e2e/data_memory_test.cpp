@@ -102,7 +102,7 @@ TEST(DataMemory, OptionsThatCannotBeAreOneLine) {
   EXPECT_EQ(more.status, 2);
   EXPECT_EQ(more.err, "intervale: --max-memory must be more than --data-memory, which it includes\n");
   const auto little = serve({"--data-memory", "1MB"});
-  EXPECT_EQ(little.status, 1);
+  EXPECT_EQ(little.status, 2);
   EXPECT_EQ(little.err, "intervale: --data-memory: a budget of 1 MB is too small: at least 4 MB\n");
   const auto nowhere = serve({"--data-memory", "1GB", "--scratch", "/none"});
   EXPECT_EQ(nowhere.status, 1);

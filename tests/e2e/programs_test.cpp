@@ -125,6 +125,8 @@ TEST(Programs, WrongUsageIsStatus2) {
   expect_complaint(run({client(), "fetch", "ws://127.0.0.1:1/x", "--error", "-1"}), 2, "--error");
   expect_complaint(run({client(), "fetch", "ws://127.0.0.1:1/x", "--roi", "1", "0", "0", "0", "1", "1"}), 2, "--roi");
   expect_complaint(run({program("intervale"), "serve", buckyball(), "--listen", "nowhere"}), 2, "address", "intervale: ");
+  expect_complaint(run({program("intervale"), "build", "https://127.0.0.1:1/a.nrrd", "-o", "a.ivm"}), 2, "not from URLs", "intervale: ");
+  expect_complaint(run({program("intervale"), "build", "a.nrrd", "-o", "a.ivm", "--spacing", "1", "1", "2"}), 2, "describe raw input", "intervale: ");
 }
 
 TEST(Programs, ACameraThatMakesNoSenseIsStatus2) {

@@ -64,7 +64,7 @@ TEST_F(ScratchBuild, OptionsThatCannotBeAreOneLine) {
   EXPECT_EQ(alone.status, 2);
   EXPECT_EQ(alone.err, "intervale: --scratch belongs to a limit of memory, or to --resume: give --memory or --resume too\n");
   const auto little = run(build(volume, small, {"--memory", "1MB"}));
-  EXPECT_EQ(little.status, 1);
+  EXPECT_EQ(little.status, 2);
   EXPECT_THAT(little.err, StartsWith("intervale: a budget of 1 MB is too small: with 2 threads at least "));
   const auto nowhere = run(build(volume, small, {"--memory", "1GB", "--scratch", folder / "none"}));
   EXPECT_EQ(nowhere.status, 1);

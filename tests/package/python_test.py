@@ -227,6 +227,12 @@ class DataSets(Package):
         self.assertRaises(FileNotFoundError, intervale.open, self.folder / "none.ivm")
         self.assertRaises(intervale.FormatError, intervale.decode, b"nothing")
         self.assertRaises(ValueError, intervale.build, ball(), (2, 1))
+        self.assertRaises(ValueError, intervale.build, ball(), threads=-1)
+        self.assertRaises(ValueError, every.enclosed_volume, 1, 0)
+        for wrong in ((1, 2, 3), "ab", 5, [(0, 1), 2]):
+            self.assertRaisesRegex(ValueError, r"^a range is \(low, high\), not ", every.extract, wrong)
+        for wrong in ({"max_tets": -1}, {"max_updates": -1}, {"error": 1, "error_percent": 1}):
+            self.assertRaises(ValueError, every.extract, (0, 1), **wrong)
 
     def test_other_threads_run_meanwhile(self):
         ticks, fractions, stop = [], [], threading.Event()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import _intervale
-from ._request import make_request
+from ._request import check_count, make_request
 from ._volumes import Volume, read
 
 
@@ -58,6 +58,8 @@ class DataSet:
         """The volume that the closed range encloses, in world units cubed, at once: off by 0.1 % of the box at most. None
         for a data set of one range.
         """
+        if low > high:
+            raise ValueError(f"a range needs low <= high, not {low} and {high}")
         return self._handle._enclosed_volume(low, high)
 
 
@@ -69,6 +71,8 @@ def build(volume, range=None, *, refine="boundary", step=None, nan=None, channel
     fields on the same grid, each whatever volume may be. progress: called with the fraction done. threads: 0: one for
     each core.
     """
+    check_count("threads", threads)
+
     def raw(source):
         if isinstance(source, (str, os.PathLike)):
             source = read(source)

@@ -228,7 +228,7 @@ class Page {
       if (!isMissing) tell(null);
     } catch (error) {
       tell(null);
-      status.set({ error: textOf(error) });
+      status.set({ error: textOf(error), datasets: status.value.datasets ?? [] });
     }
   }
 

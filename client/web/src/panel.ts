@@ -101,7 +101,7 @@ function showDatasets(datasets: Dataset[] | null, open: Dataset | null, choose: 
   if (datasets === null) return;
   const list = element('datasets');
   if (datasets.length === 0) {
-    list.replaceChildren(create('p', { className: 'hint' }, 'This server has no data sets.'));
+    list.replaceChildren(create('p', { className: 'hint' }, 'There are no data sets.'));
     return;
   }
   // The same list keeps its elements, and with them the keyboard's focus.
