@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <condition_variable>
 #include <mutex>
-#include <random>
 #include <thread>
 #include <utility>
 
 #include "client/api/data_set_url.h"
-#include "client/core/backoff.h"
 #include "client/core/client_session.h"
+#include "client/core/reconnecting.h"
 #include "client/net/connection.h"
 #include "common/api/describe_data_set.h"
 
@@ -47,6 +46,7 @@ class LiveMesh::Worker {
       : url_(std::move(url)),
         options_(options),
         session_({.dataset = url_.name, .client = "intervale-client " INTERVALE_VERSION, .server = "the server at " + url_.authority()}),
+        reconnecting_(options.reconnect),
         request_(request),
         thread_([this] { run(); }) {}
   Worker(const Worker&) = delete;
@@ -122,8 +122,6 @@ class LiveMesh::Worker {
   // Over one connection after the other.
   Result<void> converse() {
     std::optional<Error> lost;
-    Clock::time_point deadline;
-    Backoff backoff(std::random_device{}());
     while (!is_ending()) {
       auto connection = StreamConnection::open(url_);
       if (!connection) {
@@ -133,15 +131,12 @@ class LiveMesh::Worker {
         if (stream || !session_.mesh() || !was_lost_ || options_.reconnect.count() == 0) return stream;
         session_.disconnected();
         lost = stream.error();
-        if (std::exchange(has_progress_, false) || !was_opened_) {
-          deadline = Clock::now() + options_.reconnect;
-          backoff = Backoff(std::random_device{}());
-        }
+        reconnecting_.lost();
       }
-      const auto pause = backoff.next();
-      if (Clock::now() + pause > deadline) return tl::unexpected(*lost);
+      const auto pause = reconnecting_.pause();
+      if (!pause) return tl::unexpected(*lost);
       std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, pause, [this] { return is_ending_; });
+      changed_.wait_for(lock, *pause, [this] { return is_ending_; });
     }
     return {};
   }
@@ -164,7 +159,7 @@ class LiveMesh::Worker {
   Result<void> receive_until_end(StreamConnection& connection) {
     if (auto looked = take_request(); !looked) return looked;
     session_.connected(Clock::now());
-    was_opened_ = false;
+    reconnecting_.connected();
     if (auto sent = connection.send(session_); !sent) return sent;
     while (!is_ending()) {
       if (auto looked = take_request(); !looked) return looked;
@@ -172,8 +167,7 @@ class LiveMesh::Worker {
       const bool is_late = make_state();
       const auto event = connection.receive(session_, is_late ? next_state() : Clock::time_point::max());
       if (!event) return tl::unexpected(event.error());
-      was_opened_ = was_opened_ || event->kind != ClientSession::Event::Kind::none;
-      has_progress_ = has_progress_ || event->updates > 0 || event->kind == ClientSession::Event::Kind::done;
+      reconnecting_.received(*event);
       if (event->kind == ClientSession::Event::Kind::opened) {
         if (auto opened = take_description(); !opened) return opened;
       }
@@ -250,8 +244,7 @@ class LiveMesh::Worker {
   ClientSession session_;
   CameraMotion motion_;
   bool was_lost_ = false;
-  bool was_opened_ = false;         // over the last connection
-  bool has_progress_ = true;        // since it was lost last: updates came, or the end of the stream
+  Reconnecting reconnecting_;
   bool is_changed_ = false;         // the mesh, since the last state
   Clock::time_point changed_at_{};  // when it changed last
   Clock::time_point made_at_{};     // the last state

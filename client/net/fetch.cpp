@@ -1,11 +1,10 @@
 #include "client/net/fetch.h"
 
 #include <chrono>
-#include <random>
 #include <thread>
 #include <utility>
 
-#include "client/core/backoff.h"
+#include "client/core/reconnecting.h"
 #include "client/net/connection.h"
 
 namespace intervale {
@@ -16,7 +15,7 @@ using Clock = FetchSession::Clock;
 class Fetch {
  public:
   Fetch(const ServerUrl& url, const FetchOptions& options, const FetchEvents& events)
-      : url_(url), options_(options), stream_(url.name, "the server at " + url.authority(), options, events) {}
+      : url_(url), options_(options), stream_(url.name, "the server at " + url.authority(), options, events), reconnecting_(options.reconnect) {}
 
   Result<void> run() {
     auto done = stream();
@@ -37,34 +36,28 @@ class Fetch {
     if (!connection) return tl::unexpected(connection.error());
     connection_ = std::move(*connection);
     stream_.session().connected(Clock::now());
-    was_opened_ = false;
+    reconnecting_.connected();
     if (auto sent = connection_->send(stream_.session()); !sent) return sent;
     while (!stream_.has_enough()) {
       const auto event = connection_->receive(stream_.session());
       if (!event) return tl::unexpected(event.error());
-      was_opened_ = was_opened_ || event->kind != ClientSession::Event::Kind::none;
-      has_progress_ = has_progress_ || event->updates > 0 || event->kind == ClientSession::Event::Kind::done;
+      reconnecting_.received(*event);
       if (auto received = stream_.received(*event); !received) return received;
       if (auto sent = connection_->send(stream_.session()); !sent) return sent;
     }
     return {};
   }
 
-  // Fails with `why` once the time for it is over, or as stream() does. A server that is reached again and opens the
-  // data set, but sends nothing new before it ends the session, has not been reached.
+  // Fails with `why` once the time for it is over, or as stream() does.
   Result<void> reconnect(const Error& why) {
-    if (std::exchange(has_progress_, false) || !was_opened_) {
-      stream_.notice(why.message + "; connecting again");
-      deadline_ = Clock::now() + options_.reconnect;
-      backoff_ = Backoff(std::random_device{}());
-    }
+    if (reconnecting_.lost()) stream_.notice(why.message + "; connecting again");
     stream_.session().disconnected();
     connection_.reset();
     Result<void> done;
     while (!connection_) {
-      const auto wait = backoff_.next();
-      if (Clock::now() + wait > deadline_) return tl::unexpected(why);
-      std::this_thread::sleep_for(wait);
+      const auto pause = reconnecting_.pause();
+      if (!pause) return tl::unexpected(why);
+      std::this_thread::sleep_for(*pause);
       done = stream();
     }
     return done;
@@ -76,10 +69,7 @@ class Fetch {
   const FetchOptions& options_;
   FetchSession stream_;
   std::optional<StreamConnection> connection_;
-  bool was_opened_ = false;       // over the last connection
-  bool has_progress_ = true;      // since it was lost last: updates came, or the end of the stream
-  Clock::time_point deadline_{};  // for reaching the server again
-  Backoff backoff_{0};
+  Reconnecting reconnecting_;
 };
 
 }  // namespace

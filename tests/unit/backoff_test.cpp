@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+
+#include "client/core/reconnecting.h"
 
 namespace intervale {
 namespace {
@@ -24,6 +27,31 @@ TEST(Backoff, ClientsOfOneServerComeBackApart) {
   bool apart = false;
   for (int attempt = 0; attempt < 4; ++attempt) apart |= a.next() != b.next();
   EXPECT_TRUE(apart);
+}
+
+// The time begins anew with each loss, but not where a server opened the data set and sent nothing.
+TEST(Reconnecting, EndsWhereNothingNewComes) {
+  using Kind = ClientSession::Event::Kind;
+  using std::chrono::seconds;
+  const auto start = Reconnecting::Clock::now();
+  Reconnecting reconnecting(seconds(30));
+  reconnecting.connected();
+  reconnecting.received({.kind = Kind::opened});
+  EXPECT_TRUE(reconnecting.lost(start)) << "the first time";
+  EXPECT_TRUE(reconnecting.pause(start));
+  EXPECT_FALSE(reconnecting.pause(start + seconds(31)));
+  reconnecting.connected();
+  reconnecting.received({.kind = Kind::opened});
+  EXPECT_FALSE(reconnecting.lost(start + seconds(20)));
+  EXPECT_FALSE(reconnecting.pause(start + seconds(31)));
+  reconnecting.connected();
+  EXPECT_TRUE(reconnecting.lost(start + seconds(20))) << "it was not opened: the server may be starting";
+  EXPECT_TRUE(reconnecting.pause(start + seconds(31)));
+  reconnecting.connected();
+  reconnecting.received({.kind = Kind::opened});
+  reconnecting.received({.kind = Kind::batch, .updates = 7});
+  EXPECT_TRUE(reconnecting.lost(start + seconds(60)));
+  EXPECT_TRUE(reconnecting.pause(start + seconds(70)));
 }
 
 }  // namespace
