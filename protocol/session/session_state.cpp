@@ -23,6 +23,15 @@ Fault other_version(std::uint32_t payload) {
 // Most memory of messages that wait for a data set to grow: Haves of some five million updates.
 constexpr std::uint64_t kMostHeld = 4 << 20;
 
+// Of a Have or a View.
+std::uint64_t held_size(const protocol::ClientMessage& message) {
+  if (const auto* const have = std::get_if<protocol::Have>(&message)) return sizeof(message) + have->splits.size() * sizeof(SlotGroup);
+  const auto& view = std::get<protocol::View>(message);
+  std::uint64_t bytes = sizeof(message) + view.forget.size() * sizeof(SlotGroup) + view.shown.ranges.size() * sizeof(Range);
+  for (const std::string& name : view.channels) bytes += sizeof(std::string) + name.size();
+  return bytes + (view.depth ? view.depth->codes.size() : 0);
+}
+
 // Once a view is so exact, updates of every range with at least such errors go ahead of the rest of it: few, so that it is
 // not put off for long.
 constexpr double kCoarsePixels = 16, kAheadOfRestPercent = 40;
@@ -48,9 +57,15 @@ bool SessionState::lacks_updates_of(const protocol::ClientMessage& message) cons
 }
 
 std::optional<Fault> SessionState::hold(const protocol::ClientMessage& message) {
-  const auto* const view = std::get_if<protocol::View>(&message);
-  const auto groups = view != nullptr ? view->forget.size() : std::get<protocol::Have>(message).splits.size();
-  held_bytes_ += sizeof(message) + groups * sizeof(SlotGroup) + (view != nullptr && view->depth ? view->depth->codes.size() : 0);
+  // A view that gives nothing up is over with the next one.
+  if (std::holds_alternative<protocol::View>(message) && !held_.empty()) {
+    const auto* const last = std::get_if<protocol::View>(&held_.back());
+    if (last != nullptr && last->forget.empty()) {
+      held_bytes_ -= held_size(held_.back());
+      held_.pop_back();
+    }
+  }
+  held_bytes_ += held_size(message);
   if (held_bytes_ > kMostHeld) return Fault{CloseCode::going_away, "the data set is being read"};
   held_.push_back(message);
   return {};
@@ -62,7 +77,7 @@ std::optional<Fault> SessionState::handle_held() {
   if (!handles_held_) return {};
   const protocol::ClientMessage message = std::move(held_.front());
   held_.erase(held_.begin());
-  if (held_.empty()) held_bytes_ = 0;
+  held_bytes_ -= held_size(message);
   handles_held_ = !held_.empty();
   return handle(message);
 }
